@@ -7,6 +7,7 @@ from collections.abc import Sequence, Set
 import numpy as np
 import pandas as pd
 
+from adapters.engines import OWN as OWN_PROFILE
 from reports.compare.comparison import Comparison
 from reports.page import pooled
 from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, grouped
@@ -27,8 +28,8 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     statuses = [run.status for comparison in comparisons for run in comparison.runs]
     sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
     if engines is not off:
-        sentences = [how_right(name, off) for name in groups.get(YOURS, [])] + sentences
-        sentences += [how_right(name, off) for name in groups.get(EXACT, [])]
+        sentences = [how_right(name, off, FAR_OFF) for name in groups.get(YOURS, [])] + sentences
+        sentences += [how_right(name, off, RIGHT) for name in groups.get(EXACT, [])]
     if untrusted:
         sentences.append(
             f"Not counted, as it broke the protocol of the harness: {', '.join(sorted(untrusted))}."
@@ -53,21 +54,25 @@ def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> 
     return table.reindex(index=scored, columns=names)
 
 
-def how_right(name: str, off: pd.DataFrame) -> str:
-    """Of an engine that is not ranked: in how many scenes it is right, and in which it fails."""
+def how_right(name: str, off: pd.DataFrame, within: float) -> str:
+    """Of an engine that is not ranked: in how many scenes it is so near, radii; in which it is more
+    than a radius off, the worst first; and in which it has no result."""
     errors = off[name].dropna()
-    far = errors[errors > FAR_OFF].sort_values(ascending=False, kind="stable")
-    right = f"{name} is within {number(RIGHT)} radii in {int((errors < RIGHT).sum())}"
-    listed = [
-        f"{scene} ({f'{number(error, 2)} radii' if np.isfinite(error) else 'no result'})"
-        for scene, error in far.items()
+    far = errors[(errors > FAR_OFF) & np.isfinite(errors)].sort_values(ascending=False)
+    lost = list(errors.index[np.isinf(errors)])
+    near = "radius" if within == 1 else "radii"
+    parts = [
+        f"{name.removesuffix(OWN_PROFILE)} is within {number(within)} {near} of the exact answer in"
+        f" {int((errors <= within).sum())} of {counted(len(errors), 'scene')}"
     ]
-    more = f" and {len(listed) - 3} more" if len(listed) > 3 else ""
-    return (
-        f"{right} of {counted(len(errors), 'scene')}"
-        + (f", and fails in {', '.join(listed[:3])}{more}" if listed else ", and fails in none")
-        + ". It is not ranked among the engines."
-    )
+    if len(far):
+        parts.append(f"off by {number(far.iloc[0], 2)} radii in {far.index[0]}")
+        if len(far) > 1:
+            parts.append(f"by more than a radius in {len(far) - 1} more")
+    if lost:
+        more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+        parts.append(f"without a result in {', '.join(lost[:3])}{more}")
+    return f"{', '.join(parts)}. It is not ranked among the engines."
 
 
 def closest(off: pd.DataFrame) -> str:

@@ -108,11 +108,14 @@ def test_findings_rank_engines_and_say_in_how_many_scenes_the_others_are_right()
     errors = score(ERRORS | {"mine.py:own": [1e-3, 2.0, 1e-9]})
     off = errors.pivot(index="scenario", columns="name", values="error")
 
-    assert findings.how_right("reference:ordered", off) == (
-        "reference:ordered is within 10⁻⁶ radii in 2 of 3 scenes, and fails in c (1000 radii). It"
-        " is not ranked among the engines."
+    assert findings.how_right("reference:ordered", off, situations.RIGHT) == (
+        "reference:ordered is within 10⁻⁶ radii of the exact answer in 2 of 3 scenes, off by 1000"
+        " radii in c. It is not ranked among the engines."
     )
-    assert "in 1 of 3 scenes, and fails in b (2 radii)" in findings.how_right("mine.py:own", off)
+    mine = findings.how_right("mine.py:own", off, situations.FAR_OFF)
+    assert "mine.py is within 1 radius of the exact answer in 2 of 3 scenes, off by 2" in mine
+    box2d = findings.how_right("box2d:matched", off, situations.FAR_OFF)
+    assert "in 2 of 3 scenes, without a result in c." in box2d
 
 
 def test_findings_and_summary_have_one_median(comparisons: list[Comparison]):
