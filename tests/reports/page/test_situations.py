@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -214,6 +215,40 @@ def as_number(text: str) -> float:
     if plain.startswith("10-"):
         plain = f"1×{plain}"
     return float(plain.replace("×10", "e"))
+
+
+def test_where_no_engine_is_within_a_radius_none_is_called_best(
+    comparisons: list[Comparison], tmp_path: Path
+):
+    """All positions 50 radii off. The control: as they were played, an engine is named."""
+    page = tmp_path / "report.html"
+    said = []
+    for error in (None, 50.0):
+        table = comparisons[0].table.copy()
+        if error is not None:
+            table.loc[table.metric == "position_max_radii", "value"] = error
+        write_small(page, [replace(comparisons[0], table=table)])
+        said.append("<b>none within 1 radius</b>" in page.read_text(encoding="utf-8"))
+
+    assert said == [False, True]
+
+
+def test_your_solver_comes_before_the_engines(comparisons: list[Comparison], tmp_path: Path):
+    """What `check` says of the file, then its column, then the engines; without a file neither."""
+    page, one = tmp_path / "report.html", comparisons[0]
+    whose = {"engine": "mine.py", "profile": "own"}
+    runs = [replace(run, **whose) if run.name == "reference:exercise" else run for run in one.runs]
+    table = one.table.copy()
+    table.loc[table.engine == "reference", list(whose)] = list(whose.values())
+    write_small(page, [one])
+    without = page.read_text(encoding="utf-8")
+    said = {"mine.py:own": ["No fault found."]}
+    write_small(page, [replace(one, runs=runs, table=table)], said=said)
+    text = page.read_text(encoding="utf-8")
+    places = [text.index(word) for word in ("No fault found", ">Your solver<", ">Best engine")]
+
+    assert places == sorted(places)
+    assert ">Your solver<" not in without
 
 
 def test_one_scene_does_not_drown_a_column():
