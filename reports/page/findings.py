@@ -1,5 +1,4 @@
-"""The finding in three sentences, computed from the table: nothing here is written by hand but the
-grammar."""
+"""The findings, computed from the scores: nothing here is written by hand but the grammar."""
 
 from __future__ import annotations
 
@@ -8,30 +7,37 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 import pandas as pd
 
-from adapters.engines import OWN
+from adapters.engines import OWN as OWN_PROFILE
 from reports.compare.comparison import Comparison
-from reports.page.overview import MAPPED, values
+from reports.page import pooled
+from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, grouped
+from reports.page.style import number
 from reports.terminal.counts import counted
-
-FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
-    """Three sentences: who is closest, what settings are worth, where each fails; of none who is
-    `untrusted`. A solver's own file that refuses scenes has a sentence of its own."""
-    off = position_errors(comparisons).drop(columns=list(untrusted), errors="ignore")
-    refusals = own_refusals(comparisons)
-    ranked = off.drop(columns=list(refusals), errors="ignore")
-    if ranked.columns.empty:
-        ranked = off
+    """Who is closest, what settings are worth, where each fails; before them the reader's own
+    solver, after them what orders collisions by time. None who is `untrusted`."""
+    scores = pooled.scores(comparisons)
+    scores = scores[scores.middle & ~scores.name.isin(untrusted)]
+    groups = grouped(dict.fromkeys(scores.name), scores)
+    refused = own_refusals(comparisons)
+    off = position_errors(scores, comparisons)
+    for name in refused.keys() & off.columns:
+        off.loc[off.index.isin(refused[name]), name] = np.nan
+    apart = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
+    # where nothing else was played, these are all there is to speak of
+    engines = off if len(apart) == off.shape[1] else off.drop(columns=apart)
     statuses = [
         run.status
         for comparison in comparisons
         for run in comparison.runs
-        if comparison.scenario.name not in refusals.get(run.name, {})
+        if comparison.scenario.name not in refused.get(run.name, {})
     ]
-    own = [asked_in_part(off[name], refusals[name]) for name in refusals if name in off]
-    return [closest(ranked), worth_of_settings(ranked), where_it_fails(ranked, statuses), *own]
+    sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
+    own = [how_right(name, off, FAR_OFF, refused.get(name, {})) for name in groups.get(YOURS, [])]
+    exact = [how_right(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
+    return sentences if engines is off else [*own, *sentences, *exact]
 
 
 def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
@@ -40,17 +46,9 @@ def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]
     found: dict[str, dict[str, str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
-            if run.name.endswith(OWN) and run.status == "unsupported":
+            if run.name.endswith(OWN_PROFILE) and run.status == "unsupported":
                 found.setdefault(run.name, {})[comparison.scenario.name] = run.reason
     return found
-
-
-def asked_in_part(off: pd.Series, refused: Mapping[str, str]) -> str:
-    """How far a solver's own file is off where it is asked, and why it is not asked elsewhere."""
-    asked = off.drop(index=list(refused), errors="ignore")
-    why = "; ".join(dict.fromkeys(refused.values()))
-    number = f"{asked.median():.2g} radii off, {over_scenes(len(asked))}; " if len(asked) else ""
-    return f"{off.name}: {number}not asked in {counted(len(refused), 'scene')} ({why})."
 
 
 def not_counted(broken: Mapping[str, str]) -> list[str]:
@@ -62,27 +60,46 @@ def not_counted(broken: Mapping[str, str]) -> list[str]:
     ]
 
 
-def position_errors(comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row a scenario, a column an
-    `engine:profile`.
+def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> pd.DataFrame:
+    """Largest deviation from the truth in radii at the middle dt: a row a scenario with an exact
+    answer, a column an `engine:profile`.
 
     `inf` for who was asked and has no result, so that to refuse a hard scene does not help.
     """
     # A truth that is lost before its second sample has only the start, which is given to all.
     scored = [
-        comparison
+        comparison.scenario.name
         for comparison in comparisons
         if comparison.truth is not None and len(comparison.truth) > 1
     ]
-    rows = []
-    for comparison in scored:
-        found = {
-            name: one.value
-            for (name, metric), one in values(comparison).items()
-            if metric == MAPPED
-        }
-        rows.append({run.name: found.get(run.name, np.inf) for run in comparison.middle_runs})
-    return pd.DataFrame(rows, index=[comparison.scenario.name for comparison in scored])
+    names = list(dict.fromkeys(scores.name))
+    table = scores.pivot(index="scenario", columns="name", values="error")
+    return table.reindex(index=scored, columns=names)
+
+
+def how_right(name: str, off: pd.DataFrame, within: float, refused: Mapping[str, str]) -> str:
+    """Of an engine that is not ranked: in how many scenes it is so near, radii; in which it is more
+    than a radius off, the worst first; in which it has no result; which it was not asked, and
+    why."""
+    errors = off[name].dropna()
+    far = errors[(errors > FAR_OFF) & np.isfinite(errors)].sort_values(ascending=False)
+    lost = list(errors.index[np.isinf(errors)])
+    near = "radius" if within == 1 else "radii"
+    parts = [
+        f"{name.removesuffix(OWN_PROFILE)} is within {number(within)} {near} of the exact answer in"
+        f" {int((errors <= within).sum())} of {counted(len(errors), 'scene')}"
+    ]
+    if len(far):
+        parts.append(f"off by {number(far.iloc[0], 2)} radii in {far.index[0]}")
+        if len(far) > 1:
+            parts.append(f"by more than a radius in {len(far) - 1} more")
+    if lost:
+        more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+        parts.append(f"without a result in {', '.join(lost[:3])}{more}")
+    if refused:
+        why = "; ".join(dict.fromkeys(refused.values()))
+        parts.append(f"not asked in {counted(len(refused), 'scene')} ({why})")
+    return f"{', '.join(parts)}. It is not ranked among the engines."
 
 
 def closest(off: pd.DataFrame) -> str:
@@ -103,7 +120,7 @@ def closest(off: pd.DataFrame) -> str:
             "No engine was played to its end in half of the scenes with an exact answer, so engines"
             " are not ranked."
         )
-    best, *others = (f"{name} ({value:.2g})" for name, value in medians.items())
+    best, *others = (f"{name} ({number(value, 2)})" for name, value in medians.items())
     # within 1 % counts as equal
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     ranking = (
@@ -145,10 +162,10 @@ def worth_of_settings(off: pd.DataFrame) -> str:
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     """Scenes in which an engine ends up more than a radius away, and cells without a result."""
     cells = played_to_the_end(statuses)
-    lost = off > FAR_OFF
+    lost = off > FAR_OFF  # what was not asked for is nan
     if off.empty or not lost.any(axis=None):
         return (
-            f"No engine that is scored is off by more than a radius; {cells}"
+            f"No engine that is ranked is off by more than a radius; {cells}"
             if not off.empty
             else cells[0].upper() + cells[1:]
         )

@@ -146,16 +146,27 @@ def summary(
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
+    scores = pooled.scores(comparisons)
+    scored = set(scores.scenario)
     rows: dict[str, list[OverviewCell]] = {}
     for name in names:
-        cells = [pool(metric, name, comparisons, found) for metric in SUMMARY if metric != "failed"]
+        lost = [
+            comparison.scenario.name
+            for comparison, each in zip(comparisons, failed)
+            if name in each and comparison.scenario.name in scored
+        ]
+        cells = [
+            pool(metric, name, comparisons, found, lost if metric == MAPPED else ())
+            for metric in SUMMARY
+            if metric != "failed"
+        ]
         if name in untrusted:
             broken = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
             cells = [broken] * len(cells)
         count = sum(name in each for each in failed)
         cells.append(OverviewCell(f"{count} of {len(comparisons)}", failed=count > 0, value=count))
         rows[name] = cells
-    groups = situations.grouped(names, pooled.scores(comparisons))
+    groups = situations.grouped(names, scores)
     marked = [mark_best({name: rows[name] for name in each}, untrusted) for each in groups.values()]
     return {name: each[name] for name in names for each in marked if name in each}
 
@@ -183,9 +194,15 @@ def by_value(cell: OverviewCell) -> float:
 
 
 def pool(
-    metric: str, name: str, comparisons: Sequence[Comparison], found: Sequence[Found]
+    metric: str,
+    name: str,
+    comparisons: Sequence[Comparison],
+    found: Sequence[Found],
+    lost: Iterable[str] = (),
 ) -> OverviewCell:
     """Median and worst of a metric over the scenarios in which it is judged, and in how many it is.
+
+    In those that are `lost` the engine has no result, which counts as infinitely far off.
 
     Wrong collisions are the missed and the spurious of a scene together; where nobody can miss one,
     as there is none, those that are spurious count alone.
@@ -200,14 +217,14 @@ def pool(
         if any(one.judged for one in each)
     }
     left_out = sum(bool(each) for each in known) - len(totals)
+    totals |= dict.fromkeys(lost, np.inf)
     remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
     if not totals:
         return OverviewCell(number(np.nan), remark)
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
     worst = totals[worst_in]
-    return OverviewCell(
-        number(value), remark, value=value, worst=number(worst) if worst else "", worst_in=worst_in
-    )
+    shown = "no result" if np.isinf(worst) else number(worst) if worst else ""
+    return OverviewCell(number(value), remark, value=value, worst=shown, worst_in=worst_in)
 
 
 def heat_map(

@@ -1,5 +1,5 @@
 """Which engine for what: a scene belongs to a situation, and in each the engines are ranked apart
-from this project's own solvers and from its exact references."""
+from the reader's own solver and from this project's solvers."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import ENGINES
+from adapters.engines import OWN as OWN_PROFILE
 from scenarios.model import Scenario, Trajectory
 
 FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN = (
@@ -30,8 +31,9 @@ SITUATIONS = {
     SPIN: "a disk turns; these scenes count above as well",
     ALL: "of all situations",
 }
-ENGINE, OWN, EXACT = "Engines", "Hand-written solvers of this project", "Exact references"
-RIGHT = 1e-6  # radii: a solver of this project that is closer in half of the scenes is a reference
+YOURS, ENGINE = "Your solver", "Engines"
+OWN, EXACT = "Solvers of this project", "Solvers of this project that order collisions by time"
+RIGHT = 1e-6  # radii: what is closer is right; in half of the scenes only collisions in order are
 FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
 COLUMNS = ["scenario", "name", "error", "angle", "cost"]
 
@@ -84,6 +86,7 @@ class Ranked(NamedTuple):
         name: `engine:profile`.
         median, worst: error over the scenes, radii (rad of an angle); inf: no result.
         worst_in: the scene of the worst.
+        right: in how many scenes it is off by less than `RIGHT`.
         fails: scene -> error, of those where it is off by more than `FAR_OFF`, the worst first.
         cost: µs of engine time per simulated second, median; nan where not known.
     """
@@ -92,6 +95,7 @@ class Ranked(NamedTuple):
     median: float
     worst: float
     worst_in: str
+    right: int
     fails: Mapping[str, float]
     cost: float
 
@@ -104,8 +108,9 @@ class Answer(NamedTuple):
         scenes: which belong to it.
         best, other: of what takes part as an engine, the nearest to the exact answers; and the best
             profile of any other engine, if there is one.
-        own: the best of the hand-written solvers beside it, if it is not `best` itself.
-        exact: the exact references.
+        yours: the reader's own solvers, the best first.
+        own: the best of `OWN` beside it, if it is not `best` itself.
+        exact: those of `EXACT`.
     """
 
     title: str
@@ -114,22 +119,25 @@ class Answer(NamedTuple):
     scenes: Sequence[str]
     best: Ranked
     other: Ranked | None
+    yours: Sequence[Ranked]
     own: Ranked | None
     exact: Sequence[Ranked]
 
 
 def grouped(names: Iterable[str], scores: pd.DataFrame) -> dict[str, list[str]]:
-    """`ENGINE`, `OWN`, `EXACT` -> their names in the order given; groups without a name are left
-    out.
+    """`YOURS`, `ENGINE`, `OWN`, `EXACT` -> their names in the order given; groups without a name
+    are left out.
 
-    An engine is what others made: a library, or a solver's file. A solver of this project is an
-    exact reference if the median of its errors is below `RIGHT`.
+    Yours is a solver's file; an engine is a library. A solver of this project belongs to `EXACT` if
+    the median of its errors is below `RIGHT`.
     """
     medians = scores.groupby("name").error.median()
-    groups: dict[str, list[str]] = {ENGINE: [], OWN: [], EXACT: []}
+    groups: dict[str, list[str]] = {YOURS: [], ENGINE: [], OWN: [], EXACT: []}
     for name in names:
         row = ENGINES.get(name)
-        if row is None or row.distributions:
+        if name.endswith(OWN_PROFILE):
+            groups[YOURS].append(name)
+        elif row is None or row.distributions:
             groups[ENGINE].append(name)
         else:
             groups[EXACT if medians.get(name, np.inf) < RIGHT else OWN].append(name)
@@ -150,7 +158,7 @@ def answers(
     if scores.empty:
         return []
     groups = grouped(dict.fromkeys(scores.name), scores)
-    ranked = groups.get(ENGINE) or groups.get(OWN) or groups[EXACT]
+    ranked = next(groups[group] for group in (ENGINE, OWN, EXACT, YOURS) if group in groups)
     rows: list[Answer] = []
     for title, meaning in SITUATIONS.items():
         members = [s for s in dict.fromkeys(scores.scenario) if title in [*situations[s], ALL]]
@@ -189,6 +197,7 @@ def answer(
         list(dict.fromkeys(here.scenario)),
         best,
         next((one for one in rest if one.name.split(":")[0] != engine), None),
+        in_order(name for name in groups.get(YOURS, []) if name not in ranked),
         own[0] if own and own[0].name not in ranked else None,
         in_order(name for name in groups.get(EXACT, []) if name not in ranked),
     )
@@ -203,6 +212,7 @@ def rank(name: str, mine: pd.DataFrame) -> Ranked:
         float(errors.median()),
         float(errors.iloc[0]),
         str(errors.index[0]),
+        int((errors < RIGHT).sum()),
         {str(scene): float(error) for scene, error in errors.items() if error > FAR_OFF},
         float(costs.median()) if len(costs) else np.nan,
     )

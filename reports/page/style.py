@@ -15,8 +15,10 @@ TRUTH = "truth"
 
 
 class Look(NamedTuple):
-    """How an engine and profile are drawn; the shape shows the engine and the dash the profile
-    without colour.
+    """How an engine and profile are drawn.
+
+    Without colour the mark (shape, filled or not) tells all of `ENGINES` apart, and the dash tells
+    the profiles of an engine apart.
 
     Attributes:
         light, dark: hex colour on a light and on a dark page.
@@ -59,6 +61,9 @@ PATHS = {
     "hexagon": "M-2.3,-4H2.3L4.6,0L2.3,4H-2.3L-4.6,0Z",
     "pentagon": "M0,-4.6L4.4,-1.4L2.7,3.7H-2.7L-4.4,-1.4Z",
     "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
+    "hourglass": "M-3.4,-4.2H3.4L-3.4,4.2H3.4Z",
+    "x": "M-4.2,-2.1L-2.1,-4.2L0,-2.1L2.1,-4.2L4.2,-2.1L2.1,0L4.2,2.1L2.1,4.2L0,2.1L-2.1,4.2"
+    "L-4.2,2.1L-2.1,0Z",
     "star": "M0,-5L1.3,-1.7L4.8,-1.5L2.1,0.7L2.9,4L0,2.2L-2.9,4L-2.1,0.7L-4.8,-1.5L-1.3,-1.7Z",
 }
 PALETTE = (
@@ -70,6 +75,9 @@ PALETTE = (
 )
 DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3), "neighbours": (7, 5)}
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
+# Of an engine with more than two profiles: filled and open tell two of them apart where there is
+# no colour and no line, the others have a shape of their own.
+SHAPED = {"ordered": "hourglass", "neighbours": "x"}
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep
 # to pale on dark.
@@ -104,7 +112,7 @@ def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile`, or the truth, is drawn."""
     light, dark, shape = OF_TRUTH if engine == TRUTH else mark_of(engine)
     dash = CHANGED if "+" in profile else DASHED.get(profile, ())
-    return Look(light, dark, dash, shape, not dash)
+    return Look(light, dark, dash, SHAPED.get(profile, shape), not dash)
 
 
 def mark_of(engine: str) -> Mark:

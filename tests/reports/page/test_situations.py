@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +11,14 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
+from adapters.engines import ENGINES
 from reports.compare.comparison import Comparison
-from reports.page import charts, overview, situations
+from reports.page import charts, findings, overview, situations
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
 from reports.page.pooled import scores
 from reports.page.situations import CROWDS, FLIGHT, ROWS, SINGLE, SPIN, STACKS
+from reports.page.style import PATHS, look, mark_of
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, write_small
@@ -83,6 +87,63 @@ def test_engines_are_ranked_among_themselves_and_the_next_is_another_engine():
     assert row.own is not None
     assert row.own.name == "reference:exercise"
     assert [one.name for one in row.exact] == ["reference:ordered"]
+
+
+def test_a_solvers_file_is_yours_and_not_ranked_among_the_engines():
+    """It stands first, though it is nearer than all of them; without it nothing is yours."""
+    with_mine = score(ERRORS | {"mine.py:own": [1e-3, 2.0, 1e-9]})
+    [row] = situations.answers(with_mine, PLACES, set())
+    [alone] = situations.answers(score({"mine.py:own": [1e-3, 2.0]}), PLACES, set())
+    groups = situations.grouped(dict.fromkeys(with_mine.name), with_mine)
+
+    assert [one.name for one in row.yours] == ["mine.py:own"]
+    assert (row.yours[0].right, row.yours[0].fails) == (1, {"b": 2.0})
+    assert row.best.name == "pymunk:matched"
+    assert next(iter(groups)) == situations.YOURS
+    assert (alone.best.name, alone.yours) == ("mine.py:own", [])
+
+
+def test_findings_rank_engines_and_say_in_how_many_scenes_the_others_are_right():
+    """What orders collisions by time is neither first nor in the list of who fails; your file's
+    sentence is the first."""
+    errors = score(ERRORS | {"mine.py:own": [1e-3, 2.0, 1e-9]})
+    off = errors.pivot(index="scenario", columns="name", values="error")
+
+    assert findings.how_right("reference:ordered", off, situations.RIGHT) == (
+        "reference:ordered is within 10⁻⁶ radii of the exact answer in 2 of 3 scenes, off by 1000"
+        " radii in c. It is not ranked among the engines."
+    )
+    mine = findings.how_right("mine.py:own", off, situations.FAR_OFF)
+    assert "mine.py is within 1 radius of the exact answer in 2 of 3 scenes, off by 2" in mine
+    box2d = findings.how_right("box2d:matched", off, situations.FAR_OFF)
+    assert "in 2 of 3 scenes, without a result in c." in box2d
+
+
+def test_findings_and_summary_have_one_median(comparisons: list[Comparison]):
+    """Of every engine, one without any result included: it is infinitely far off in both."""
+    names = overview.names_of(comparisons)
+    found = scores(comparisons)
+    middle = found[found.middle]
+    off = findings.position_errors(middle, comparisons)
+    rows = overview.summary(comparisons, names, set())
+
+    assert {name: rows[name][0].value for name in names} == off.median().to_dict()
+    assert rows["box2d_v3:shipped"][0].worst == "no result"
+
+
+MARKS = {name: look(*name.split(":")) for name in (*ENGINES, "reference:neighbours")}
+
+
+def test_every_engine_is_told_without_colour():
+    """By its mark, where there are marks only; by its dash, where an engine has several lines."""
+    for one, other in combinations(MARKS, 2):
+        first, second = MARKS[one], MARKS[other]
+        assert first.symbol != second.symbol, (one, other)
+        assert one.split(":")[0] != other.split(":")[0] or first.dash != second.dash, (one, other)
+    assert {each.shape for each in MARKS.values()} <= set(PATHS)
+    # the control: with the shape of its engine alone, one of reference's would be another's mark
+    alike = {(mark_of(name.split(":")[0]).shape, each.filled) for name, each in MARKS.items()}
+    assert len(alike) < len(MARKS)
 
 
 def test_equal_medians_are_ordered_by_the_worst_scene_and_who_breaks_the_protocol_is_left_out():
@@ -154,6 +215,40 @@ def as_number(text: str) -> float:
     if plain.startswith("10-"):
         plain = f"1×{plain}"
     return float(plain.replace("×10", "e"))
+
+
+def test_where_no_engine_is_within_a_radius_none_is_called_best(
+    comparisons: list[Comparison], tmp_path: Path
+):
+    """All positions 50 radii off. The control: as they were played, an engine is named."""
+    page = tmp_path / "report.html"
+    said = []
+    for error in (None, 50.0):
+        table = comparisons[0].table.copy()
+        if error is not None:
+            table.loc[table.metric == "position_max_radii", "value"] = error
+        write_small(page, [replace(comparisons[0], table=table)])
+        said.append("<b>none within 1 radius</b>" in page.read_text(encoding="utf-8"))
+
+    assert said == [False, True]
+
+
+def test_your_solver_comes_before_the_engines(comparisons: list[Comparison], tmp_path: Path):
+    """What `check` says of the file, then its column, then the engines; without a file neither."""
+    page, one = tmp_path / "report.html", comparisons[0]
+    whose = {"engine": "mine.py", "profile": "own"}
+    runs = [replace(run, **whose) if run.name == "reference:exercise" else run for run in one.runs]
+    table = one.table.copy()
+    table.loc[table.engine == "reference", list(whose)] = list(whose.values())
+    write_small(page, [one])
+    without = page.read_text(encoding="utf-8")
+    said = {"mine.py:own": ["No fault found."]}
+    write_small(page, [replace(one, runs=runs, table=table)], said=said)
+    text = page.read_text(encoding="utf-8")
+    places = [text.index(word) for word in ("No fault found", ">Your solver<", ">Best engine")]
+
+    assert places == sorted(places)
+    assert ">Your solver<" not in without
 
 
 def test_one_scene_does_not_drown_a_column():
