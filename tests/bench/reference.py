@@ -160,9 +160,8 @@ def compared(
         yield Figure(scene, n, f"{name}, step", middle, high - low, "us")
         if name != base:
             ratio = float(np.median(samples / measured[base]))
-            yield Figure(
-                scene, n, f"{name} over {base}", ratio, at_least=least.get(name.split(":")[0])
-            )
+            demanded = least.get(name, least.get(name.split(":")[0]))
+            yield Figure(scene, n, f"{name} over {base}", ratio, at_least=demanded)
 
 
 def added(n: int) -> float:
