@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import version
 from types import ModuleType
 from typing import Any
@@ -64,8 +65,13 @@ class Reference:
             **self.options,
         )
         kept: Array = disks_block(disks).astype(self.precision)
-        self.blocks: tuple[Array, Array] = kept, world_block(world)
-        self.disks, self.world = disks_of(self.blocks[0]), world_of(self.blocks[1])
+        blocks: tuple[Array, Array] = kept, world_block(world)
+        self.disks, self.world = disks_of(blocks[0]), world_of(blocks[1])
+        self.advance: Callable[..., Any] = self.variant.advance
+        self.entered: tuple[Any, Any] = self.disks, self.world
+        # what somebody else has written may have no quicker way in
+        if self.variant.__name__ in ADVANCE:
+            self.advance, self.entered = ADVANCE[self.variant.__name__], blocks
         self.forced = False
         self._advance(0)  # compiles, if nobody has yet
 
@@ -87,12 +93,8 @@ class Reference:
 
     def _advance(self, count: int) -> None:
         done = self.steps
-        # what somebody else has written may have no quicker way in
-        if advance := ADVANCE.get(self.variant.__name__):
-            collisions = advance(*self.blocks, self.dt, count)
-        else:
-            collisions = self.variant.advance(self.disks, self.world, self.dt, count)
-        if self.listening:
+        collisions = self.advance(*self.entered, self.dt, count)
+        if collisions and self.listening:
             self.log += [ContactImpulse(done + k, i, j, impulse) for k, i, j, impulse in collisions]
         self.steps += count
 

@@ -51,7 +51,7 @@ class Kicks(NamedTuple):
     strongest: float  # m: no disk moves by more in a step than it did in the one before
 
 
-@compiled
+@pasted
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """As `exercise.advance`, to the bit."""
     if len(disks.radius) * count < WORTH:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -84,9 +84,9 @@ def checked_scenes(
     return scenes
 
 
-def checked_engines(asked: Sequence[str], unasked: Iterable[str] = DISTINCT) -> list[str]:
-    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; if none
-    is asked those of `unasked`."""
+def checked_engines(asked: Sequence[str], unasked: Collection[str] = DISTINCT) -> list[str]:
+    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; a NAME
+    for its rows of `unasked`, and if none is asked all of these."""
     chosen: set[str] = set()
     own: list[str] = []
     faults: list[str] = []
@@ -95,7 +95,8 @@ def checked_engines(asked: Sequence[str], unasked: Iterable[str] = DISTINCT) -> 
             own += [f"{file}{OWN}"]
             faults += faults_of_file(file)
             continue
-        matching = {row for row in ENGINES if name in (row, row.split(":")[0])}
+        matching = {row for row in unasked if row.split(":")[0] == name}
+        matching |= {row for row in ENGINES if row == name}
         if not matching:
             faults.append(
                 unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)})

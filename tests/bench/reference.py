@@ -19,6 +19,7 @@ import csv
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from time import thread_time
@@ -31,7 +32,7 @@ from adapters.box2d import Box2DEngine
 from adapters.box2d_v3 import Box2DV3
 from adapters.pymunk import Pymunk
 from adapters.reference import Reference
-from reference_impl import neighbours, ordered
+from reference_impl import exercise, neighbours, ordered
 from reports.run.machine import about, busy_cores
 from scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
@@ -40,6 +41,9 @@ from tests.reference_impl.test_ordered import CASES, off
 Step = Callable[[int], object]  # advances so many steps
 DT, ROUNDS, LONG = 1 / 240, 15, 0.02  # s, rounds, s that a round of one engine takes at least
 SIZES = (100, 1000, 10_000, 100_000)
+HUGE, CALL = 1_000_000, 50  # disks that run at all; steps in a call at least: a list serves 16
+FEWEST, GASES = (2, 5, 10, 21), (50, 100, 300, 1000)  # of the asteroids; disks of a gas
+MOST = {1 / 60: 0.35, 1e-3: 0.2}  # dt in s -> neighbours over all pairs in the box of the asteroids
 # steps of the reference in one of theirs, of 1000 disks
 LEAST = {"pymunk": 8.0, "box2d": 25.0, "box2d_v3": 12.0}
 FIGURES = Path(__file__).parents[2] / "tests" / "data" / "reference_figures.csv"
@@ -114,8 +118,9 @@ def engines(scene: Scene, dt: float) -> dict[str, Step]:
     """Everyone who steps, and the reference a second time: what it measures against itself is the
     noise."""
     steps = {
-        "reference:exercise": reference(neighbours, scene, dt),
-        "reference:exercise again": reference(neighbours, scene, dt),
+        "reference:neighbours": reference(neighbours, scene, dt),
+        "reference:neighbours again": reference(neighbours, scene, dt),
+        "reference:exercise": reference(exercise, scene, dt),
     }
     for profile in ("matched", "shipped"):
         steps[f"pymunk:{profile}"] = pymunk(profile, scene, dt)
@@ -124,16 +129,16 @@ def engines(scene: Scene, dt: float) -> dict[str, Step]:
     return steps
 
 
-def times(steps: dict[str, Step], warm: int) -> dict[str, np.ndarray]:
+def times(steps: dict[str, Step], warm: int, fewest: int = 10) -> dict[str, np.ndarray]:
     """(ROUNDS,) microseconds a step of each, interleaved in an order shuffled anew each round,
-    after warming up."""
+    after warming up; `fewest` steps in a call."""
     rng = np.random.default_rng(0)
     counts = {}
     for name, step in steps.items():
         step(warm)
         started = thread_time()
         step(10)
-        counts[name] = max(10, int(10 * LONG / (thread_time() - started)))
+        counts[name] = max(fewest, int(10 * LONG / (thread_time() - started)))
     samples: dict[str, list[float]] = {name: [] for name in steps}
     for _ in range(ROUNDS):
         for name in rng.permutation(list(steps)):
@@ -155,9 +160,8 @@ def compared(
         yield Figure(scene, n, f"{name}, step", middle, high - low, "us")
         if name != base:
             ratio = float(np.median(samples / measured[base]))
-            yield Figure(
-                scene, n, f"{name} over {base}", ratio, at_least=least.get(name.split(":")[0])
-            )
+            demanded = least.get(name, least.get(name.split(":")[0]))
+            yield Figure(scene, n, f"{name} over {base}", ratio, at_least=demanded)
 
 
 def added(n: int) -> float:
@@ -202,13 +206,46 @@ def gases() -> Iterator[Figure]:
 def sizes() -> Iterator[Figure]:
     """What a disk costs among many, and what room it takes."""
     sized = {str(n): reference(neighbours, boxed_gas(n, 0.3), DT) for n in SIZES}
-    measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50).values())}
+    measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50, CALL).values())}
     for n, samples in measured.items():
         low, middle, high = np.quantile(samples, [0.25, 0.5, 0.75])
-        yield Figure("gas", n, "reference:exercise, disk and step", middle, high - low, "ns")
+        yield Figure("gas", n, "reference:neighbours, disk and step", middle, high - low, "ns")
     ratio = float(np.median(measured[SIZES[-1]] / measured[SIZES[0]]))
-    yield Figure("gas", SIZES[-1], f"disk and step over one of {SIZES[0]}", ratio, at_most=2.0)
-    yield Figure("gas", SIZES[-1], "memory a disk", memory(SIZES[-1]), unit="B", at_most=300.0)
+    yield Figure("gas", SIZES[-1], f"disk and step over one of {SIZES[0]}", ratio, at_most=1.6)
+    for n in (SIZES[-1], HUGE):
+        yield Figure("gas", n, "memory a disk", memory(n), unit="B", at_most=300.0)
+
+
+def first_of(scene: Scene, n: int) -> Scene:
+    """Its first n disks alone."""
+    arrays = ("position", "velocity", "angle", "angular_velocity", "radius", "mass", "inertia")
+    return replace(scene, **{name: getattr(scene, name)[:n] for name in arrays})
+
+
+def small() -> Iterator[Figure]:
+    """What the list buys among few disks, and what a call costs; all pairs in the same rounds."""
+    variants = {"neighbours": neighbours, "ordered": ordered, "exercise": exercise}
+    asteroids = boxed_asteroids(0)
+    scenes: list[tuple[Scene, float, float | None]] = []
+    scenes += [(asteroids, dt, most) for dt, most in MOST.items()]
+    scenes += [(first_of(asteroids, n), DT, None) for n in FEWEST]
+    scenes += [(boxed_gas(n, 0.3), DT, None) for n in GASES]
+    for scene, dt, most in scenes:
+        steps = {name: reference(variant, scene, dt) for name, variant in variants.items()}
+        samples = times(steps, 600, 600 if scene.n < 100 else CALL)
+        where = f"{'asteroids in a box' if scene.n <= FEWEST[-1] else 'gas'}, {1 / dt:.0f} Hz"
+        for name, at_most in (("neighbours", most), ("ordered", 1.0)):
+            ratio = float(np.min(samples[name]) / np.min(samples["exercise"]))
+            yield Figure(where, scene.n, f"{name} over exercise", ratio, at_most=at_most)
+    engine = Reference(neighbours)
+    engine.load(asteroids, 1 / 60)
+
+    def one_by_one(count: int) -> None:
+        for _ in range(count):
+            engine.step()
+
+    one = times({"call": one_by_one}, 600)["call"]
+    yield Figure("asteroids in a box", 21, "a call of one step", float(one.min()), unit="us")
 
 
 def in_order() -> Iterator[Figure]:
@@ -217,11 +254,12 @@ def in_order() -> Iterator[Figure]:
     asteroids, dt = boxed_asteroids(0), 1 / 60
     steps = {
         "reference:ordered": reference(ordered, asteroids, dt),
-        "reference:exercise": reference(neighbours, asteroids, dt),
+        "reference:neighbours": reference(neighbours, asteroids, dt),
+        "reference:exercise": reference(exercise, asteroids, dt),
         "pymunk:matched": pymunk("matched", asteroids, dt),
         "pymunk:shipped": pymunk("shipped", asteroids, dt),
     }
-    least = {"reference": 1 / 1.5, "pymunk": 1.0}
+    least = {"reference:exercise": 1.0, "pymunk": 1.0}
     yield from compared("asteroids in a box", 21, steps, least)
     for e, gravity, t, rate in CASES:
         errors = [off(boxed_asteroids(seed, e, gravity), t, rate) for seed in range(20)]
@@ -249,7 +287,7 @@ def main() -> None:
         file.write(header())
         table = csv.writer(file, lineterminator="\n")
         table.writerow(Figure._fields)
-        for part in (gases, sizes, in_order):
+        for part in (gases, small, sizes, in_order):
             for figure in part():
                 row = [
                     "" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else cell

@@ -211,7 +211,7 @@ def test_disks_all_in_one_place_are_not_listed():
     assert not holds(listed(disks, World(), 1))
 
 
-@pytest.mark.parametrize("n", [3, FEW, FEW + 1, 1000])
+@pytest.mark.parametrize("n", [3, 21, FEW, FEW + 1, 300, 1000])
 def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
     """As the harness plays it: in several calls."""
     scene = boxed_gas(n, 0.3)
@@ -227,9 +227,10 @@ def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
 
 
 @pytest.mark.slow
-def test_a_gas_kept_in_float32_plays_as_by_all_pairs():
+@pytest.mark.parametrize("n", [3, 21, FEW, FEW + 1, 300, 1000])
+def test_a_gas_kept_in_float32_plays_as_by_all_pairs(n):
     """Where every number rounds a billion times as much."""
-    scene = boxed_gas(100, 0.3)
+    scene = boxed_gas(n, 0.3)
     disks = make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass)
     first, other = (type(disks)(*(a.astype(np.float32) for a in disks)) for _ in range(2))
     world = World(restitution=1.0, walls=scene.walls)
