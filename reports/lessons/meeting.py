@@ -190,7 +190,7 @@ MEETING = Lesson(
     name="meeting",
     number="4",
     title="Two disks meet",
-    asks="What are the four parts of a collision, in numbers?",
+    asks="What happens in a collision, in numbers?",
     text=(
         (
             "At the end of a step two disks overlap. <b>Detect</b> the overlap. <b>Project</b> the"
