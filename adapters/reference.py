@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from adapters.engine import ContactImpulse
+from adapters.library_versions import version
 from reference_impl import exercise
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, Disks, World, make_disks
 from scenarios.model import Array, Scene, State
