@@ -118,7 +118,8 @@ class Game {
     ];
   }
 
-  mark({ x, y, i, j }, name) { return { x, y, name, text: `${shortName(name)} ${pairOf(i, j)}` }; }
+  // Its name only, so that labels leave the field free: the table says which disks and when.
+  mark({ x, y }, name) { return { x, y, name, text: shortName(name) }; }
 
   show() {
     const frame = this.now;
