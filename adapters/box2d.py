@@ -3,7 +3,6 @@ position correction."""
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from time import perf_counter
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.library_versions import version
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from importlib.metadata import version
 from math import atan2, cos, pi, sin
 from threading import Lock
 from time import perf_counter
@@ -16,6 +15,7 @@ import pyb2d3
 
 from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.library_versions import version
 from adapters.matched import Searched
 from scenarios.model import Array, Scene, State
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import version
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from adapters.engine import ContactImpulse
+from adapters.library_versions import version
 from reference_impl.blocks import ADVANCE, disks_block, disks_of, world_block, world_of
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from scenarios.model import Array, Scene, State

@@ -3,13 +3,13 @@ each step."""
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from adapters.engine import ContactImpulse, Unsupported
 from adapters.event_driven.events import EventEngine
+from adapters.library_versions import version
 from scenarios.model import Array, Scene, State
 from scenarios.no_truth import NoTruth
 

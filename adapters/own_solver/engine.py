@@ -119,7 +119,12 @@ class Student:
     def step(self, count: int = 1) -> None:
         """One request for all the steps, now or, if they are collected, with the next `read`."""
         forces = self.forces.tolist() if self.forces.any() else None
-        self.asked.append({"count": count, "forces": forces})
+        single = forces is not None and count == 1 and not self.whole
+        last = self.asked[-1] if self.asked else {}
+        if single and last.get("held") and last["forces"] == forces:
+            last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
+        else:
+            self.asked.append({"count": count, "forces": forces, "held": single})
         self.forces[:] = 0.0
         self.rows = None
         if not self.collected:

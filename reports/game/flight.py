@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from adapters.advance import advance
 from adapters.engine import Engine
 from adapters.engines import ENGINES
 from adapters.first_collisions import weight_impulse
+from adapters.own_solver.engine import Student
 from adapters.runaway import RUNAWAY, fault_of, reach
 from reports.game.divergence import WAIT, Divergence, Edge, Touches, divergence
 from reports.game.pilot import SHIP, Pilot
@@ -117,7 +119,9 @@ class Flight:
         self.is_game = wrap is not None and np.array_equal(wrap, [LOW, HIGH])
         self.farthest = RUNAWAY * reach(scenario)
         self.pilot = Pilot(scenario.scene, scenario.sample_interval)
+        self.steered = scenario  # with the thrusts of the keys that are down
         self.frame, self.left_at, self.won_at = 0, -1, -1
+        self.threads = ThreadPoolExecutor(len(names))
         self.flyers = [self.boarded(name) for name in names]
 
     def boarded(self, name: str) -> Flyer:
@@ -147,20 +151,30 @@ class Flight:
         """A key event, which acts from the next frame on; a replay has its own."""
         if not self.replayed:
             self.pilot.key(key, down, self.frame, float(self.solid.state.angle[SHIP]))
+            self.steered = replace(self.scenario, thrusts=self.pilot.now)
 
     def advance(self, count: int = 1) -> None:
         """Fly so many frames, or what is left of them."""
         for _ in range(count):
             if self.over:
                 return
-            steered = (
-                self.scenario if self.replayed else replace(self.scenario, thrusts=self.pilot.now)
-            )
-            for flyer in self.flyers:
-                if not flyer.left:
-                    self.fly(flyer, steered)
+            self.fly_all([flyer for flyer in self.flyers if not flyer.left])
             self.frame += 1
             self.compare()
+
+    def fly_all(self, flyers: Sequence[Flyer]) -> None:
+        """One frame of every engine; those in processes of their own fly side by side, and beside
+        the others."""
+        elsewhere = [flyer for flyer in flyers if isinstance(flyer.engine, Student)]
+        waiting = [self.threads.submit(self.fly, flyer, self.steered) for flyer in elsewhere]
+        for flyer in flyers:
+            if not isinstance(flyer.engine, Student):
+                self.fly(flyer, self.steered)
+        for each in waiting:
+            each.result()
+        solid = self.solid
+        if self.left_at < 0 and solid.edges and solid.edges[-1].frame == self.frame:
+            self.left_at = self.frame
 
     def fly(self, flyer: Flyer, steered: Scenario) -> None:
         """One frame of one engine, by the same steps as `play` makes them, looked at once or, near
@@ -215,8 +229,6 @@ class Flight:
 
     def set_back(self, flyer: Flyer, before: State, now: float) -> None:
         """The ship to its start, all else as it is, at `now` s; it was last seen in `before`."""
-        if flyer is self.solid and self.left_at < 0:
-            self.left_at = self.frame
         arrays: dict[str, Any] = {
             name: np.array(array) for name, array in vars(flyer.state).items()
         }
@@ -314,6 +326,7 @@ class Flight:
 
     def close(self) -> None:
         """Give every engine back."""
+        self.threads.shutdown(wait=False)
         for flyer in self.flyers:
             if flyer.engine is not None:
                 flyer.engine.close()

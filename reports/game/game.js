@@ -118,7 +118,8 @@ class Game {
     ];
   }
 
-  mark({ x, y, i, j }, name) { return { x, y, name, text: `${shortName(name)} ${pairOf(i, j)}` }; }
+  // Its name only, so that labels leave the field free: the table says which disks and when.
+  mark({ x, y }, name) { return { x, y, name, text: shortName(name) }; }
 
   show() {
     const frame = this.now;
@@ -265,7 +266,7 @@ class Game {
 
 const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
 const farewell = ({ left, left_at: at }) => at ? `left at ${at.toFixed(2)} s: ${left}` : `does not fly: ${left}`;
-const pairOf = (i, j) => i === undefined ? "leaves the field" : `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
+const pairOf = (i, j) => `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
 const raised = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
 const short = (metres) => metres === 0 ? "0" : metres >= 1e-3 ? metres.toFixed(3)
   : metres.toExponential(0).replace(/e-(\d+)/, (_, digits) => `×10⁻${raised(digits)}`);

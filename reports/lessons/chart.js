@@ -40,7 +40,8 @@ class Axis {
 
   // 1, 2 and 5 times powers of ten; where even these are too far apart, the ends.
   withinADecade() {
-    const decades = [Math.floor(this.low), Math.ceil(this.high)];
+    const [first, last] = [Math.floor(this.low), Math.ceil(this.high)];
+    const decades = Array.from({ length: last - first + 1 }, (_, k) => first + k);
     const found = decades.flatMap((v) => [1, 2, 5].map((k) => k * 10 ** v)).filter((v) => Math.log10(v) >= this.low && Math.log10(v) <= this.high);
     const values = found.length < 2 ? [10 ** this.low, 10 ** this.high] : [...new Set(found)];
     return values.map((v) => [v, short(v)]);
@@ -68,7 +69,7 @@ function drawChart(chart) {
   const clip = `clip-${Math.round(performance.now() * 1e3)}-${Math.floor(Math.random() * 1e9)}`;
   picture.append(svg("clipPath", { id: clip }));
   picture.lastChild.append(svg("rect", { x: left - 4, y: top - 4, width: width - left - right + 8, height: height - top - bottom + 8 }));
-  chart.guides.forEach(([axis, value, text]) => drawGuide(picture, axis, axis === "x" ? x.place(value) : y.place(value), text));
+  chart.guides.forEach(([axis, value, text], k) => drawGuide(picture, axis, axis === "x" ? x.place(value) : y.place(value), text, k));
   chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, [k, chart.curves.length], clip));
   figure.append(caption, picture);
   return figure;
@@ -88,13 +89,13 @@ function drawAxes(picture, chart, x, y) {
   picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: 13, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
 }
 
-// A line across, with its text at the end where it is least in the way.
-function drawGuide(picture, axis, place, text) {
+// A line across, with its text at the end where it is least in the way; that of number k stands above those before it.
+function drawGuide(picture, axis, place, text, k) {
   const { width, height, left, right, top, bottom } = SIZE;
   const ends = axis === "x" ? { x1: place, x2: place, y1: top, y2: height - bottom } : { x1: left, x2: width - right, y1: place, y2: place };
   picture.append(svg("line", { class: "guide", ...ends }));
   const late = axis === "y" || place > width / 2;
-  const at = axis === "x" ? { x: place + (late ? -5 : 5), y: height - bottom - 6 } : { x: width - right - 4, y: place - 5 };
+  const at = axis === "x" ? { x: place + (late ? -5 : 5), y: height - bottom - 6 - 16 * k } : { x: width - right - 4, y: place - 5 };
   picture.append(svg("text", { class: "axis", ...at, "text-anchor": late ? "end" : "start" }, text));
 }
 

@@ -90,11 +90,11 @@ def lies_on(engine: str, own: bool, bound: float, unit: str = "") -> Claim:
 
 
 def distances(runs: Sequence[Run], curves: Sequence[Curve], unit: str) -> list[tuple[str, str]]:
-    """How far the ablated reference's curve is from those of the engines, at the most."""
+    """By how much the ablated reference's curve differs from those of the engines, at the most."""
     shown = Shown([LessonChart("", "", "", curves)])
     return [
         (
-            f"largest distance of the ablated reference from {run.name}",
+            f"largest difference of the ablated reference from {run.name}",
             f"{number(shown.gap(ABLATED, run.name), 2)} {unit}".strip(),
         )
         for run in runs
@@ -742,7 +742,7 @@ MECHANISMS = (
         " path. The limit is a length, so the highest speed depends on the step.",
         ["box2d:shipped"],
         show_cap,
-        Slider("cap", "Farthest move in a step", (np.inf, 1.0, 2.0, 4.0), 0, "m"),
+        Slider("cap", "Farthest move in a step", (1.0, 2.0, 4.0, np.inf), 3, "m"),
         time_step(1 / 60, (4, 1), 1),
     ),
     page(
