@@ -109,7 +109,7 @@ def test_findings_rank_engines_and_say_in_how_many_scenes_the_others_are_right()
     errors = score(ERRORS | {"mine.py:own": [1e-3, 2.0, 1e-9]})
     off = errors.pivot(index="scenario", columns="name", values="error")
 
-    assert findings.how_right("reference:ordered", off, situations.RIGHT) == (
+    assert findings.how_right("reference:ordered", off, situations.RIGHT, {}) == (
         "reference:ordered is within 10⁻⁶ radii of the exact answer in 2 of 3 scenes, off by 1000"
         " radii in c. It is not ranked among the engines."
     )
