@@ -113,9 +113,9 @@ def test_findings_rank_engines_and_say_in_how_many_scenes_the_others_are_right()
         "reference:ordered is within 10⁻⁶ radii of the exact answer in 2 of 3 scenes, off by 1000"
         " radii in c. It is not ranked among the engines."
     )
-    mine = findings.how_right("mine.py:own", off, situations.FAR_OFF)
+    mine = findings.how_right("mine.py:own", off, situations.FAR_OFF, {})
     assert "mine.py is within 1 radius of the exact answer in 2 of 3 scenes, off by 2" in mine
-    box2d = findings.how_right("box2d:matched", off, situations.FAR_OFF)
+    box2d = findings.how_right("box2d:matched", off, situations.FAR_OFF, {})
     assert "in 2 of 3 scenes, without a result in c." in box2d
 
 
