@@ -82,7 +82,7 @@ ADDED: dict[str, list[Added]] = {
             '    "toy:plain": EngineRow(_toy, "flies through everything", 0.5, FLOAT64,'
             ' distributions=("typer",),\n                     options={"as it is": {}},'
             ' variants={"as_it_is": Variant({}, "nothing")}),\n',
-            "}\n\nOWN",
+            "}\n\n# whose numbers",
         ),
     ],
     "a scenario": [
