@@ -20,7 +20,7 @@ from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, run_of
-from reports.lessons.mechanisms import ABLATED
+from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.meeting import collision_of_the_reference, two
 from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
