@@ -10,7 +10,7 @@ from reports.lessons.mechanisms.cap import CAP
 from reports.lessons.mechanisms.correction import CORRECTION
 from reports.lessons.mechanisms.digits import DIGITS
 from reports.lessons.mechanisms.gravity import GRAVITY
-from reports.lessons.mechanisms.mixing import MIXING
+from reports.lessons.mechanisms.mixing import MIXING_RULE
 from reports.lessons.mechanisms.order import ORDER
 from reports.lessons.mechanisms.row import ROW
 from reports.lessons.mechanisms.substeps import SUBSTEPS
@@ -26,7 +26,7 @@ ALL = (
     MEETING,
     COST,
     THRESHOLD,
-    MIXING,
+    MIXING_RULE,
     ORDER,
     GRAVITY,
     CORRECTION,

@@ -64,7 +64,7 @@ def show_mixing(settings: Settings) -> Shown:
     return Shown([chart], film, facts, claims)
 
 
-MIXING = page(
+MIXING_RULE = page(
     2,
     "mixing",
     "A rule for mixing",
