@@ -9,7 +9,7 @@ from adapters.engines import ENGINES, OWN
 from reports.game.divergence import DIVERGED
 from reports.game.flight import FRAME, SUBSTEPS
 from reports.page.documents import render
-from reports.page.style import look
+from reports.page.style import looks_of
 from scenarios.model import Scenario
 
 
@@ -31,7 +31,7 @@ def game_page(
         generator="crosscheck play",
         scripts=["game/field.js", "game/game.js"],
         styles=["game/game.css"],
-        looks={name: look(*name.split(":", 1)) for name in rows},
+        looks=looks_of(rows),
         connects=True,
         rows=rows,
         labels=labels(list(rows)),

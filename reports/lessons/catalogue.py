@@ -2,12 +2,39 @@
 
 from __future__ import annotations
 
+from reports.lessons.box import BOX
 from reports.lessons.crowd import COST, HORIZON
 from reports.lessons.lesson import Lesson
 from reports.lessons.limits import LIMITS
-from reports.lessons.mechanisms import MECHANISMS
+from reports.lessons.mechanisms.cap import CAP
+from reports.lessons.mechanisms.correction import CORRECTION
+from reports.lessons.mechanisms.digits import DIGITS
+from reports.lessons.mechanisms.gravity import GRAVITY
+from reports.lessons.mechanisms.mixing import MIXING_RULE
+from reports.lessons.mechanisms.order import ORDER
+from reports.lessons.mechanisms.row import ROW
+from reports.lessons.mechanisms.substeps import SUBSTEPS
+from reports.lessons.mechanisms.threshold import THRESHOLD
 from reports.lessons.meeting import MEETING
-from reports.lessons.motion import BOX, PARTICLE, THRUST
+from reports.lessons.particle import PARTICLE
+from reports.lessons.thrust import THRUST
 
-ALL = (PARTICLE, THRUST, BOX, MEETING, COST, *MECHANISMS, HORIZON, LIMITS)
+ALL = (
+    PARTICLE,
+    THRUST,
+    BOX,
+    MEETING,
+    COST,
+    THRESHOLD,
+    MIXING_RULE,
+    ORDER,
+    GRAVITY,
+    CORRECTION,
+    SUBSTEPS,
+    DIGITS,
+    CAP,
+    ROW,
+    HORIZON,
+    LIMITS,
+)
 LESSONS: dict[str, Lesson] = {lesson.name: lesson for lesson in ALL}

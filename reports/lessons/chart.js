@@ -69,7 +69,9 @@ function drawChart(chart) {
   const clip = `clip-${Math.round(performance.now() * 1e3)}-${Math.floor(Math.random() * 1e9)}`;
   picture.append(svg("clipPath", { id: clip }));
   picture.lastChild.append(svg("rect", { x: left - 4, y: top - 4, width: width - left - right + 8, height: height - top - bottom + 8 }));
-  chart.guides.forEach(([axis, value, text], k) => drawGuide(picture, axis, axis === "x" ? x.place(value) : y.place(value), text, k));
+  const guides = chart.guides.map(([axis, value, text]) => [axis, axis === "x" ? x.place(value) : y.place(value), text]);
+  for (const [axis, place] of guides) drawGuide(picture, axis, place);
+  guides.forEach(([axis, place, text], k) => nameGuide(picture, axis, place, text, k));
   chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, [k, chart.curves.length], clip));
   figure.append(caption, picture);
   return figure;
@@ -89,14 +91,19 @@ function drawAxes(picture, chart, x, y) {
   picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: 13, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
 }
 
-// A line across, with its text at the end where it is least in the way; that of number k stands above those before it.
-function drawGuide(picture, axis, place, text, k) {
+// A line across.
+function drawGuide(picture, axis, place) {
   const { width, height, left, right, top, bottom } = SIZE;
   const ends = axis === "x" ? { x1: place, x2: place, y1: top, y2: height - bottom } : { x1: left, x2: width - right, y1: place, y2: place };
   picture.append(svg("line", { class: "guide", ...ends }));
+}
+
+// Its text, at the end where it is least in the way, over all lines; that of number k stands above those before it.
+function nameGuide(picture, axis, place, text, k) {
+  const { width, height, right, bottom } = SIZE;
   const late = axis === "y" || place > width / 2;
   const at = axis === "x" ? { x: place + (late ? -5 : 5), y: height - bottom - 6 - 16 * k } : { x: width - right - 4, y: place - 5 };
-  picture.append(svg("text", { class: "axis", ...at, "text-anchor": late ? "end" : "start" }, text));
+  picture.append(svg("text", { class: "axis over", ...at, "text-anchor": late ? "end" : "start" }, text));
 }
 
 // The lower a curve lies, the wider are its line and its marks, so that those that coincide stay visible under each other.

@@ -202,7 +202,9 @@ def show_horizon(settings: Settings) -> Shown:
         return share
 
     assert shown.truth is not None
-    errors = shown.errors()
+    errors, end = shown.errors(), float(shown.truth.t[-1])
+    motions = {run.name: run.trajectory for run in shown.runs if run.trajectory}
+    motions["the exact answer"] = shown.truth
     return Shown(
         [
             LessonChart("Farthest disk from the exact answer", "time in s", "m", errors, "y"),
@@ -215,12 +217,11 @@ def show_horizon(settings: Settings) -> Shown:
         ],
         shown.film,
         [
+            ("the exact answer ends at", f"{number(end)} s"),
             *(
-                (f"collisions of {run.name}", str(len(run.trajectory.collisions)))
-                for run in shown.runs
-                if run.trajectory
+                (f"collisions of {name} until then", str(int((each.collisions.t <= end).sum())))
+                for name, each in motions.items()
             ),
-            ("the exact answer ends at", f"{number(float(shown.truth.t[-1]))} s"),
         ],
         horizon_claims(shown, settings["e"]),
     )
@@ -312,10 +313,10 @@ HORIZON = Lesson(
     asks="How long do two right solvers agree?",
     text=(
         (
-            "Two disks that meet slightly further to the side separate in another direction. So"
-            " a collision multiplies a small error by some factor, also the smallest there is, the"
-            " rounding of a number. The time from which on a rounding decides is the"
-            " <b>horizon</b>."
+            "Two disks that meet slightly further to the side separate in another direction. So a"
+            " collision multiplies an error, also one that is as small as the rounding of a number."
+            " The <b>horizon</b> is the time after which rounding alone makes two right solvers"
+            " disagree."
         ),
         (
             "After the horizon no engine is right or wrong about where a disk is. What stays"

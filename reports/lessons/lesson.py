@@ -275,6 +275,13 @@ class Simulation:
         """For the engine of the page."""
         return Comparison(self.scenario, self.truth, self.runs, pd.DataFrame())
 
+    @property
+    def first_collision(self) -> float:
+        """s, up to when nothing collides, in the exact answer and in any engine."""
+        assert self.truth is not None
+        motions = [self.truth, *(run.trajectory for run in self.runs if run.trajectory)]
+        return min(float(each.collisions.t[0]) for each in motions) - self.runs[0].dt
+
     def curves(self, read: Callable[[Trajectory], Array]) -> list[Curve]:
         """`read` of every trajectory over time; the truth last, so that it lies on top."""
         found = [

@@ -19,7 +19,7 @@ from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.lesson import Lesson
-from reports.lessons.mechanisms import ABLATED
+from reports.lessons.mechanisms.ablation import ABLATED
 from reports.page.documents import ENGINE, deflated, fragment, render
 from reports.page.server import in_thread
 from reports.page.style import Look, look

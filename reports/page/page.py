@@ -76,8 +76,8 @@ def write_page(
     """
     names = overview.names_of(comparisons)
     common = overview.common_settings(comparisons)
+    looks = style.looks_of((*names, style.TRUTH))
     sections = [section_of(comparison, names, common) for comparison in comparisons]
-    looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
     scores = pooled.scores(comparisons)
     answers = situations.answers(scores[scores.middle], situated(comparisons), untrusted)
     drawings = pooled.drawings(scores, answers, untrusted)

@@ -4,11 +4,13 @@ write a number."""
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from pathlib import PurePath
 from typing import Any, NamedTuple
 from zlib import crc32
 
 from adapters.engine_row import Mark
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, OWN
 from reports.terminal.foreign_text import encoded
 
 TRUTH = "truth"
@@ -115,20 +117,41 @@ def look(engine: str, profile: str = "") -> Look:
     return Look(light, dark, dash, SHAPED.get(profile, shape), not dash)
 
 
+def looks_of(names: Iterable[str]) -> dict[str, Look]:
+    """How each `engine:profile` of a page is drawn, or the truth. Solvers' files on one page differ
+    in colour and shape, as long as there are no more of them than `PALETTE` has marks."""
+    names = list(names)
+    _files.clear()
+    for name in sorted(names):
+        mark_of(name.partition(":")[0])
+    return {name: look(*name.split(":", 1)) for name in names}
+
+
+_files: dict[str, Mark] = {}  # of the solvers' files that are drawn beside each other
+
+
 def mark_of(engine: str) -> Mark:
     """What its row of `ENGINES` says; of those whose rows say nothing the first has the first of
     `PALETTE`, and so on.
 
-    An engine without a row, such as a solver's file, has one of `PALETTE` by its name, in every run
-    the same.
+    A solver's file has one of `PALETTE` by the name of the file, in the game and in every report
+    the same, unless a file that is drawn beside it has that one already: then the next.
     """
     marks: dict[str, Mark | None] = {}
     for name, row in ENGINES.items():
-        marks.setdefault(name.partition(":")[0], row.mark)
+        if not name.endswith(OWN):
+            marks.setdefault(name.partition(":")[0], row.mark)
     if engine not in marks:
-        return PALETTE[crc32(encoded(engine)) % len(PALETTE)]
+        return _files.get(engine) or _files.setdefault(engine, mark_of_file(engine))
     unnamed = [name for name, mark in marks.items() if mark is None]
     return marks[engine] or PALETTE[unnamed.index(engine) % len(PALETTE)]
+
+
+def mark_of_file(path: str) -> Mark:
+    """The first that is free, from the one on that the name of the file stands for."""
+    first = crc32(encoded(PurePath(path).name)) % len(PALETTE)
+    marks = PALETTE[first:] + PALETTE[:first]
+    return next((mark for mark in marks if mark not in _files.values()), marks[0])
 
 
 def heat(value: float) -> int:

@@ -44,7 +44,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started,
     seconds, load."""
     names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
-    looks = {name: style.look(*name.split(":", 1)) for name in names}
+    looks = style.looks_of(names)
     found = middle_scores(results)
     html = render(
         "speed/speed.html.j2",

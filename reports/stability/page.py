@@ -81,7 +81,7 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
         + [one.engine for one in laws]
     )
     names = list(dict.fromkeys(names))
-    looks = {name: style.look(*name.split(":", 1)) for name in (*names, style.TRUTH)}
+    looks = style.looks_of((*names, style.TRUTH))
     html = render(
         "stability/stability.html.j2",
         generator=GENERATOR,

@@ -4,13 +4,16 @@ and its faults."""
 from __future__ import annotations
 
 import csv
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from adapters.conformance.conform import ask, conform
 from adapters.own_solver.engine import engine_file
+from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import own_restitution
 from adapters.play import play
 from scenarios.catalogue import scenario
@@ -37,6 +40,36 @@ def test_a_file_plays_as_an_engine(name: str):
     assert all(
         abs(one.trajectory.position - first.trajectory.position).max() < 1e-12 for one in others
     )  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", ["plain.js", "plain.py"])
+def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
+    """For all the steps that follow each other under them; what changes, or ends, is a list of its
+    own. They act in each step as if each were asked for by itself, to the last bit."""
+    heard: list[tuple[int, bool]] = []
+
+    def noted(self: SolverProcess, verb: str, what: Any, *limit: float) -> Any:
+        if verb == "play":
+            heard.extend((each["count"], bool(each["forces"])) for each in what["steps"])
+        return do(self, verb, what, *limit)
+
+    do = SolverProcess.do
+    monkeypatch.setattr(SolverProcess, "do", noted)
+    states = []
+    for collected in (True, False):
+        with closing(engine_file(RIGHT.parent / name, collected=collected).make()) as engine:
+            engine.load(asteroid_field(0, 3, 0.9), 1 / 1024)
+            for force in [0.5] * 16 + [0.25] * 4 + [0.0] * 3:
+                if force:
+                    engine.apply_force(0, np.array([force, 0.1]), 0.01)
+                engine.step()
+            states.append(engine.read())
+    together, one_by_one = states
+
+    assert heard == [(16, True), (4, True), (1, False), (1, False), (1, False)]
+    for array, other in zip(vars(together).values(), vars(one_by_one).values()):
+        assert array.tobytes() == other.tobytes()
+    assert together.velocity[0, 0] > asteroid_field(0, 3, 0.9).velocity[0, 0]  # they do act
 
 
 @pytest.mark.parametrize(

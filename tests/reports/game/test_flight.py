@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import pi, sqrt
 from pathlib import Path
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.first_collisions import first_collisions
+from adapters.own_solver.engine import Student
 from adapters.play import play
 from reports.game.divergence import Edge, Touches
 from reports.game.flight import EARTH, FRAME, Flight, field_scenario
@@ -309,6 +312,68 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
     assert flight.flyers[0].left == "out of fuel"
     assert flight.solid.name == "reference:exercise"
     assert flight.frame == 10
+
+
+class Meeting(Student):
+    """A file that steps only while another does: side by side, or never. Its engine is the
+    reference."""
+
+    def __init__(self, barrier: Barrier, fails_at: int = 0) -> None:
+        self.inner, self.barrier, self.frames = ENGINES["reference:exercise"].make(), barrier, 0
+        self.fails_at = fails_at
+        for verb in ("load", "apply_force", "read", "collisions", "close"):
+            setattr(self, verb, getattr(self.inner, verb))
+
+    def step(self, count: int = 1) -> None:
+        self.barrier.wait()
+        self.frames += 1
+        if self.frames == self.fails_at:
+            raise RuntimeError("out of fuel")
+        self.inner.step(count)
+
+
+def meeting(
+    names: Sequence[str],
+    monkeypatch: pytest.MonkeyPatch,
+    fails_at: int = 0,
+    patience: float = 10.0,
+) -> Flight:
+    """A flight of such files, which wait for each other so many s; the first fails."""
+    barrier = Barrier(2, timeout=patience)
+    for k, name in enumerate(names):
+        make = partial(Meeting, barrier, 0 if k else fails_at)
+        monkeypatch.setitem(ENGINES, name, EngineRow(make, "waits", 1.0, 0.0))
+    return Flight(field_scenario(), [*names, "reference:exercise"])
+
+
+def test_files_fly_side_by_side_each_with_its_own_state(monkeypatch: pytest.MonkeyPatch):
+    """And in the order of their names: each has what it has alone. The control: a file that is
+    alone waits in vain."""
+    flight = meeting(["a:own", "b:own"], monkeypatch)
+    flight.key("w", True)
+    flight.advance(20)
+    names, states = [flyer.name for flyer in flight.flyers], bits(flight)
+    touches = [flyer.touches.count for flyer in flight.flyers]
+    lonely = meeting(["a:own"], monkeypatch, patience=0.1)
+    lonely.advance(1)
+
+    assert [flyer.left for flyer in flight.flyers] == [""] * 3
+    assert names == ["a:own", "b:own", "reference:exercise"]
+    assert states[0] == states[1] == states[2]
+    assert touches[0] == touches[1] == touches[2]
+    assert "BrokenBarrierError" in lonely.flyers[0].left
+
+
+def test_a_file_that_raises_in_its_thread_leaves_and_the_others_fly_on(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """With its reason and the time, as an engine that flies in no thread."""
+    flight = meeting(["a:own", "b:own"], monkeypatch, fails_at=3)
+    flight.advance(3)
+    left, other, _ = flight.flyers
+
+    assert (left.left, left.left_at) == ("out of fuel", 3 * FRAME)
+    assert (other.left, flight.solid.name) == ("", "b:own")
 
 
 def test_spin_is_part_of_the_energy():

@@ -77,7 +77,9 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
     page.context.close()
     lesson.context.close()
 
+    settings = sum(len(lesson.grid) for lesson in few.values())
     assert (done.returncode, again.returncode) == (0, 0)
+    assert f"2 lessons with {settings} settings of their sliders: takes minutes" in done.stderr
     assert sorted(path.name for path in (tmp_path / "all").iterdir()) == [
         "index.html",
         "made.json",

@@ -20,7 +20,7 @@ from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, run_of
-from reports.lessons.mechanisms import ABLATED
+from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.meeting import collision_of_the_reference, two
 from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
@@ -263,3 +263,22 @@ def test_what_departs_is_seen_to_depart():
     departing = [(row.expected, *row.got["box2d_v3:shipped"]) for row in rows]
     assert [verdict for _, _, verdict in departing].count("departs") > 3
     assert all(expected != got for expected, got, verdict in departing if verdict == "departs")
+
+
+@pytest.mark.slow
+def test_lesson_7_counts_all_collisions_up_to_the_end_of_the_exact_answer():
+    """The event-driven engine stops there and the others go on: within that time it has as many as
+    the exact answer, and those of the others are near."""
+    shown = LESSONS["horizon"].at(LESSONS["horizon"].start)
+    counts = {
+        what.removeprefix("collisions of ").removesuffix(" until then"): int(n)
+        for what, n in shown.facts
+        if what.startswith("collisions")
+    }
+    exact = counts["the exact answer"]
+    assert shown.film is not None
+    whole = {run.name: len(run.trajectory.collisions) for run in shown.film.runs if run.trajectory}
+
+    assert counts["event_driven:float64"] == exact > 10
+    assert all(exact / 2 < count < 2 * exact for count in counts.values())
+    assert whole["reference:exercise"] > counts["reference:exercise"]

@@ -18,7 +18,7 @@ from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
 from reports.page.pooled import scores
 from reports.page.situations import CROWDS, FLIGHT, ROWS, SINGLE, SPIN, STACKS
-from reports.page.style import PATHS, look, mark_of
+from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, write_small
@@ -144,6 +144,27 @@ def test_every_engine_is_told_without_colour():
     # the control: with the shape of its engine alone, one of reference's would be another's mark
     alike = {(mark_of(name.split(":")[0]).shape, each.filled) for name, each in MARKS.items()}
     assert len(alike) < len(MARKS)
+
+
+def test_a_solvers_file_is_drawn_alike_everywhere_and_unlike_its_neighbour(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """damped.js and gravity.js, whose names stand for the same mark: however many engines are
+    beside them, in the game, where a file is a row of `ENGINES`, too, and from any folder."""
+    files = ["damped.js:own", "gravity.js:own"]
+    two = looks_of([*files, "pymunk:shipped", TRUTH])
+    elsewhere = looks_of(f"/home/anna/{name}" for name in reversed(files))
+    for name in files:
+        monkeypatch.setitem(ENGINES, name, ENGINES["reference:exercise"])
+    in_the_game = looks_of([*files, *ENGINES])
+
+    def drawn(found: dict[str, Look]) -> list[Look]:
+        return [each for name, each in found.items() if name.endswith(":own")]
+
+    assert drawn(two) == drawn(in_the_game) == drawn(elsewhere)[::-1]
+    assert len({each.light for each in drawn(two)}) == len({each.path for each in drawn(two)}) == 2
+    # the control: each alone on its page would have the same mark
+    assert {looks_of([name])[name] for name in files} == {two[files[0]]}
 
 
 def test_equal_medians_are_ordered_by_the_worst_scene_and_who_breaks_the_protocol_is_left_out():

@@ -1,0 +1,99 @@
+"""Lesson 6.5: slop and position correction."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from adapters.engines import changed
+from adapters.mechanisms.ablated import BOX2D, AblatedReference
+from adapters.play import play_once
+from reports.lessons.lesson import Claim, LessonChart, Settings, Shown, Slider
+from reports.lessons.mechanisms.ablation import (
+    ABLATED,
+    FLOAT32,
+    NO_CCD,
+    PLAIN,
+    asked,
+    distances,
+    filmed,
+    lies_on,
+    over_time,
+    page,
+    runs_of,
+    setting_rows,
+)
+from reports.page.style import number
+from scenarios.families.placing import lay_out
+
+
+def show_position_correction(settings: Settings) -> Shown:
+    """How an overlap that is there at the start is undone."""
+    x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
+    scenario = asked(
+        lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0),
+        0.4,
+    )
+    on = AblatedReference(
+        BOX2D, correction_most=0.2, correction_share=settings["share"], slop=settings["slop"] / 1e3
+    )
+    without = partial(changed, "box2d:matched", continuous=False, bullet=False, length_unit=1.0)
+    runs = [play_once(without, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
+    curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
+    facts = [*setting_rows(runs, "linear slop in m"), *distances(runs, curves, "mm")]
+    chart = LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")
+    return Shown(
+        [chart],
+        filmed(scenario, runs),
+        facts,
+        correction_claims(settings["share"], settings["slop"]),
+    )
+
+
+def correction_claims(share: float, slop: float) -> list[Claim]:
+    """What is left of 200 mm after a step, and in the end; slop in mm."""
+    own = 2.5  # mm, the slop of Box2D in a scene of metres
+    single = 1e3 * 72 * FLOAT32  # mm: 24 steps, three corrections each, of coordinates up to 1 m
+    left = own + (200 - own) * (1 - 0.2) ** 3
+    return [
+        Claim(
+            "reference:exercise removes the overlap in the first step.",
+            lambda shown: shown.y(PLAIN)[0] > 199 and shown.y(PLAIN)[1:].max() <= 1e-3,
+        ),
+        Claim(
+            "Box2D undoes 0.2 of what exceeds its slop of 2.5 mm, three times a step:"
+            f" {number(left)} mm are left after the first step, and in the end the slop and less"
+            " than 0.1 mm more.",
+            lambda shown: (
+                abs(shown.y(NO_CCD)[1] - left) <= single and own <= shown.y(NO_CCD)[-1] < own + 0.1
+            ),
+        ),
+        Claim(
+            f"The ablated reference never goes below its slop of {number(slop)} mm."
+            if share
+            else "The ablated reference undoes no share of the overlap yet: it stays at 200 mm.",
+            lambda shown: (
+                (np.diff(shown.y(ABLATED)) <= 0).all()
+                and shown.y(ABLATED).min() >= (slop - 1e-9 if share else 200 - 1e-9)
+            ),
+        ),
+        lies_on(NO_CCD, (share, slop) == (0.2, own), single, "mm"),
+    ]
+
+
+CORRECTION = page(
+    5,
+    "correction",
+    "Slop and position correction",
+    "What becomes of an overlap?",
+    "The exercise projects two disks apart at once. Box2D undoes a share of their overlap at a"
+    " time and leaves the last bit, the <b>slop</b>, so that a contact stays a contact. Here a"
+    " disk starts deep in a fixed one, for which there is no exact answer. The continuous"
+    " collision of Box2D is off (<code>+no_ccd</code>), because it removes the overlap by other"
+    " means.",
+    [NO_CCD],
+    show_position_correction,
+    Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),
+    Slider("slop", "Slop", (0.0, 1.25, 2.5, 5.0), 0, "mm"),
+)

@@ -1,0 +1,96 @@
+"""Lesson 6.7: single precision."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.mechanisms.ablated import AblatedReference
+from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider
+from reports.lessons.mechanisms.ablation import (
+    PLAIN,
+    asked,
+    distances,
+    filmed,
+    lies_on,
+    over_time,
+    page,
+    runs_of,
+)
+from reports.page.style import TRUTH, number
+from scenarios.families.placing import lay_out
+
+PRECISION = {53: np.float64, 24: np.float32}
+
+
+def show_digits(settings: Settings) -> Shown:
+    """How far a disk far out is from x + v t."""
+    far, digits = settings["far"], settings["digits"]
+    start, v = np.array([far, 0.0]), np.array([1.0, 0.3])
+    scenario = asked(
+        lay_out(position=[start], velocity=[v], radius=[0.5], mass=[1.0], restitution=0.0), 2.0
+    )
+    runs = runs_of(["box2d:shipped"], AblatedReference(precision=PRECISION[digits]), scenario, 4)
+    exact = start + scenario.times[:, None] * v
+    curves = over_time(
+        runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16)
+    )
+    facts = distances(runs, curves, "m")
+    curves.append(Curve(TRUTH, scenario.times, np.full(scenario.samples + 1, 1e-16)))
+    chart = LessonChart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
+    return Shown(
+        [chart],
+        filmed(scenario, runs),
+        facts,
+        digits_claims(far, digits, scenario.samples * 4, scenario.dt(4)),
+    )
+
+
+def digits_claims(far: float, digits: int, steps: int, dt: float) -> list[Claim]:
+    """What rounding a place that often may add up to."""
+    apart = float(np.spacing(np.float32(far + 2)))  # m; the disk moves by 2 m
+    most = steps * apart  # half of it along x, less along y
+    claims = [
+        Claim(
+            f"{number(far)} m from the origin two neighbouring float32 numbers are"
+            f" {number(1e3 * apart)} mm apart, and a step is {number(1e3 * dt)} mm. Box2D rounds"
+            f" the place in each of {steps} steps; all together may not exceed"
+            f" {number(1e3 * most)} mm, and does not.",
+            lambda shown: apart / 100 < shown.y("box2d:shipped").max() <= most,
+        ),
+        Claim(
+            "reference:exercise computes with 53 binary digits and stays within a millionth of a"
+            " millimetre.",
+            lambda shown: shown.y(PLAIN).max() < 1e-9,
+        ),
+        lies_on("box2d:shipped", digits == 24, 0.0),
+    ]
+    if far == 1e4:
+        claims.insert(
+            1,
+            Claim(
+                "Here every step is rounded the same way, so the error grows in proportion to the"
+                " time.",
+                lambda shown: (
+                    np.abs(
+                        shown.y("box2d:shipped")
+                        - shown.y("box2d:shipped")[-1] * shown.x("box2d:shipped") / 2
+                    ).max()
+                    < 0.05 * shown.y("box2d:shipped")[-1]
+                ),
+            ),
+        )
+    return claims
+
+
+DIGITS = page(
+    7,
+    "digits",
+    "Single precision",
+    "Why does a free disk drift, far from the origin?",
+    "A float32 number has 24 binary digits. The farther a disk is from the origin, the more of"
+    " them the integer part of its coordinate takes, and the fewer are left for a step.",
+    ["box2d:shipped"],
+    show_digits,
+    Slider("digits", "Binary digits", (53, 24), 0),
+    Slider("far", "Distance from the origin", (1.0, 100.0, 1e4), 2, "m"),
+)

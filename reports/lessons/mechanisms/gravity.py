@@ -1,0 +1,123 @@
+"""Lesson 6.4: impulse before or after gravity."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from adapters.engines import changed
+from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK, AblatedReference
+from adapters.play import play_once
+from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider, time_step
+from reports.lessons.mechanisms.ablation import (
+    FLOAT32,
+    NO_CCD,
+    PLAIN,
+    distances,
+    filmed,
+    lies_on,
+    over_time,
+    page,
+    runs_of,
+)
+from reports.page.style import TRUTH, number
+from scenarios.families.walls import bouncing_ball_e1
+from scenarios.model import Array, Scene
+
+ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
+
+
+def show_gravity(settings: Settings) -> Shown:
+    """Height of a ball that should bounce for ever."""
+    scenario, k = bouncing_ball_e1(), settings["k"]
+    names = ["box2d:matched", "pymunk:matched"]
+    ablated = AblatedReference(order=ORDERS[settings["order"]])
+    without = partial(changed, "box2d:matched", continuous=False, bullet=False)
+    dt = scenario.dt(k)
+    runs = [play_once(without, NO_CCD, scenario, dt), *runs_of(names, ablated, scenario, k)]
+    curves = over_time(runs, lambda each: each.position[:, 0, 1])
+    facts = distances(runs, curves, "m")
+    assert scenario.truth is not None
+    curves.append(Curve(TRUTH, scenario.times, scenario.truth(scenario.times).position[:, 0, 1]))
+    return Shown(
+        [LessonChart("Height of the centre", "time in s", "m", curves)],
+        filmed(scenario, runs),
+        facts,
+        bounce_claims(scenario.scene, dt, settings["order"]),
+    )
+
+
+def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
+    """What each bounce adds to the height of the next."""
+    start, radius = float(scene.position[0, 1]), float(scene.radius[0])
+    g = float(np.hypot(*scene.gravity))
+    # A sample is up to 1/120 s from the turn, which is then up to g (1/120 s)² / 2 higher.
+    seen = g / 120**2 / 2  # m
+    # 600 to 4800 steps that each round a height of up to 2.5 m, and bounces that hand the error on.
+    single = 2400 * FLOAT32
+
+    def gains(shown: Shown) -> bool:
+        found = np.array([start, *peaks(shown, NO_CCD)])
+        speed = np.sqrt(2 * g * (found[:-1] - radius))
+        return bool((np.abs(np.diff(found) - speed * dt) <= 0.1 * speed * dt + 2 * seen).all())
+
+    def rises(shown: Shown) -> bool:
+        return bool(shown.y("box2d:matched").max() < shown.y(NO_CCD).max() - 2 * seen)
+
+    fall = float(np.sqrt(2 * g * (start - radius)))
+    continuous = (
+        Claim(
+            "At this dt box2d:matched, whose continuous collision is on, does the same.",
+            lambda shown: shown.gap("box2d:matched", NO_CCD) <= single,
+        )
+        if round(1 / dt) == 240
+        else Claim(
+            "At this dt continuous collision (box2d:matched) acts in some bounces, and the ball"
+            " rises less high than without it.",
+            rises,
+        )
+    )
+    return [
+        Claim(
+            "Box2D without continuous collision (+no_ccd) turns round a velocity that gravity has"
+            " changed already. The ball gains |v| dt of height at each bounce, where v is its"
+            f" speed: {number(1e3 * fall * dt)} mm at the first, and more at each later one.",
+            lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
+        ),
+        continuous,
+        Claim(
+            "pymunk:matched turns round the velocity before gravity. Up and down are the same"
+            " motion, and the ball returns to the height it started from.",
+            lambda shown: np.abs(peaks(shown, "pymunk:matched") - start).max() <= seen + 1e-9,
+        ),
+        Claim(
+            "reference:exercise projects the ball back to the floor at each bounce; no bounce rises"
+            " higher than the start.",
+            lambda shown: peaks(shown, PLAIN).max() <= start,
+        ),
+        lies_on(NO_CCD, order == "aimed after gravity", single, "m"),
+        lies_on("pymunk:matched", order == "aimed before gravity", 1e-11, "m"),
+    ]
+
+
+def peaks(shown: Shown, name: str) -> Array:
+    """m, the heights at which a bouncing ball turns, at the samples."""
+    y = shown.y(name)
+    return y[1:-1][(y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])]
+
+
+GRAVITY = page(
+    4,
+    "gravity",
+    "Impulse before or after gravity",
+    "Why does a ball in Box2D bounce ever higher?",
+    "A bounce turns round the velocity with which a ball meets the floor. If gravity has been"
+    " added to it already, the part that gravity added in this step is turned round, too. Box2D"
+    " plays twice, with its continuous collision on and off (<code>+no_ccd</code>), because"
+    " continuous collision hides the effect at some step sizes.",
+    [NO_CCD, "box2d:matched", "pymunk:matched"],
+    show_gravity,
+    Slider("order", "Velocity that is turned round", tuple(ORDERS), 0),
+    time_step(1 / 60, (8, 4, 2, 1), 1),
+)

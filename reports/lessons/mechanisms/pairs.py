@@ -1,0 +1,39 @@
+"""Pairs that meet head on, and the restitution of each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports.lessons.mechanisms.ablation import Read
+from scenarios.families.placing import lay_out
+from scenarios.model import Array, Scene
+
+
+def pairs(closing: Array, restitution: float) -> Scene:
+    """One head-on pair of equal disks for each closing speed (k,) m/s, above each other, to meet
+    after 0.2 s."""
+    k, r = len(closing), 0.1
+    gap = r + closing * 0.1
+    x = np.stack(
+        [
+            np.column_stack([-gap, 3 * r * np.arange(k)]),
+            np.column_stack([gap, 3 * r * np.arange(k)]),
+        ],
+        axis=1,
+    )
+    v = np.stack(
+        [np.column_stack([closing / 2, np.zeros(k)]), np.column_stack([-closing / 2, np.zeros(k)])],
+        axis=1,
+    )
+    return lay_out(
+        position=x.reshape(-1, 2),
+        velocity=v.reshape(-1, 2),
+        radius=np.full(2 * k, r),
+        mass=np.ones(2 * k),
+        restitution=restitution,
+    )
+
+
+def separation(closing: Array) -> Read:
+    """(k,) separation over approach speed of `pairs`, at the end."""
+    return lambda each: (each.velocity[-1, 1::2, 0] - each.velocity[-1, 0::2, 0]) / closing

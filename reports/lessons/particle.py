@@ -1,0 +1,230 @@
+"""Lesson 1: a particle and its step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Simulation,
+    Slider,
+    run_of,
+    time_step,
+)
+from reports.page.style import TRUTH, number
+from scenarios.families.lesson import ping_pong
+from scenarios.model import Array, Scenario
+from scenarios.truth.exact import with_oracle
+
+STEPS = (64, 32, 16, 8, 4, 2)  # of a sample interval of 1/8 s
+METHODS = ("reference:lesson", "reference:exercise")
+ROUNDING = 1e-11  # m: some thousand steps, each of which rounds a height of up to 11 m in float64
+
+
+def bouncing(speed: float, gravity: float) -> Scenario:
+    """The lesson's particle between y = 1 and y = 11, thrown upwards, for 20 m of its way: past
+    both walls."""
+    base = ping_pong()
+    scene = replace(
+        base.scene, velocity=np.array([[0.0, speed]]), gravity=np.array([0.0, -gravity])
+    )
+    return with_oracle(
+        replace(base, scene=scene, duration=20.0 / speed, sample_interval=1 / 8, truth=None)
+    )
+
+
+def show_particle(settings: Settings) -> Shown:
+    """Height over time, and the error against the step."""
+    speed, gravity, claims = PARTS[settings["part"]]
+    scenario = bouncing(speed, gravity)
+    played = Simulation.by(scenario, METHODS, settings["k"])
+    steps = np.array([scenario.dt(k) for k in STEPS])
+    errors = []
+    for name in METHODS:
+        runs = [Simulation(scenario, [run_of(name, scenario, k)], played.truth) for k in STEPS]
+        errors.append(
+            Curve(name, 1e3 * steps, [np.max(run.errors()[0].y) for run in runs], dots=True)
+        )
+    dt, radius = scenario.dt(settings["k"]), float(scenario.scene.radius[0])
+    height = played.curves(lambda each: each.position[:, 0, 1])
+    guides = [("x", 1e3 * dt, "here")]
+    if speed * scenario.dt(STEPS[-1]) > radius:
+        guides.append(("x", 1e3 * radius / speed, "v dt = R"))
+    return Shown(
+        [
+            LessonChart("Height", "time in s", "y in m", height),
+            LessonChart("Distance from the exact answer", "time in s", "m", played.errors()),
+            LessonChart(
+                f"Largest error in {number(scenario.duration)} s, against the step",
+                "dt in ms",
+                "m",
+                errors,
+                "xy",
+                guides,
+            ),
+        ],
+        played.film,
+        [
+            (f"{curve.name}, largest error", f"{number(np.max(curve.y))} m")
+            for curve in played.errors()
+        ],
+        claims(played),
+    )
+
+
+def way_of(played: Simulation) -> float:
+    """v dt of the start, m."""
+    return float(np.hypot(*played.scenario.scene.velocity[0])) * played.runs[0].dt
+
+
+def without_force(played: Simulation) -> list[Claim]:
+    """Exact flight, and a bounce that is found up to one step late."""
+    assert played.truth is not None
+    way = way_of(played)
+    bounces = np.searchsorted(played.truth.collisions.t, played.truth.t, side="right")
+    mm = number(1e3 * way)
+    return [
+        Claim(
+            "Until the first bounce both methods are exact: without a force, v dt is the whole"
+            " motion of a step.",
+            lambda shown: all(shown.y(name, 1)[bounces == 0].max() < ROUNDING for name in METHODS),
+        ),
+        Claim(
+            "A bounce is found at the end of a step, up to dt late. reference:exercise then moves"
+            f" the particle back to the wall and loses up to v dt = {mm} mm at each bounce."
+            " reference:lesson does not move it back and loses up to 2 v dt.",
+            lambda shown: all(
+                (shown.y(name, 1) <= each * way * bounces + ROUNDING).all()
+                for name, each in (("reference:exercise", 1), ("reference:lesson", 2))
+            ),
+        ),
+        Claim(
+            "A smaller step has a smaller error, with both methods.",
+            lambda shown: all((np.diff(shown.y(name, 2)) > 0).all() for name in METHODS),
+        ),
+    ]
+
+
+def with_gravity(played: Simulation) -> list[Claim]:
+    """Two orders of the same two lines."""
+    assert played.truth is not None
+    gain = float(np.hypot(*played.scenario.scene.gravity)) * played.runs[0].dt  # m/s in a step
+    flight = played.truth.t < played.first_collision
+    offset = gain * played.truth.t[flight] / 2
+    late = 1e3 * offset[-1]
+    return [
+        Claim(
+            "Until the first bounce explicit Euler (reference:lesson) is g dt t / 2 above the exact"
+            f" parabola, {number(late)} mm in the end, and symplectic Euler (reference:exercise) as"
+            " far below it.",
+            lambda shown: all(
+                np.abs(above(shown, name)[flight] - sign * offset).max() < ROUNDING
+                for name, sign in (("reference:lesson", 1), ("reference:exercise", -1))
+            ),
+        ),
+        Claim(
+            "Explicit Euler rises higher than the exact answer ever does, symplectic Euler less"
+            " high.",
+            lambda shown: (
+                shown.y("reference:lesson").max()
+                > shown.y(TRUTH).max()
+                > shown.y("reference:exercise").max()
+            ),
+        ),
+        Claim(
+            f"From the largest step to the smallest, {STEPS[0] // STEPS[-1]} times smaller, both"
+            " errors fall to less than a tenth. Not every halving of the step helps, because how"
+            " late a bounce is found depends on where in a step it happens.",
+            lambda shown: (
+                all(10 * shown.y(name, 2)[0] < shown.y(name, 2)[-1] for name in METHODS)
+                and any((np.diff(shown.y(name, 2)) < 0).any() for name in METHODS)
+            ),
+        ),
+    ]
+
+
+def tunnelling(played: Simulation) -> list[Claim]:
+    """A wall acts on what overlaps it at the end of a step."""
+    way, radius = way_of(played), float(played.scenario.scene.radius[0])
+    apart = f"A step moves the particle by v dt = {number(way)} m; its radius is R = {radius} m."
+    low, high = 1 - radius, 11 + radius  # m, where the walls are
+    if way <= radius:
+        return [
+            Claim(
+                f"{apart} No step can carry the centre from outside the reach of a wall to behind"
+                " it, and both methods stay between the walls.",
+                lambda shown: all(
+                    low < shown.y(name).min() and shown.y(name).max() < high for name in METHODS
+                ),
+            )
+        ]
+    return [
+        Claim(
+            f"{apart} A step can carry the centre across a wall without an end of a step at which"
+            " the wall is touched from inside. That is tunnelling: both methods leave the box.",
+            lambda shown: all(
+                shown.y(name).min() < low or shown.y(name).max() > high for name in METHODS
+            ),
+        ),
+        Claim(
+            "The exact answer stays between the walls.",
+            lambda shown: low < shown.y(TRUTH).min() and shown.y(TRUTH).max() < high,
+        ),
+    ]
+
+
+def above(shown: Shown, name: str) -> Array:
+    """(k,) m that a method is above the exact answer."""
+    return shown.y(name) - shown.y(TRUTH)
+
+
+class Part(NamedTuple):
+    """A part of lesson 1: how fast the particle starts, m/s, gravity, m/s2, and what is claimed."""
+
+    speed: float
+    gravity: float
+    claims: Callable[[Simulation], list[Claim]]
+
+
+PARTS = {
+    "1. without a force": Part(1.0, 0.0, without_force),
+    "2. with gravity": Part(1.0, 0.5, with_gravity),
+    "3. a step longer than the radius": Part(10.0, 0.0, tunnelling),
+}
+
+
+PARTICLE = Lesson(
+    name="particle",
+    number="1",
+    title="A particle and its step",
+    asks="How wrong does a particle get when time goes in steps?",
+    text=(
+        (
+            "A particle is a position, a velocity and a radius. A step of <code>dt</code> moves it"
+            " by <code>v dt</code>. Between two walls it plays ping-pong: at a wall its velocity is"
+            " turned round."
+        ),
+        (
+            "Then a force acts. <b>Explicit Euler</b> (<code>reference:lesson</code>) moves with"
+            " the old velocity and then changes it. <b>Symplectic Euler</b>"
+            " (<code>reference:exercise</code>) changes the velocity first and moves with the new"
+            " one. At last the particle is so fast that a step may be longer than its radius, and"
+            " it may pass through a wall: this is <b>tunnelling</b>."
+        ),
+    ),
+    sliders=(
+        Slider("part", "Part of the lesson", tuple(PARTS)),
+        time_step(1 / 8, STEPS, STEPS.index(4)),
+    ),
+    names=(*METHODS, TRUTH),
+    show=show_particle,
+)
