@@ -51,7 +51,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         run = replace(run, settings=engine.settings(), versions=engine.versions())
         states.append(engine.read())
         watch(states[0])
-        for k in range(scenario.samples):
+        for k in range(scenario.intervals):
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
             if fault := fault_of(state, farthest):

@@ -114,14 +114,14 @@ class Scenario:
         check_scenario(self)
 
     @property
-    def samples(self) -> int:
-        """How many sample intervals the duration has; a trajectory has one sample more."""
+    def intervals(self) -> int:
+        """Sample intervals in the duration; a trajectory has one sample more."""
         return max(1, round(self.duration / self.sample_interval))
 
     @property
     def times(self) -> Array:
         """(k,) s, the instants at which every trajectory of this scenario is sampled."""
-        return frozen(np.arange(self.samples + 1) * self.sample_interval)
+        return frozen(np.arange(self.intervals + 1) * self.sample_interval)
 
     def dt(self, substeps: int) -> float:
         """Step size in s when each sample interval is cut into `substeps`."""

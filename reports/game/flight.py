@@ -145,7 +145,7 @@ class Flight:
     @property
     def over(self) -> bool:
         """Whether there is nothing left to fly."""
-        return self.frame >= self.scenario.samples or all(flyer.left for flyer in self.flyers)
+        return self.frame >= self.scenario.intervals or all(flyer.left for flyer in self.flyers)
 
     def key(self, key: str, down: bool) -> None:
         """A key event, which acts from the next frame on; a replay has its own."""

@@ -80,7 +80,7 @@ class Lap(NamedTuple):
         scenario = self.scenario
         # Halved, so that another run of the same times the same part.
         halvings = max(0, ceil(log2(max(self.seconds, 1e-9) / LONGEST)))
-        samples = max(1, scenario.samples // 2**halvings)
+        samples = max(1, scenario.intervals // 2**halvings)
         return replace(scenario, duration=samples * scenario.sample_interval)
 
 

@@ -66,7 +66,7 @@ def doublings(scenario: Scenario, most_steps: int) -> tuple[int, ...]:
     return tuple(
         k
         for n, k in enumerate(step_sizes)
-        if n < FEWEST_STEP_SIZES or k * scenario.samples <= most_steps
+        if n < FEWEST_STEP_SIZES or k * scenario.intervals <= most_steps
     )
 
 

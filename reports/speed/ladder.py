@@ -46,7 +46,7 @@ def held(scene: str, seed: int) -> Held:
 def reach_of(scene: str, seed: int) -> tuple[int, str]:
     """How many sample intervals have an exact answer, 0 with the reason if none has."""
     try:
-        return held(scene, seed).scenario.samples, ""
+        return held(scene, seed).scenario.intervals, ""
     except NoTruth as refusal:
         return 0, str(refusal)
 
