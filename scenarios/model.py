@@ -123,6 +123,11 @@ class Scenario:
         """(k,) s, the instants at which every trajectory of this scenario is sampled."""
         return frozen(np.arange(self.intervals + 1) * self.sample_interval)
 
+    @property
+    def middle_substeps(self) -> int:
+        """Substeps of the middle step size, whose errors are the scores of the report."""
+        return self.substeps[len(self.substeps) // 2]
+
     def dt(self, substeps: int) -> float:
         """Step size in s when each sample interval is cut into `substeps`."""
         return self.sample_interval / substeps

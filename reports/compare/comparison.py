@@ -28,8 +28,8 @@ class Comparison:
 
     @property
     def middle_dt(self) -> float:
-        """s, the middle step size: where a scenario is read when one must be chosen."""
-        return self.scenario.dt(self.scenario.substeps[len(self.scenario.substeps) // 2])
+        """s, the middle step size, whose errors are the scores of the report."""
+        return self.scenario.dt(self.scenario.middle_substeps)
 
     @property
     def middle_runs(self) -> list[Run]:

@@ -113,7 +113,7 @@ class Flight:
 
     def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
         self.scenario, self.replayed = scenario, replayed
-        self.substeps = scenario.substeps[len(scenario.substeps) // 2]
+        self.substeps = scenario.middle_substeps
         self.dt = scenario.dt(self.substeps)
         wrap = scenario.scene.wrap
         self.is_game = wrap is not None and np.array_equal(wrap, [LOW, HIGH])

@@ -167,9 +167,12 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
         scenario, truth = answered(
             tables.answers[scene].given_to(scenario_of(archive.folder, records))
         )
-        middle = scenario.substeps[len(scenario.substeps) // 2]
         runs = [
-            run_of(archive.folder, record, with_trajectory=record["substeps"] == middle)
+            run_of(
+                archive.folder,
+                record,
+                with_trajectory=record["substeps"] == scenario.middle_substeps,
+            )
             for record in records
         ]
         comparisons.append(

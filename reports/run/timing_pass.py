@@ -143,12 +143,7 @@ class Pass:
 def in_turns(laps: Sequence[Lap]) -> list[tuple[Lap, int]]:
     """The laps, and how often each takes part: twice at the middle step size of its scene, which
     gives the noise floor."""
-    return [(lap, 2 if lap.substeps == middle(lap.scenario) else 1) for lap in laps]
-
-
-def middle(scenario: Scenario) -> int:
-    """Steps in a sample interval at the middle step size."""
-    return scenario.substeps[len(scenario.substeps) // 2]
+    return [(lap, 2 if lap.substeps == lap.scenario.middle_substeps else 1) for lap in laps]
 
 
 def lap_of(lap: Lap, copy: int) -> Timed:
