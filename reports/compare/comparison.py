@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.run import Run
+from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
 from reports.compare.table import TableRow, row_of, status_row, table_of
@@ -50,7 +51,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
             rows.append(status_row(run, f"{run.status}: {run.reason}"))
             continue
         for versus, other in _opponents(run, runs, truth):
-            view = beside(scenario, run, other, jumps if versus == "truth" else None)
+            view = beside(scenario, run, other, jumps if versus == TRUTH else None)
             rows += _measure(run, view, versus)
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
 
@@ -59,9 +60,9 @@ def _opponents(
     run: Run, runs: Sequence[Run], truth: Trajectory | None
 ) -> Iterator[tuple[str, Trajectory | None]]:
     """What a run is set against: the laws, the truth, and each engine that stands after it."""
-    yield "itself", None
+    yield ITSELF, None
     if truth is not None:
-        yield "truth", truth
+        yield TRUTH, truth
     for other in runs[runs.index(run) + 1 :]:
         if other.dt == run.dt and other.name != run.name and other.status == "ok":
             yield other.name, other.trajectory
@@ -69,7 +70,7 @@ def _opponents(
 
 def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
     """A row for each metric that applies."""
-    kind = versus if versus in ("itself", "truth") else "engine"
+    kind = versus if versus in (ITSELF, TRUTH) else ENGINE
     rows = []
     with np.errstate(over="ignore", invalid="ignore"):  # of what was thrown far; the value says so
         for name, metric in METRICS.items():

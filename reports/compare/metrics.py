@@ -15,6 +15,7 @@ import numpy as np
 
 from reports.compare import collision_metrics as collisions
 from reports.compare import laws, scales, violations
+from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array
 
@@ -100,16 +101,12 @@ def energy_loss_error(view: View) -> Value | None:
         return None
     if not view.judged.any():
         return Value(np.nan)
-    last, scale = (
-        int(np.flatnonzero(view.judged.any(axis=1))[-1]),
-        scales.energy(scenario, view.other) or 1.0,
-    )
+    last = int(np.flatnonzero(view.judged.any(axis=1))[-1])
+    scale = scales.energy(scenario, view.other) or 1.0
     low, high = view.energy_range
     start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
-    excess, width = (
-        float(start - view.energy_deviation[last]) / scale,
-        (high[last] - low[last]) / scale,
-    )
+    excess = float(start - view.energy_deviation[last]) / scale
+    width = (high[last] - low[last]) / scale
     return Value(
         excess,
         at=float(view.played.t[last]),
@@ -223,8 +220,7 @@ class Metric:
     Attributes:
         of: the function.
         unit: of the value, "1" for a ratio.
-        against: what it is measured against: "itself" (laws of physics and the start), "truth",
-            "engine".
+        against: what it is measured against: `ITSELF`, `TRUTH`, `ENGINE` (against.py).
         better: "lower", "higher", "zero" or "as stated" (the best value).
         title: the name in words, as a table shows it; "" for the name itself.
     """
@@ -241,7 +237,6 @@ class Metric:
         return " ".join((getdoc(self.of) or "").split("\n\n")[0].split())
 
 
-TRUTH, ITSELF, ENGINE = "truth", "itself", "engine"
 METRICS: dict[str, Metric] = {
     "position_max_radii": Metric(
         position_max_radii, "radii", (TRUTH, ENGINE), title="Position, largest error"

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.run import Run
+from reports.compare.against import ITSELF
 from reports.compare.view import Value
 
 COLUMNS = (
@@ -33,7 +34,7 @@ def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> Table
     return (*whose, value.disk, value.value, unit, versus, value.at, value.note)
 
 
-def status_row(run: Run, why: str, versus: str = "itself") -> TableRow:
+def status_row(run: Run, why: str, versus: str = ITSELF) -> TableRow:
     """In place of numbers: why there is none of a run."""
     return row_of(run, "status", Value(np.nan, note=why), "", versus)
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.run.answers import Answer, read_answer
 from reports.run.archive import Archive, digest, run_of
@@ -153,7 +154,7 @@ def unkept_comparison(
         return Comparison(scenario, truth, runs, read_share(share))
     why = not_compared(share)
     scenario = replace(scenario, truth=None, without_truth=why)
-    return Comparison(scenario, None, runs, not_judged(runs, why, "itself"))
+    return Comparison(scenario, None, runs, not_judged(runs, why, ITSELF))
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
