@@ -1,4 +1,4 @@
-"""Runs of one scenario set against the truth and against each other, as one tidy table."""
+"""Compare the runs of one scenario with the truth and with each other, in one table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from scenarios.no_truth import answered
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One scenario, all that was played of it, and what came out."""
+    """One scenario, its runs, and the table of their metrics."""
 
     scenario: Scenario
     truth: Trajectory | None  # the exact answer up to its horizon
@@ -41,7 +41,7 @@ class Comparison:
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Every metric of every run against the laws, the truth and every other engine at the same dt.
 
-    A run that failed earns no score; what it played before is kept in its file.
+    A run that failed has one row with its status, and no score.
     """
     scenario, truth = answered(scenario)
     jumps = None if truth is None else jumps_of(truth, scenario)
@@ -59,7 +59,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
 def _opponents(
     run: Run, runs: Sequence[Run], truth: Trajectory | None
 ) -> Iterator[tuple[str, Trajectory | None]]:
-    """What a run is set against: the laws, the truth, and each engine that stands after it."""
+    """What a run is measured against: the laws, the truth, and each later engine of `runs`."""
     yield ITSELF, None
     if truth is not None:
         yield TRUTH, truth
@@ -72,7 +72,7 @@ def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
     """A row for each metric that applies."""
     kind = versus if versus in (ITSELF, TRUTH) else ENGINE
     rows = []
-    with np.errstate(over="ignore", invalid="ignore"):  # of what was thrown far; the value says so
+    with np.errstate(over="ignore", invalid="ignore"):  # a disk far out gives inf or nan
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
                 judged = value if len(view.played) > 1 else not_judged("the start alone")

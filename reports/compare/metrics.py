@@ -1,7 +1,7 @@
-"""Every number of the report: a function, what it means, its unit, and what it is measured against.
+"""The metrics: for each its function, unit, and what it is measured against.
 
-To add one: write `def name(view) -> Value | None` and its row in `METRICS`. None: it does not apply
-here.
+To add one, write `def name(view) -> Value | None` and its row in `METRICS`. A metric that does not
+apply to a scene returns None.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ Measure = Callable[[View], Value | None]
 
 
 def over_judged(measure: Measure) -> Measure:
-    """The metric, that says how many samples carry it, and nothing where they are too few (view.py:
-    LEAST_SHARE)."""
+    """The metric with the number of judged samples in its note; "not judged" where they are fewer
+    than `LEAST_SHARE` (view.py)."""
 
     @wraps(measure)
     def carried(view: View) -> Value | None:
@@ -122,8 +122,7 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall: they are where no collision can bring them back
-    from."""
+    """Disks whose centre has crossed a wall, so that no collision can bring them back."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
@@ -153,7 +152,8 @@ def position_max_radii(view: View) -> Value | None:
 
 @over_judged
 def velocity_rms(view: View) -> Value | None:
-    """Root mean square over disks and samples of what `velocity_max` is the largest of."""
+    """Root mean square over disks and samples; `velocity_max` is the largest of the same
+    differences."""
     return Value(_rms(view.velocity_deviation[view.judged]))
 
 

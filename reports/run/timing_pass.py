@@ -1,5 +1,5 @@
-"""The timing pass of a run: after all is played, what its steps cost is measured in one process,
-in interleaved rounds, with nothing of the run beside it."""
+"""The timing pass of a run: when every cell has ended, one process measures the time of steps in
+interleaved rounds, while no other task of the run is under way."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SCENES = (
     "asteroids",  # the exercise's own scene
     "gas_of_100",  # a crowd
 )
-"""Scenes that need different things of an engine."""
+"""Scenes with different work for an engine."""
 # s a run may take: of a longer one only the first part is timed, so that every round visits all.
 # About a hundred of them take a quarter of the pass.
 LONGEST = 0.03
@@ -166,7 +166,7 @@ def besides(laps: Sequence[Lap]) -> list[Timed]:
 
 
 def can(timed: Timed) -> bool:
-    """Whether it runs at all: an engine may refuse a world in which nothing moves."""
+    """Whether it runs: an engine may refuse a world in which nothing moves."""
     with suppress(Exception):
         timed.run()
         return True
@@ -174,7 +174,7 @@ def can(timed: Timed) -> bool:
 
 
 def line_of(key: tuple[Any, ...], samples: Sequence[Any]) -> dict[str, Any]:
-    """The line of the journal for one thing."""
+    """The line of the journal for the samples of one key."""
     costs = [sample.cost for sample in samples]
     if key[0] == "timing":
         _, cell, copy, until = key
@@ -234,7 +234,7 @@ def binding(archive: Archive, name: str, scenario: Scenario, substeps: int) -> f
 
 
 def median_of(costs: Sequence[float] | None) -> float:
-    """nan of none."""
+    """The median; nan if there are no costs."""
     return float(np.median(costs)) if costs else np.nan
 
 
