@@ -1,4 +1,4 @@
-"""What an engine must be able to do to take part: a few verbs, and no base class."""
+"""The protocol of an engine: the methods that an adapter must have. There is no base class."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ from typing import Any, NamedTuple, Protocol
 
 from scenarios.model import Array, Scene, State
 
-# What stands in place of the value that an engine resolved a setting to:
-NOT_READABLE = "not readable"  # its binding does not report it
-PASSED = "passed with every step"  # it keeps no such setting
-KEPT = "kept by the adapter"  # it knows no such setting
+# In `settings`, in place of the resolved value, where the engine does not report it:
+NOT_READABLE = "not readable"  # the binding has no getter
+PASSED = "passed with every step"  # an argument of the step, which the engine does not store
+KEPT = "kept by the adapter"  # the adapter does it, the engine has no such setting
 NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
 
 
 class Unsupported(Exception):
-    """An engine cannot model this scene, and says why rather than approximate it."""
+    """An engine cannot model this scene; str() is the reason. It must not approximate the scene."""
 
 
 class NotStarted(Exception):
-    """What an engine runs in cannot be had, as where memory is short: no fault of the engine's, and
-    no result."""
+    """The process of an engine could not be started, for example for want of memory. This is not a
+    result of the engine."""
 
     outside = True
 
 
 class ContactImpulse(NamedTuple):
-    """A contact with an impulse during one step; one that lasts gives another in every step."""
+    """The impulse of a contact in one step; a lasting contact has one in every step."""
 
     step: int  # from 0
     i: int  # a disk
@@ -34,13 +34,13 @@ class ContactImpulse(NamedTuple):
 
 
 class Engine(Protocol):
-    """The protocol: `load`, then `step` and `read` as often as is wanted, and `close`."""
+    """The protocol: `load` once, then `step` and `read` any number of times, then `close`."""
 
-    # Whether collisions are logged; set before `load`. Off where speed is measured: to log every
-    # collision in Python costs more than some engines' whole step.
+    # Whether collisions are logged; set before `load`. Off where speed is measured, because logging
+    # in Python takes longer than a whole step of some engines.
     listening: bool = True
-    # s spent in Python on setting disks onto the opposite edge, by an engine that knows no such
-    # edge; part of what `step` takes. Whoever measures sets it to 0.
+    # s of the time of `step` that the adapter spent on `Scene.wrap`, where the engine itself has no
+    # such edges. A measurement sets it to 0 first.
     wrapping: float = 0.0
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -64,7 +64,7 @@ class Engine(Protocol):
         own default."""
 
     def versions(self) -> dict[str, str]:
-        """Library -> version, of all that decides the numbers."""
+        """Library -> version, of every library that affects the numbers."""
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all memory and processes."""

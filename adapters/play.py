@@ -13,19 +13,19 @@ from adapters.run import Run, gather, run_of, substeps_of
 from adapters.runaway import RUNAWAY, fault_of, reach
 from scenarios.model import Scenario, State
 
-Watch = Callable[[State], None]  # is given every good sample as soon as it is there
+Watch = Callable[[State], None]  # called with every sample that is no fault
 
 
 def unwatched(state: State) -> None:
-    """Do nothing with a sample."""
+    """The `Watch` of a run that nobody watches: do nothing."""
 
 
 def play_once(
     make: Callable[[], Engine], name: str, scenario: Scenario, dt: float, watch: Watch = unwatched
 ) -> Run:
-    """`play` on a new engine, made by `make`, which is closed again whatever happens.
+    """`play` on a new engine from `make`, which is closed at the end, also after an exception.
 
-    A library that is missing is a refusal, with its name. Raises what `play` raises.
+    If its library cannot be imported, the run is `unsupported`. Raises what `play` raises.
     """
     try:
         engine = make()
@@ -39,9 +39,9 @@ def play_once(
 def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch = unwatched) -> Run:
     """Play `scenario` in steps of `dt` s; `name` is `engine:profile`.
 
-    Refusals, exceptions and runaways become the run's status, and what was played before them its
-    trajectory. Raises `ValueError` if dt does not divide the sample interval, `MemoryError`, and
-    `NotStarted`: of the latter two no engine is the cause.
+    A refusal, an exception or a disk that runs away becomes the status of the run, and its
+    trajectory holds the samples before it. Raises `ValueError` if dt does not divide the sample
+    interval, and `MemoryError` and `NotStarted`, which are no fault of the engine.
     """
     substeps = substeps_of(scenario, dt)
     run, states, seconds = run_of(name, scenario, dt), list[State](), 0.0
@@ -51,7 +51,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         run = replace(run, settings=engine.settings(), versions=engine.versions())
         states.append(engine.read())
         watch(states[0])
-        for k in range(scenario.samples):
+        for k in range(scenario.intervals):
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
             if fault := fault_of(state, farthest):

@@ -1,4 +1,4 @@
-"""What one engine made of one scenario."""
+"""`Run`: one scenario played by one engine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What one engine made of one scenario at one dt."""
+    """One scenario played by one engine at one dt."""
 
     engine: str
     profile: str
@@ -33,7 +33,7 @@ class Run:
 
 
 def run_of(name: str, scenario: Scenario, dt: float) -> Run:
-    """A run of `engine:profile` of which nothing is known yet."""
+    """A run of `engine:profile` without a trajectory yet."""
     engine, profile = name.split(":")
     return Run(engine, profile, scenario.name, dt)
 

@@ -40,13 +40,8 @@ def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> Non
 def integrate(disks: Disks, world: World, dt: float) -> None:
     """Task 1, symplectic Euler: velocities from force and torque, then positions from the NEW
     velocities."""
-    x, v, g, force, torque = (
-        disks.position,
-        disks.velocity,
-        world.gravity,
-        disks.force,
-        disks.torque,
-    )
+    x, v, g = disks.position, disks.velocity, world.gravity
+    force, torque = disks.force, disks.torque
     for i in range(len(disks.mass)):
         if disks.mass[i] == inf:
             continue

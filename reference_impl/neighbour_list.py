@@ -1,10 +1,10 @@
-"""Which disks may touch in the next steps, so that a step need not ask every pair and every wall.
+"""A neighbour list (Verlet, Phys. Rev. 159, 98, 1967): the pairs of disks, and of disks and walls,
+that may touch in the next steps. Many disks are sorted into a cell list to find them.
 
-A neighbour list (Verlet, Phys. Rev. 159, 98, 1967), found by cells where the disks are many. It
-decides what is asked, never what is answered: the pairs stand in the order of the double loop over
-i < j, and one that is left out cannot touch as long as neither of its disks has moved by half the
-skin. Nobody measures that in every step: no disk moves farther in a step than the `STRIDE`, which
-is taken off what is left of half the skin, the `SLACK`.
+The list changes no result: its pairs are in the order of the double loop over i < j, and a pair
+that is not in it cannot touch until one of its disks has moved by half the skin. The distance moved
+is not measured in every step: no disk moves farther in a step than `STRIDE`, which each step
+subtracts from `SLACK`, the rest of half the skin.
 """
 
 from math import floor, inf, sqrt
@@ -15,9 +15,9 @@ import numpy as np
 from reference_impl.compiled import compiled, kernel
 from reference_impl.state import World
 
-LASTS = 16  # steps of the fastest disk that a list is made for, unless fewer are left
-HALF = 0.49  # of the skin: 2 % of it are more than what rounding makes of all the distances
-EARLY = 0.1  # of half the skin: what is kept for what the collisions of a step move
+LASTS = 16  # steps of the fastest disk for which a list is built, unless fewer steps remain
+HALF = 0.49  # of the skin, not 1/2: the margin is more than the rounding of the distances
+EARLY = 0.1  # of half the skin, reserved for the position corrections of a step
 # the skin in mean radii: at least, so that disks at rest may fall; at most
 THIN, THICK = 0.125, 3.0
 FEW = 64  # disks, up to which asking all pairs finds the near ones sooner than cells do
@@ -126,7 +126,7 @@ def skin_for(radius, stride: float, left: int) -> float:  # type: ignore[no-unty
 
 @kernel
 def find_by_all_pairs(near: NeighbourList, x, radius, skin: float) -> None:  # type: ignore[no-untyped-def]
-    """Of `FEW` disks, for which there is always room."""
+    """For `FEW` disks or fewer, whose pairs always fit into the list."""
     count = 0
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
@@ -169,7 +169,7 @@ def find_edges(near: NeighbourList, x, world: World, margin: float) -> None:  # 
 
 @compiled
 def find_by_cells(near: NeighbourList, x, radius, skin: float) -> None:  # type: ignore[no-untyped-def]
-    """Of many disks: only those in neighbouring cells are asked."""
+    """For more disks: tests only the pairs in neighbouring cells."""
     # wider than needed by more than rounding
     cells = sort_into_cells(x, radius, 1.001 * (2.0 * radius.max() + skin))
     first, second = near_pairs(cells, skin)

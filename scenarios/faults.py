@@ -116,7 +116,7 @@ def check_scenario(scenario: Any) -> None:
     duration, interval = scenario.duration, scenario.sample_interval
     if not (0 < interval < np.inf and 0 < duration < np.inf):
         raise ValueError("duration and sample_interval must be positive and finite")
-    if abs(duration / interval - scenario.samples) > 1e-9 * scenario.samples:
+    if abs(duration / interval - scenario.intervals) > 1e-9 * scenario.intervals:
         raise ValueError(
             f"sample_interval {interval:g} s does not divide the duration {duration:g} s"
         )

@@ -1,4 +1,4 @@
-"""The nouns: what is asked (`Scene`, `Thrust`, `Scenario`) and what is answered (`State`,
+"""The data types of a scene (`Scene`, `Thrust`, `Scenario`) and of its motion (`State`,
 `Collisions`, `Trajectory`).
 
 SI units, float64, y up, counter-clockwise positive. n disks, w walls, k samples, h collisions;
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scenarios.faults import check_scenario, check_scene, check_thrust
 
 Array = NDArray[np.float64]
-DEFAULT: Any = None  # what a field is until the scene sets it to what its comment says
+DEFAULT: Any = None  # stands for the default value that the comment of the field names
 
 
 def frozen(value: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
@@ -102,8 +102,8 @@ class Scenario:
     sample_interval: float  # s; every engine is sampled at i * sample_interval
     substeps: Sequence[int] = (1, 2, 4, 8)  # k of dt = sample_interval / k, coarse to fine
     thrusts: Sequence[Thrust] = ()  # piecewise-constant
-    # Times (k,) s -> the exact `Trajectory` there, up to its horizon, or `NoTruth`; or None, and
-    # then why there is no exact answer, in one sentence.
+    # Times (k,) s -> the exact `Trajectory` at these times, up to its horizon; raises `NoTruth`.
+    # None: there is no exact answer, and `without_truth` says why in one sentence.
     truth: Callable[[Array], Trajectory] | None = None
     without_truth: str = ""
     seed: int | None = None  # of a random scene
@@ -114,14 +114,19 @@ class Scenario:
         check_scenario(self)
 
     @property
-    def samples(self) -> int:
-        """How many sample intervals the duration has; a trajectory has one sample more."""
+    def intervals(self) -> int:
+        """Sample intervals in the duration; a trajectory has one sample more."""
         return max(1, round(self.duration / self.sample_interval))
 
     @property
     def times(self) -> Array:
         """(k,) s, the instants at which every trajectory of this scenario is sampled."""
-        return frozen(np.arange(self.samples + 1) * self.sample_interval)
+        return frozen(np.arange(self.intervals + 1) * self.sample_interval)
+
+    @property
+    def middle_substeps(self) -> int:
+        """Substeps of the middle step size, whose errors are the scores of the report."""
+        return self.substeps[len(self.substeps) // 2]
 
     def dt(self, substeps: int) -> float:
         """Step size in s when each sample interval is cut into `substeps`."""
@@ -130,7 +135,7 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What every disk does at one instant."""
+    """Position and velocity of every disk at one instant."""
 
     position: Array  # (n, 2) m
     velocity: Array  # (n, 2) m/s
@@ -171,8 +176,8 @@ class Trajectory:
     angle: Array  # (k, n) rad, unwrapped
     angular_velocity: Array  # (k, n) rad/s
     collisions: Collisions = NO_COLLISIONS  # those up to t[-1]
-    # Of a truth: s, up to where engines are held to it, beyond which it has no sample; m, how far
-    # it may be off (0: a closed form, right to a few roundings); why it ends, "" if it does not.
+    # Only of a truth: the time in s up to which it has samples; its largest error in m (0: a closed
+    # form, exact to a few roundings); why the horizon is before the end, "" if it is not.
     horizon: float = np.inf
     error_bound: float = 0.0
     reason: str = ""

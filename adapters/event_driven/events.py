@@ -176,12 +176,6 @@ class EventEngine:
         """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all collisions so far."""
         return np.concatenate([np.empty((0, 5)), *self.kept])[:, :4]
 
-    @property
-    def cosines(self) -> Array:
-        """(h,) of the impact angle of each of the collisions, normal over whole speed: the smaller,
-        the more a graze."""
-        return np.concatenate([np.empty((0, 5)), *self.kept])[:, 4]
-
     def refuse_pairs(self) -> None:
         """`NoTruth` if two disks overlap, or touch and close in, judged in rationals: floats cannot
         tell."""

@@ -66,7 +66,7 @@ def play_scene(
     }
     before = fresh_world(process) if afresh else []
     requests = [*before, ("load", start, LIMIT), ("read", None, LIMIT)]
-    for _ in range(scenario.samples):
+    for _ in range(scenario.intervals):
         requests += [("step", step, LIMIT), ("read", None, LIMIT)]
     requests.append(("contacts", None, LIMIT))
     *answers, contacts = process.request(requests, SCENE_LIMIT)[len(before) :]

@@ -66,7 +66,7 @@ def replay(
     status, reason, after = again(record, row, continued(scenario, substeps, before, k), timeout)
     step = k * substeps + (len(after) - 1 if after is not None else 0)
     show(f"now:     {ending(status, reason)}")
-    show(f"reached: step {step} of {scenario.samples * substeps}, {step * record['dt_s']:g} s")
+    show(f"reached: step {step} of {scenario.intervals * substeps}, {step * record['dt_s']:g} s")
     if record["status"] == status == "ok":
         show(f"bits:    {'as' if same(before, after, substeps) else 'not as'} recorded")
     sys.exit(DONE if status == "ok" else FAILED)
@@ -111,7 +111,7 @@ def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: i
         scenario,
         scene=scene,
         sample_interval=dt,
-        duration=max(1, scenario.samples - k) * substeps * dt,
+        duration=max(1, scenario.intervals - k) * substeps * dt,
         substeps=(1,),
         thrusts=[
             replace(thrust, start=max(0.0, thrust.start - start), stop=thrust.stop - start)

@@ -1,4 +1,4 @@
-"""Runs of one scenario set against the truth and against each other, as one tidy table."""
+"""Compare the runs of one scenario with the truth and with each other, in one table."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.run import Run
+from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
 from reports.compare.table import TableRow, row_of, status_row, table_of
@@ -19,7 +20,7 @@ from scenarios.no_truth import answered
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One scenario, all that was played of it, and what came out."""
+    """One scenario, its runs, and the table of their metrics."""
 
     scenario: Scenario
     truth: Trajectory | None  # the exact answer up to its horizon
@@ -28,8 +29,8 @@ class Comparison:
 
     @property
     def middle_dt(self) -> float:
-        """s, the middle step size: where a scenario is read when one must be chosen."""
-        return self.scenario.dt(self.scenario.substeps[len(self.scenario.substeps) // 2])
+        """s, the middle step size, whose errors are the scores of the report."""
+        return self.scenario.dt(self.scenario.middle_substeps)
 
     @property
     def middle_runs(self) -> list[Run]:
@@ -40,7 +41,7 @@ class Comparison:
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
     """Every metric of every run against the laws, the truth and every other engine at the same dt.
 
-    A run that failed earns no score; what it played before is kept in its file.
+    A run that failed has one row with its status, and no score.
     """
     scenario, truth = answered(scenario)
     jumps = None if truth is None else jumps_of(truth, scenario)
@@ -50,7 +51,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
             rows.append(status_row(run, f"{run.status}: {run.reason}"))
             continue
         for versus, other in _opponents(run, runs, truth):
-            view = beside(scenario, run, other, jumps if versus == "truth" else None)
+            view = beside(scenario, run, other, jumps if versus == TRUTH else None)
             rows += _measure(run, view, versus)
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
 
@@ -58,10 +59,10 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
 def _opponents(
     run: Run, runs: Sequence[Run], truth: Trajectory | None
 ) -> Iterator[tuple[str, Trajectory | None]]:
-    """What a run is set against: the laws, the truth, and each engine that stands after it."""
-    yield "itself", None
+    """What a run is measured against: the laws, the truth, and each later engine of `runs`."""
+    yield ITSELF, None
     if truth is not None:
-        yield "truth", truth
+        yield TRUTH, truth
     for other in runs[runs.index(run) + 1 :]:
         if other.dt == run.dt and other.name != run.name and other.status == "ok":
             yield other.name, other.trajectory
@@ -69,9 +70,9 @@ def _opponents(
 
 def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
     """A row for each metric that applies."""
-    kind = versus if versus in ("itself", "truth") else "engine"
+    kind = versus if versus in (ITSELF, TRUTH) else ENGINE
     rows = []
-    with np.errstate(over="ignore", invalid="ignore"):  # of what was thrown far; the value says so
+    with np.errstate(over="ignore", invalid="ignore"):  # a disk far out gives inf or nan
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
                 judged = value if len(view.played) > 1 else not_judged("the start alone")

@@ -1,7 +1,7 @@
-"""Every number of the report: a function, what it means, its unit, and what it is measured against.
+"""The metrics: for each its function, unit, and what it is measured against.
 
-To add one: write `def name(view) -> Value | None` and its row in `METRICS`. None: it does not apply
-here.
+To add one, write `def name(view) -> Value | None` and its row in `METRICS`. A metric that does not
+apply to a scene returns None.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from reports.compare import collision_metrics as collisions
 from reports.compare import laws, scales, violations
+from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array
 
@@ -22,8 +23,8 @@ Measure = Callable[[View], Value | None]
 
 
 def over_judged(measure: Measure) -> Measure:
-    """The metric, that says how many samples carry it, and nothing where they are too few (view.py:
-    LEAST_SHARE)."""
+    """The metric with the number of judged samples in its note; "not judged" where they are fewer
+    than `LEAST_SHARE` (view.py)."""
 
     @wraps(measure)
     def carried(view: View) -> Value | None:
@@ -100,16 +101,12 @@ def energy_loss_error(view: View) -> Value | None:
         return None
     if not view.judged.any():
         return Value(np.nan)
-    last, scale = (
-        int(np.flatnonzero(view.judged.any(axis=1))[-1]),
-        scales.energy(scenario, view.other) or 1.0,
-    )
+    last = int(np.flatnonzero(view.judged.any(axis=1))[-1])
+    scale = scales.energy(scenario, view.other) or 1.0
     low, high = view.energy_range
     start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
-    excess, width = (
-        float(start - view.energy_deviation[last]) / scale,
-        (high[last] - low[last]) / scale,
-    )
+    excess = float(start - view.energy_deviation[last]) / scale
+    width = (high[last] - low[last]) / scale
     return Value(
         excess,
         at=float(view.played.t[last]),
@@ -125,8 +122,7 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall: they are where no collision can bring them back
-    from."""
+    """Disks whose centre has crossed a wall, so that no collision can bring them back."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
@@ -156,7 +152,8 @@ def position_max_radii(view: View) -> Value | None:
 
 @over_judged
 def velocity_rms(view: View) -> Value | None:
-    """Root mean square over disks and samples of what `velocity_max` is the largest of."""
+    """Root mean square over disks and samples; `velocity_max` is the largest of the same
+    differences."""
     return Value(_rms(view.velocity_deviation[view.judged]))
 
 
@@ -223,8 +220,7 @@ class Metric:
     Attributes:
         of: the function.
         unit: of the value, "1" for a ratio.
-        against: what it is measured against: "itself" (laws of physics and the start), "truth",
-            "engine".
+        against: what it is measured against: `ITSELF`, `TRUTH`, `ENGINE` (against.py).
         better: "lower", "higher", "zero" or "as stated" (the best value).
         title: the name in words, as a table shows it; "" for the name itself.
     """
@@ -241,7 +237,6 @@ class Metric:
         return " ".join((getdoc(self.of) or "").split("\n\n")[0].split())
 
 
-TRUTH, ITSELF, ENGINE = "truth", "itself", "engine"
 METRICS: dict[str, Metric] = {
     "position_max_radii": Metric(
         position_max_radii, "radii", (TRUTH, ENGINE), title="Position, largest error"

@@ -1,4 +1,4 @@
-"""The tidy table: one number a row, with what was played, by whom, and what it is measured
+"""The tidy table deviations.csv: a row for each number, with its run and what it is measured
 against."""
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.run import Run
+from reports.compare.against import ITSELF
 from reports.compare.view import Value
 
 COLUMNS = (
@@ -28,16 +29,16 @@ TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str]  #
 
 
 def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
-    """A number of a run."""
+    """The row of one metric of a run."""
     whose = (run.scenario, run.engine, run.profile, run.dt, metric)
     return (*whose, value.disk, value.value, unit, versus, value.at, value.note)
 
 
-def status_row(run: Run, why: str, versus: str = "itself") -> TableRow:
-    """In place of numbers: why there is none of a run."""
+def status_row(run: Run, why: str, versus: str = ITSELF) -> TableRow:
+    """The row of a run without numbers, with the reason."""
     return row_of(run, "status", Value(np.nan, note=why), "", versus)
 
 
 def table_of(rows: Sequence[TableRow]) -> pd.DataFrame:
-    """The rows as a table; of none an empty one."""
+    """The rows as a table with `COLUMNS`."""
     return pd.DataFrame(rows, columns=list(COLUMNS))

@@ -1,4 +1,4 @@
-"""A played trajectory beside what it is set against: the one argument of every metric."""
+"""`View`: a run and the trajectory it is measured against; the one argument of every metric."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LEAST_SHARE = 0.1
 judged by. An engine errs in collisions: what is left of a run in less than a tenth of its samples
 is mostly the flight before the first of them, where nobody errs; and those of the collisions that a
 step can tell apart are the easiest."""
-# how the note of a number begins that too little carries; its value is NaN
+# begins the note of a number that is NaN because too few samples are judged
 NOT_JUDGED = "not judged"
 
 
@@ -46,13 +46,13 @@ class Value(NamedTuple):
 
 
 def not_judged(why: str) -> Value:
-    """What a metric says where it applies and too little carries it."""
+    """The value of a metric that applies, where too few samples or collisions are judged."""
     return Value(np.nan, note=f"{NOT_JUDGED}: {why}")
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A played trajectory beside what it is set against, over the samples both have.
+    """The trajectory of a run and the one it is measured against, over the samples both have.
 
     Attributes:
         scenario: what was played.
@@ -78,12 +78,11 @@ class View:
 
     @cached_property
     def judged(self) -> np.ndarray:
-        """(k, n) where the velocity of a disk is compared; never at the start, which is given to
-        all.
+        """(k, n) where the velocity of a disk is compared; never at the start, which is given.
 
-        With the truth: everywhere but within `WINDOW` dt of its end, as of a collision after it
-        nobody knows that may come early. With an engine, where nobody knows who is late: where
-        neither has a collision of that disk within `WINDOW` dt.
+        With the truth: up to `WINDOW` dt before its end, because an engine may already have a
+        collision that the truth has only after its end. With another engine, of which either may
+        be late: where neither has a collision of that disk within `WINDOW` dt.
         """
         assert self.other is not None
         played, moving = self.played, ~self.scenario.scene.static
@@ -97,13 +96,13 @@ class View:
 
     @cached_property
     def share(self) -> float:
-        """Of the samples after the start, disk by disk, those that are judged."""
+        """The fraction of the samples after the start, disk by disk, that are judged."""
         every = (len(self.played) - 1) * int((~self.scenario.scene.static).sum())
         return float(self.judged.sum() / every) if every else 0.0
 
     @cached_property
     def carried(self) -> str:
-        """How many samples carry what is compared with the other."""
+        """How many of the samples are judged, in words."""
         samples = len(self.played) - 1
         if self.jumps is not None:
             return f"{self.judged.any(axis=1).sum()} of {samples} samples"

@@ -113,7 +113,7 @@ class Flight:
 
     def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
         self.scenario, self.replayed = scenario, replayed
-        self.substeps = scenario.substeps[len(scenario.substeps) // 2]
+        self.substeps = scenario.middle_substeps
         self.dt = scenario.dt(self.substeps)
         wrap = scenario.scene.wrap
         self.is_game = wrap is not None and np.array_equal(wrap, [LOW, HIGH])
@@ -145,7 +145,7 @@ class Flight:
     @property
     def over(self) -> bool:
         """Whether there is nothing left to fly."""
-        return self.frame >= self.scenario.samples or all(flyer.left for flyer in self.flyers)
+        return self.frame >= self.scenario.intervals or all(flyer.left for flyer in self.flyers)
 
     def key(self, key: str, down: bool) -> None:
         """A key event, which acts from the next frame on; a replay has its own."""

@@ -65,7 +65,7 @@ def crowd(count: int, fill: float) -> Scenario:
 def cost(name: str, scenario: Scenario) -> float:
     """µs a step, the least of some rounds: what disturbs a measurement only ever makes it
     longer."""
-    steps = scenario.samples * SUBSTEPS
+    steps = scenario.intervals * SUBSTEPS
     return (
         min(
             play_once(ENGINES[name].make, name, scenario, scenario.dt(SUBSTEPS)).seconds

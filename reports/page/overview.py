@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
 from reports.compare.view import NOT_JUDGED
@@ -98,7 +99,7 @@ def values(comparison: Comparison) -> Found:
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
     found: Found = {}
-    for versus in ("itself", TRUTH):  # the truth comes last and wins
+    for versus in (ITSELF, TRUTH):  # the truth comes last and wins
         rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
         for row in rows.to_dict("records"):
             where = (

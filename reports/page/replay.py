@@ -81,13 +81,13 @@ def name_of(run: Run | None) -> str:
 def frames(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> NDArray[np.int64]:
     """The samples that are drawn: spread evenly, and those nearest to the last layer's collisions,
     if these are few."""
-    count = int(min(FRAMES, max(60, NUMBERS // scenario.scene.n), scenario.samples + 1))
+    count = int(min(FRAMES, max(60, NUMBERS // scenario.scene.n), scenario.intervals + 1))
     collisions = np.unique(
         np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int)
     )
-    collisions = collisions[(collisions > 0) & (collisions < scenario.samples)]
+    collisions = collisions[(collisions > 0) & (collisions < scenario.intervals)]
     collisions = collisions if len(collisions) < count // 4 else collisions[:0]
-    even = np.rint(np.linspace(0, scenario.samples, count - len(collisions))).astype(int)
+    even = np.rint(np.linspace(0, scenario.intervals, count - len(collisions))).astype(int)
     return np.unique(np.concatenate([even, collisions]))
 
 

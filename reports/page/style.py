@@ -11,9 +11,8 @@ from zlib import crc32
 
 from adapters.engine_row import Mark
 from adapters.engines import ENGINES, OWN
+from reports.compare.against import TRUTH as TRUTH  # its curve is drawn, as an engine's is
 from reports.terminal.foreign_text import encoded
-
-TRUTH = "truth"
 
 
 class Look(NamedTuple):

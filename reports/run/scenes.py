@@ -61,7 +61,7 @@ def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario
             too small.
     """
     ladder, interval = tuple(scenario.substeps), scenario.sample_interval
-    most = MOST_STEPS // scenario.samples
+    most = MOST_STEPS // scenario.intervals
     for dt in dts:
         if dt > 0 and interval / dt > most + 0.5:  # the nearest whole number is more
             raise ValueError(

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from adapters.run import Run
+from reports.compare.against import TRUTH
 from reports.compare.comparison import Comparison, compare
 from reports.compare.table import status_row, table_of
 from reports.compare.view import NOT_JUDGED
@@ -172,7 +173,7 @@ def share_of(folder: Path, records: Records, answered: Path) -> Share:
     assert answer is not None
     comparison = compared(folder, records, answer)
     table = comparison.table
-    if answer.lost and not (lost := not_judged(comparison.runs, answer.lost, "truth")).empty:
+    if answer.lost and not (lost := not_judged(comparison.runs, answer.lost, TRUTH)).empty:
         table = pd.concat([table, lost])
     damaged = any(run.status != record["status"] for run, record in zip(comparison.runs, records))
     return Share(csv_of(table), damaged)

@@ -34,7 +34,7 @@ class Stepping:
         with closing(self.make()) as engine:
             engine.listening, engine.wrapping = False, 0.0
             engine.load(scenario.scene, dt)
-            seconds = advance(engine, scenario, 0, scenario.samples * self.substeps, dt)
+            seconds = advance(engine, scenario, 0, scenario.intervals * self.substeps, dt)
             return Spent(seconds, engine.wrapping)
 
 
@@ -109,6 +109,6 @@ def binding_of(step: float, singly: float, scenario: Scenario, substeps: int) ->
 def rates(scenario: Scenario, substeps: int) -> tuple[float, float]:
     """How many steps, and how many calls of `step`, a simulated second of the scenario takes: in
     its one call there are many steps, but for those in which a thrust acts."""
-    steps = scenario.samples * substeps
+    steps = scenario.intervals * substeps
     calls = sum(1 for _ in thrust_steps(scenario.thrusts, 0, steps, scenario.dt(substeps)))
     return steps / scenario.duration, calls / scenario.duration

@@ -1,12 +1,12 @@
-"""The main job: play scenarios through engines into a folder, each cell once, and keep every result
-as it comes."""
+"""A run: play scenarios through engines, each cell once, and write every result to the run's folder
+as soon as it is there."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
@@ -36,12 +36,12 @@ from scenarios.model import Scenario
 
 
 class Check(NamedTuple):
-    """What `crosscheck check` says of a solver's file.
+    """The verdict of `crosscheck check` on a solver's file.
 
     Attributes:
         passed: whether it found no fault.
-        says: its sentences, the one to begin with first.
-        source: of the text that was checked, as `EngineRow.source`; "" if there is none.
+        says: its sentences, the most important first.
+        source: `EngineRow.source` of the text that was checked; "" if there is none.
     """
 
     passed: bool
@@ -57,7 +57,7 @@ class Checking(NamedTuple):
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What is asked for: all that decides which numbers come out.
+    """The scenes, engines and settings of a run: all that decides its numbers.
 
     Attributes:
         scenes: names of the catalogue or paths of scene files, in reading order.
@@ -65,10 +65,11 @@ class RunPlan:
         seed: seed of random scenes.
         dts: step sizes in s instead of each scenario's own; empty: its own.
         full: two finer steps for every scenario.
-        timings: s that the timing pass after all is played may take; 0: there is none.
-        command: how to ask for the same again.
-        folder: where it was asked for, from where paths that are not absolute are meant.
-        files: what is read instead of a scene's path, such as the copy of a file that is gone.
+        timings: s that the timing pass at the end may take; 0: there is none.
+        command: the command line that runs this plan again.
+        folder: the working directory of the command, to which relative paths belong.
+        files: path of a scene -> the file that is read instead, such as the kept copy of a deleted
+            file.
         checks: a solver's file of `engines` -> a picklable task that gives its `Check`.
     """
 
@@ -90,15 +91,15 @@ class RunPlan:
         )
 
     def header(self) -> dict[str, Any]:
-        """What the journal begins with, and `RunPlan` is made from again when a run is resumed."""
-        asked = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
-        same = {name: getattr(self, name) for name in ("full", "timings", "folder")}
-        return about(self.command, self.seed) | asked | same
+        """The first line of the journal; when a run is resumed, its `RunPlan` is made from it."""
+        lists = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
+        values = {name: getattr(self, name) for name in ("full", "timings", "folder")}
+        return about(self.command, self.seed) | lists | values
 
 
 @dataclass(frozen=True)
 class Means:
-    """With what a plan is carried out; decides no number.
+    """The processes, time and memory with which a plan is carried out; they change no number.
 
     Attributes:
         workers: processes that play at once.
@@ -114,63 +115,98 @@ class Means:
 
 
 class OtherVersions(Exception):
-    """Workers on another machine do not play by the same source and versions."""
+    """A worker has other source or other library versions than this machine."""
 
 
 def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:
-    """Put the probes to every engine and play every cell that the journal does not have; all goes
-    into its folder."""
+    """Run every task of the plan whose result the journal does not have, take the timings, and
+    write all results to the journal and its folder."""
     folder = journal.path.parent
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     tasks = tasks_of(plan, scenarios)
     begin(plan, journal, scenarios, len(tasks))
     archive = Archive.read(folder)
-    done = had(archive, plan, means, scenarios)
-    missing = {task: work for task, work in tasks.items() if task not in done}
-    # where the file is
-    checks = {task: missing.pop(task) for task in list(missing) if isinstance(task, Checking)}
+    finished = finished_tasks(archive, plan, means, scenarios)
+    missing = {task: work for task, work in tasks.items() if task not in finished}
     cells = [task for task in missing if isinstance(task, Cell)]
-    alone = {cell for cell in cells if plan.engines[cell.engine].leaves_state}
     gathering = Gathering(archive, cells, means.timeout, progress.note)
-    comparing: deque[Any] = deque([*checks.items(), *gathering.tasks()])
-    progress.start(len(missing) + len(checks), len(tasks))
-    limits = means.timeout, means.memory
-    if gathering.asked and not missing and not checks:
-        progress.say(waiting_for(gathering.asked))
-    with closing(
-        run_all(missing, means.workers, *limits, means.scheduler, alone, comparing)
-    ) as results:
-        for task, result in results:
-            if isinstance(task, Cell):
-                key = task.key(scene_hash(scenarios[task.scene]), plan.engines[task.engine].source)
-                line = keep_cell(journal, scenarios[task.scene], means, task, key, result)
-                said = f"{line['scenario']}  {task.engine}  dt {line['dt_s']:.4g} s"
-                progress.done(said, line["status"], line["reason"])
-                comparing.extend(gathering.cell_ended(line))
-            elif isinstance(task, Path):
-                comparing.extend(gathering.task_ended(task, result))
-            elif isinstance(task, Checking):
-                progress.done(*keep_check(journal, plan, task.engine, result))
-            else:
-                progress.done(*keep_answer(journal, plan, task, result))
-            if gathering.asked and not gathering.playing:
-                progress.say(waiting_for(gathering.asked))
+    Playing(plan, means, journal, scenarios, gathering, progress).run(missing, len(tasks))
     archive = Archive.read(folder)
     take_timings(archive, plan, means, journal, scenarios, progress)
-    sweep(archive)
-    journal.append(
-        {
-            "footer": {
-                "tasks": len(tasks),
-                "played": len(missing) + len(checks),
-                "seconds": progress.seconds,
-            }
-        }
-    )
+    delete_unused_trajectories(archive)
+    footer = {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}
+    journal.append({"footer": footer})
+
+
+@dataclass(frozen=True)
+class Playing:
+    """The part of a run in which workers carry out the tasks and their results are kept.
+
+    Attributes:
+        scenarios: scene -> its scenario.
+        gathering: gives out the exact answer and the comparison of each scene whose cells have all
+            ended.
+    """
+
+    plan: RunPlan
+    means: Means
+    journal: Journal
+    scenarios: Mapping[str, Scenario]
+    gathering: Gathering
+    progress: Progress
+
+    def run(self, missing: Mapping[Any, Callable[[], Any]], tasks: int) -> None:
+        """Carry out the `missing` of so many `tasks`, and compare each scene once its cells have
+        ended."""
+        # A solver's file is checked on this machine, where the file is, as scenes are compared.
+        checks = {task: work for task, work in missing.items() if isinstance(task, Checking)}
+        played = {task: work for task, work in missing.items() if task not in checks}
+        alone = {task for task in played if isinstance(task, Cell) and self.leaves_state(task)}
+        urgent: deque[Any] = deque([*checks.items(), *self.gathering.tasks()])
+        self.progress.start(len(missing), tasks)
+        if not missing:
+            self.show_waiting()
+        limits = self.means.timeout, self.means.memory
+        with closing(
+            run_all(played, self.means.workers, *limits, self.means.scheduler, alone, urgent)
+        ) as results:
+            for task, result in results:
+                urgent.extend(self.keep(task, result))
+                self.show_waiting()
+
+    def leaves_state(self, cell: Cell) -> bool:
+        """Whether the engine of a cell needs a process of its own for each cell."""
+        return self.plan.engines[cell.engine].leaves_state
+
+    def keep(self, task: Any, result: Any) -> Iterable[Any]:
+        """Write the result of a task and show its status; the tasks that can be given out now."""
+        if isinstance(task, Path):  # the file of an exact answer or of a comparison
+            return self.gathering.task_ended(task, result)
+        if isinstance(task, Cell):
+            return self.gathering.cell_ended(self.keep_cell(task, result))
+        if isinstance(task, Checking):
+            self.progress.done(*keep_check(self.journal, self.plan, task.engine, result))
+        else:
+            self.progress.done(*keep_answer(self.journal, self.plan, task, result))
+        return ()
+
+    def keep_cell(self, cell: Cell, result: CellResult | Failure) -> dict[str, Any]:
+        """Write the result of a cell and show its status; the cell's line of the journal."""
+        scenario = self.scenarios[cell.scene]
+        key = cell.key(scene_hash(scenario), self.plan.engines[cell.engine].source)
+        line = keep_cell(self.journal, scenario, self.means, cell, key, result)
+        shown = f"{line['scenario']}  {cell.engine}  dt {line['dt_s']:.4g} s"
+        self.progress.done(shown, line["status"], line["reason"])
+        return line
+
+    def show_waiting(self) -> None:
+        """Once every cell has ended: show which exact answers the run still waits for."""
+        if self.gathering.asked and not self.gathering.playing:
+            self.progress.say(waiting_for(self.gathering.asked))
 
 
 def waiting_for(scenes: Sequence[str]) -> str:
-    """What is still to come when all is played."""
+    """The sentence part that names the scenes whose exact answer is being computed."""
     more = f" and {len(scenes) - 1} more" if len(scenes) > 1 else ""
     return f"the exact answer to {Path(scenes[0]).stem}{more}"
 
@@ -185,7 +221,7 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
     copies = {
         copy: scene_text(scenarios[scene])
         for scene, name in named.items()
-        # else it is what is left of the file
+        # where the plan reads the copy itself, the scene's own file is gone
         if (copy := stored_scene(folder, name)) != plan.files.get(scene)
     }
     header = plan.header() | {"tasks": tasks, "names": named}
@@ -198,8 +234,8 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
 
 
 def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
-    """What is to be done, by what it is: an engine's name (its probes), `Checking`, `KnownAnswer`
-    or `Cell`."""
+    """Task -> the picklable function that carries it out. A task is an engine's name (its probes),
+    a `Checking`, a `KnownAnswer` or a `Cell`."""
     tasks: dict[Any, Callable[[], Any]] = {
         name: partial(conform_here, name, row) for name, row in plan.engines.items()
     }
@@ -214,13 +250,13 @@ def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Call
     return tasks
 
 
-def had(
+def finished_tasks(
     archive: Archive, plan: RunPlan, means: Means, scenarios: Mapping[str, Scenario]
 ) -> set[Any]:
-    """The tasks of which the journal has the result, by the same scene, settings and versions.
+    """The tasks whose result the journal has, of the same scene, settings and versions.
 
-    What was stopped for time is had only if it would be stopped now; not what has lost its
-    trajectory; and what failed for a reason outside the engine is no result.
+    A cell is to be played again if it was stopped after less time than it may take now, if its
+    trajectory is gone or damaged, or if it failed for a reason outside the engine.
     """
     keys = {
         line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)
@@ -251,7 +287,7 @@ def had(
 
 
 def name_of(task: KnownAnswer | str) -> str:
-    """How the journal calls the probes of an engine, or a known answer."""
+    """The name in the journal of an engine's probes or of a known answer."""
     return task if isinstance(task, str) else repr(task)
 
 
@@ -263,8 +299,8 @@ def answer_key(plan: RunPlan, task: KnownAnswer | str) -> str:
 def keep_answer(
     journal: Journal, plan: RunPlan, task: KnownAnswer | str, result: Any
 ) -> tuple[str, str, str]:
-    """Write what a known answer, or the probes of an engine, gave; returns what to say of it, its
-    status, and why."""
+    """Write the result of a known answer or of an engine's probes to the journal; returns the
+    task in words, its status, and the reason of a failure."""
     failure = result if isinstance(result, Failure) else None
     status, reason = (failure.status, failure.reason) if failure else ("ok", "")
     if isinstance(task, KnownAnswer):
@@ -276,7 +312,7 @@ def keep_answer(
         findings = [no_answer(task, status, reason)] if failure else result
         line = {"conformance": [asdict(finding) for finding in findings]}
         said = f"conformance of {task}"
-    # A key that is nobody's: what failed for a reason outside the engine is asked again.
+    # No key matches "": a failure outside the engine is tried again when the run is resumed.
     key = "" if failure and failure.outside else answer_key(plan, task)
     journal.append(line | {"of": name_of(task), "key": key})
     return said, status, reason
@@ -285,8 +321,8 @@ def keep_answer(
 def keep_check(
     journal: Journal, plan: RunPlan, engine: str, result: Check | Failure
 ) -> tuple[str, str, str]:
-    """Write what `crosscheck check` says of an engine's file; returns what to say of it, its
-    status, and why."""
+    """Write the verdict of `crosscheck check` on an engine's file to the journal; returns the task
+    in words, its status, and the reason of a failure."""
     said, status, reason = f"check of {engine}", "ok", ""
     passed, says, key = False, ["It was saved while the run began: check it by itself."], ""
     if isinstance(result, Failure):
@@ -294,7 +330,7 @@ def keep_check(
         status, reason = result.status, result.reason
     elif result.source == plan.engines[engine].source:
         passed, says, key = result.passed, result.says, answer_key(plan, engine)
-    # without a key it is asked again when the run is resumed
+    # No key matches "": the file is checked again when the run is resumed.
     journal.append({"checked": {"passed": passed, "says": says}, "of": engine, "key": key})
     return said, status, reason
 
@@ -343,7 +379,7 @@ def keep_cell(
 
 
 def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
-    """What is left of a cell whose worker died or was stopped: the states up to then."""
+    """The result of a cell whose worker died or was stopped: the states up to that time."""
     trajectory = from_trail(failure.trail, scenario)
     samples = len(trajectory) if trajectory else 0
     last = (
@@ -370,7 +406,7 @@ def take_timings(
     scenarios: Mapping[str, Scenario],
     progress: Progress,
 ) -> None:
-    """Have the timing pass done, unless the journal has it; nothing of this run is beside it."""
+    """Run the timing pass, unless the journal has its result; no other task runs meanwhile."""
     laps = laps_of(archive, plan.engines, scenarios) if plan.timings else []
     if not laps or is_timed(archive, laps):
         return
@@ -386,9 +422,9 @@ def take_timings(
                 progress.done("timing")
 
 
-def sweep(archive: Archive) -> None:
-    """Delete the trajectories that no line of the journal speaks of any more."""
-    spoken_of = {record["cell"] for record in archive.records}
+def delete_unused_trajectories(archive: Archive) -> None:
+    """Delete the trajectories of cells that the journal does not name any more."""
+    named = {record["cell"] for record in archive.records}
     for path in (archive.folder / "trajectories").iterdir():
-        if path.stem not in spoken_of and RUN.names(f"trajectories/{path.name}"):
+        if path.stem not in named and RUN.names(f"trajectories/{path.name}"):
             path.unlink()

@@ -1,5 +1,5 @@
-"""The tables of a run, made from its journal scenario by scenario; what has been compared is not
-compared again."""
+"""Make the tables of a run from its journal, scenario by scenario; a comparison that is kept is not
+made again."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.run.answers import Answer, read_answer
 from reports.run.archive import Archive, digest, run_of
@@ -47,12 +48,12 @@ TABLES = ("deviations.csv", "runs.csv", TABLE)
 
 
 class Tables(NamedTuple):
-    """What was made.
+    """The tables of a run.
 
     Attributes:
         runs: runs.csv.
         timed: timings.csv.
-        answers: scene -> its exact answer, as it was had or not.
+        answers: scene -> its exact answer, or why there is none.
         shares: scene -> where its share of deviations.csv is.
         unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file
             is gone or torn.
@@ -84,15 +85,19 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
     answers = {
         scene: read_answer(answer_file(folder, records)) for scene, records in by_scene.items()
     }
-    had = {scene: answer for scene, answer in answers.items() if answer is not None}
-    assert len(had) == len(by_scene)
-    shares = {scene: share_file(folder, records, had[scene]) for scene, records in by_scene.items()}
+    known = {scene: answer for scene, answer in answers.items() if answer is not None}
+    assert len(known) == len(by_scene)
+    shares = {
+        scene: share_file(folder, records, known[scene]) for scene, records in by_scene.items()
+    }
     unkept = {
-        scene: unkept_comparison(folder, by_scene[scene], had[scene], share)
+        scene: unkept_comparison(folder, by_scene[scene], known[scene], share)
         for scene, share in (gathering.unkept | gathering.failed).items()
     }
     unjudged = {
-        by_scene[scene][0]["scenario"]: answer.lost for scene, answer in had.items() if answer.lost
+        by_scene[scene][0]["scenario"]: answer.lost
+        for scene, answer in known.items()
+        if answer.lost
     }
     unjudged |= {
         unkept[scene].scenario.name: not_compared(failure)
@@ -100,17 +105,17 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
     }
     say("writing the tables")
     write_deviations(folder, shares, unkept)
-    had_from = {answer_file(folder, records) for records in by_scene.values()}
-    sweep(folder / "compared", {*shares.values(), *had_from, seal_of(folder)})
+    answer_files = {answer_file(folder, records) for records in by_scene.values()}
+    sweep(folder / "compared", {*shares.values(), *answer_files, seal_of(folder)})
     runs = table_of_runs([record for records in by_scene.values() for record in records], unkept)
     put_text(folder / "runs.csv", runs.to_csv(index=False))
     timed = timings(archive, scenarios_by_name(folder, by_scene))
     put_text(folder / TABLE, timed.to_csv(index=False, float_format="%.6g"))
-    return Tables(runs, timed, had, shares, unkept, unjudged)
+    return Tables(runs, timed, known, shares, unkept, unjudged)
 
 
 def scenarios_by_name(folder: Path, by_scene: Mapping[str, Records]) -> dict[str, Scenario]:
-    """Of all that was played."""
+    """Name -> scenario, of every scene that was played."""
     scenarios = [scenario_of(folder, records) for records in by_scene.values()]
     return {scenario.name: scenario for scenario in scenarios}
 
@@ -153,7 +158,7 @@ def unkept_comparison(
         return Comparison(scenario, truth, runs, read_share(share))
     why = not_compared(share)
     scenario = replace(scenario, truth=None, without_truth=why)
-    return Comparison(scenario, None, runs, not_judged(runs, why, "itself"))
+    return Comparison(scenario, None, runs, not_judged(runs, why, ITSELF))
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
@@ -167,9 +172,12 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
         scenario, truth = answered(
             tables.answers[scene].given_to(scenario_of(archive.folder, records))
         )
-        middle = scenario.substeps[len(scenario.substeps) // 2]
         runs = [
-            run_of(archive.folder, record, with_trajectory=record["substeps"] == middle)
+            run_of(
+                archive.folder,
+                record,
+                with_trajectory=record["substeps"] == scenario.middle_substeps,
+            )
             for record in records
         ]
         comparisons.append(

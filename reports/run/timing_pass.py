@@ -1,5 +1,5 @@
-"""The timing pass of a run: after all is played, what its steps cost is measured in one process,
-in interleaved rounds, with nothing of the run beside it."""
+"""The timing pass of a run: when every cell has ended, one process measures the time of steps in
+interleaved rounds, while no other task of the run is under way."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SCENES = (
     "asteroids",  # the exercise's own scene
     "gas_of_100",  # a crowd
 )
-"""Scenes that need different things of an engine."""
+"""Scenes with different work for an engine."""
 # s a run may take: of a longer one only the first part is timed, so that every round visits all.
 # About a hundred of them take a quarter of the pass.
 LONGEST = 0.03
@@ -80,7 +80,7 @@ class Lap(NamedTuple):
         scenario = self.scenario
         # Halved, so that another run of the same times the same part.
         halvings = max(0, ceil(log2(max(self.seconds, 1e-9) / LONGEST)))
-        samples = max(1, scenario.samples // 2**halvings)
+        samples = max(1, scenario.intervals // 2**halvings)
         return replace(scenario, duration=samples * scenario.sample_interval)
 
 
@@ -143,12 +143,7 @@ class Pass:
 def in_turns(laps: Sequence[Lap]) -> list[tuple[Lap, int]]:
     """The laps, and how often each takes part: twice at the middle step size of its scene, which
     gives the noise floor."""
-    return [(lap, 2 if lap.substeps == middle(lap.scenario) else 1) for lap in laps]
-
-
-def middle(scenario: Scenario) -> int:
-    """Steps in a sample interval at the middle step size."""
-    return scenario.substeps[len(scenario.substeps) // 2]
+    return [(lap, 2 if lap.substeps == lap.scenario.middle_substeps else 1) for lap in laps]
 
 
 def lap_of(lap: Lap, copy: int) -> Timed:
@@ -171,7 +166,7 @@ def besides(laps: Sequence[Lap]) -> list[Timed]:
 
 
 def can(timed: Timed) -> bool:
-    """Whether it runs at all: an engine may refuse a world in which nothing moves."""
+    """Whether it runs: an engine may refuse a world in which nothing moves."""
     with suppress(Exception):
         timed.run()
         return True
@@ -179,7 +174,7 @@ def can(timed: Timed) -> bool:
 
 
 def line_of(key: tuple[Any, ...], samples: Sequence[Any]) -> dict[str, Any]:
-    """The line of the journal for one thing."""
+    """The line of the journal for the samples of one key."""
     costs = [sample.cost for sample in samples]
     if key[0] == "timing":
         _, cell, copy, until = key
@@ -239,7 +234,7 @@ def binding(archive: Archive, name: str, scenario: Scenario, substeps: int) -> f
 
 
 def median_of(costs: Sequence[float] | None) -> float:
-    """nan of none."""
+    """The median; nan if there are no costs."""
     return float(np.median(costs)) if costs else np.nan
 
 

@@ -1,4 +1,4 @@
-"""How much is measured: enough for a look, or for a figure to keep."""
+"""How much `crosscheck speed` measures: the quick form, and `--full`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FEWEST_STEP_SIZES, MOST_STEP_SIZES = 3, 9
 
 @dataclass(frozen=True)
 class Effort:
-    """How much.
+    """The scenes, step sizes, rounds and numbers of disks that are measured.
 
     Attributes:
         scenes: what is measured if nothing is asked for; in the quick form one of each kind, so
@@ -25,11 +25,11 @@ class Effort:
         budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
         sizes: numbers of disks.
         patience: s a step may take before an engine drops out of the sizes.
-        sweep_scenes: what iterations and substeps are turned up in: a stack, a crowd, a slide, and
+        sweep_scenes: in which iterations and substeps are increased: a stack, a crowd, a slide, and
             collisions in a row.
-        option_scenes: what changed engines are measured in: three disks, a collision that
-            thresholds matter to, one disk under gravity, many collisions, and a stack at rest.
-        budget_scenes: those in which it is asked what the errors are made of.
+        option_scenes: in which engines with changed options are measured: three disks, a collision
+            that thresholds affect, one disk under gravity, many collisions, and a stack at rest.
+        budget_scenes: of which the error budget is made.
     """
 
     scenes: tuple[str, ...]
@@ -66,7 +66,7 @@ def doublings(scenario: Scenario, most_steps: int) -> tuple[int, ...]:
     return tuple(
         k
         for n, k in enumerate(step_sizes)
-        if n < FEWEST_STEP_SIZES or k * scenario.samples <= most_steps
+        if n < FEWEST_STEP_SIZES or k * scenario.intervals <= most_steps
     )
 
 

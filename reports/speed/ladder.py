@@ -1,5 +1,5 @@
-"""One engine through one scene over its dt ladder: how far off it is, and what it costs; two
-separate passes."""
+"""Play one engine through one scene at several step sizes: its errors in one pass, its times in
+another."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def held(scene: str, seed: int) -> Held:
 def reach_of(scene: str, seed: int) -> tuple[int, str]:
     """How many sample intervals have an exact answer, 0 with the reason if none has."""
     try:
-        return held(scene, seed).scenario.samples, ""
+        return held(scene, seed).scenario.intervals, ""
     except NoTruth as refusal:
         return 0, str(refusal)
 
@@ -54,13 +54,13 @@ def reach_of(scene: str, seed: int) -> tuple[int, str]:
 def errors_of(
     scene: str, seed: int, name: str, make: Make, ladder: Sequence[int]
 ) -> list[dict[str, Any]]:
-    """A row a step size of `ladder` (coarse to fine) of what engine `name` makes of the scene, up
-    to the horizon.
+    """A row for each step size of `ladder` (coarse to fine): the error of engine `name` in the
+    scene, up to the horizon.
 
-    until_s is how far the exact answer, and so the run, goes of the duration_s of the scene;
-    error_radii the largest distance of any disk from where it truly is, change_radii the largest
-    from where the step size before had it; inf and nan where it failed. An engine that closes in on
-    another motion changes less and less while its error stays.
+    until_s is the horizon, where the run ends, and duration_s the duration of the scene.
+    error_radii is the largest distance of any disk from the exact answer, inf where the run failed;
+    change_radii the largest distance from the run at the next coarser step size, nan if either
+    failed. An engine that converges to a wrong motion has a small change and a large error.
     """
     scenario, truth = held(scene, seed)
     whole = open_scene(scene, seed).duration

@@ -143,5 +143,4 @@ def around(here: int) -> tuple[int, ...]:
 
 def middle(scene: str) -> int:
     """Steps in a sample interval at the dt the report shows."""
-    step_sizes = open_scene(scene, 0).substeps
-    return step_sizes[len(step_sizes) // 2]
+    return open_scene(scene, 0).middle_substeps

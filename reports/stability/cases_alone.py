@@ -161,7 +161,7 @@ def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
             engine.load(scenario.scene, scenario.sample_interval)
             settings = engine.settings()
             states.append(engine.read())
-            for _ in range(scenario.samples):
+            for _ in range(scenario.intervals):
                 engine.apply_force(0, -states[-1].position[0], 0.0)
                 engine.step()
                 states.append(engine.read())

@@ -173,7 +173,7 @@ def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
     whole = played(variant, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
-    half = scenario.samples // 2
+    half = scenario.intervals // 2
     state, scene = whole.trajectory.at(half), scenario.scene
     fresh: Scene = replace(
         scene,
@@ -182,7 +182,7 @@ def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
         angle=state.angle,
         angular_velocity=state.angular_velocity,
     )
-    left = (scenario.samples - half) * scenario.sample_interval
+    left = (scenario.intervals - half) * scenario.sample_interval
     rest = played(variant, replace(scenario, scene=fresh, duration=left))
     if rest.status != "ok" or rest.trajectory is None:
         return scenario, rest

@@ -98,9 +98,9 @@ def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
     """The samples around the failure, up to `BEFORE` and `AFTER` it; where it is early or late,
     more of the others."""
     at = failing.at if np.isfinite(failing.at) else 0.0
-    middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.samples))
-    first = max(0, min(middle - BEFORE, scenario.samples - BEFORE - AFTER))
-    return np.arange(first, min(scenario.samples, first + BEFORE + AFTER) + 1)
+    middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.intervals))
+    first = max(0, min(middle - BEFORE, scenario.intervals - BEFORE - AFTER))
+    return np.arange(first, min(scenario.intervals, first + BEFORE + AFTER) + 1)
 
 
 def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:

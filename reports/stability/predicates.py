@@ -200,16 +200,6 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
     return heights
 
 
-def apex_drift(scenario: Scenario, played: Trajectory) -> float:
-    """Mean change of a bouncing ball's apex per bounce, from the first bounce to the last, over the
-    height of the drop.
-
-    nan of a ball that does not bounce twice.
-    """
-    heights = apexes(scenario, played)[1:]
-    return float((heights[-1] - heights[0]) / (len(heights) - 1)) if len(heights) > 1 else np.nan
-
-
 def first_bounce(scenario: Scenario) -> float:
     """s, when a ball dropped over y = 0 collisions for the first time."""
     scene = scenario.scene

@@ -175,5 +175,7 @@ def spent(make: Make, scenario: Scenario) -> float:
         engine.listening = False
         engine.load(scenario.scene, scenario.dt(TIMED_SUBSTEPS))
         started = thread_time()
-        advance(engine, scenario, 0, scenario.samples * TIMED_SUBSTEPS, scenario.dt(TIMED_SUBSTEPS))
+        advance(
+            engine, scenario, 0, scenario.intervals * TIMED_SUBSTEPS, scenario.dt(TIMED_SUBSTEPS)
+        )
         return thread_time() - started

@@ -1,5 +1,5 @@
-"""The exact answer to scenes without a closed form: event by event in many digits, and no further
-than it is right."""
+"""The exact answer to scenes without a closed form: an event-driven computation in many digits, cut
+at the horizon up to which it is right."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from scenarios.truth.oracle.work import Clock, Work
 from scenarios.truth.record import TruthRecord, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be distinguished
-LEAST_GAIN = 1.05  # times as far must half as many bits again reach, or more will not help
+LEAST_GAIN = 1.05  # 1.5 times the bits must reach 1.05 times as far, else more bits do not help
 # times as many bits as the rate so far asks for, and so many to be left for the accuracy
 SPARE, LEFT = 1.3, 64
 MOST_DISKS = 200
 # steps of the event loop for one attempt, some twenty seconds; few attempts get so far
 WORK = 40_000
-HEAVY = 4096  # bits that make a step twice as dear as one of few bits
+HEAVY = 4096  # bits at which a step takes twice the time of one with few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
 # of the time that is left for both of two precisions: the finer one takes a little longer

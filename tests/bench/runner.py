@@ -141,7 +141,7 @@ def least(name: str, scene: Scenario, substeps: int) -> tuple[float, float]:
     for _ in range(ROUNDS):
         engine, clock = ENGINES[name].make(), [0.0, 0.0]
         engine.load(scene.scene, scene.dt(substeps))
-        for _ in range(scene.samples):
+        for _ in range(scene.intervals):
             started = process_time()
             engine.step(substeps)
             stepped = process_time()

@@ -62,7 +62,7 @@ def sampled(
     """Play all steps, and read where a sample is due."""
     rows = [read()]
     substeps = round(scenario.sample_interval / dt)
-    for k in range(scenario.samples):
+    for k in range(scenario.intervals):
         for number in range(k * substeps, (k + 1) * substeps):
             step(number)
         rows.append(read())

@@ -47,7 +47,7 @@ def sweep(asked: list[Scenario]) -> None:
     assert [one.name for one, run in zip(asked, runs) if run is None] == []
     for one, run in zip(asked, runs):
         if run.status == "ok":
-            assert len(run.trajectory) == one.samples + 1
+            assert len(run.trajectory) == one.intervals + 1
         else:
             assert run.status == "unsupported"
             assert any(re.fullmatch(words, run.reason) for words in REFUSALS), run.reason

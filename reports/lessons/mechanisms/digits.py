@@ -35,13 +35,13 @@ def show_digits(settings: Settings) -> Shown:
         runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16)
     )
     facts = distances(runs, curves, "m")
-    curves.append(Curve(TRUTH, scenario.times, np.full(scenario.samples + 1, 1e-16)))
+    curves.append(Curve(TRUTH, scenario.times, np.full(scenario.intervals + 1, 1e-16)))
     chart = LessonChart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
     return Shown(
         [chart],
         filmed(scenario, runs),
         facts,
-        digits_claims(far, digits, scenario.samples * 4, scenario.dt(4)),
+        digits_claims(far, digits, scenario.intervals * 4, scenario.dt(4)),
     )
 
 

@@ -25,7 +25,7 @@ def falling(engine: str, on: AblatedReference, substeps: int, claims: FlightClai
     runs = runs_of([engine], on, scenario, substeps)
     curves = over_time(runs, lambda each: 1e3 * (each.position - exact)[:, 0, 1])
     facts = distances(runs, curves, "mm")
-    curves.append(Curve(TRUTH, scenario.times, np.zeros(scenario.samples + 1)))
+    curves.append(Curve(TRUTH, scenario.times, np.zeros(scenario.intervals + 1)))
     offset = 1e3 * 9.81 * scenario.dt(substeps) * scenario.times / 2
     return Shown(
         [LessonChart("Above the parabola", "time in s", "mm", curves)],

@@ -121,7 +121,7 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 
     assert len(collisions) == 2
     assert (view.judged == (~near & (view.played.t > 0))[:, None]).all()
-    assert view.carried == f"{view.judged.sum()} of {2 * one.samples} samples of a disk"
+    assert view.carried == f"{view.judged.sum()} of {2 * one.intervals} samples of a disk"
 
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():

@@ -68,7 +68,7 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
     )
     scenario = Scenario("through-the-edge", "Does it come back?", "", scene, 6.0, 0.125)
     session = Session(["reference:exercise"], scenario)
-    session.flight.advance(scenario.samples)
+    session.flight.advance(scenario.intervals)
     run = play(
         ENGINES["reference:exercise"].make(), "reference:exercise", scenario, session.flight.dt
     )

@@ -106,7 +106,7 @@ def test_the_rest_of_a_scenario_is_its_rest(name: str):
     played before."""
     whole, row = scenario(name), EVERY["reference:exercise"]
     first = play_cell(Cell(name, 0, "reference:exercise", 1), row, whole).trajectory
-    k = whole.samples // 2
+    k = whole.intervals // 2
     rest = continued(whole, 1, first, k)
     second = play_cell(Cell(name, 0, "reference:exercise", 1), row, rest).trajectory
 

@@ -43,7 +43,7 @@ def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
     """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
     in it."""
     held = ladder.held("near_miss", 0).scenario
-    steps = held.samples
+    steps = held.intervals
     samples = ladder.times_of(
         "near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0
     )
@@ -58,7 +58,7 @@ def test_what_wrapping_in_python_took_is_given_separately():
     engines = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
     row = summed_up(table(ladder.times_of("near_miss", 0, engines, 3, 1.0)), ["key"]).iloc[0]
 
-    rate = scenario("near_miss").samples / scenario("near_miss").duration
+    rate = scenario("near_miss").intervals / scenario("near_miss").duration
     assert row.wrapping == pytest.approx(rate * EACH / 4)
     assert rate * EACH * 3 / 4 <= row.best <= rate * EACH * (3 / 4 + SLACK)
 

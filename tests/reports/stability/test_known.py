@@ -14,11 +14,11 @@ from adapters.engines import changed
 from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit
-from reports.stability.predicates import apex_drift
+from reports.stability.predicates import apexes
 from reports.stability.search import Search
 from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
 from reports.stability.variants import VARIANTS, Variant, play_as, played
-from scenarios.model import Trajectory
+from scenarios.model import Scenario, Trajectory
 
 PARTNERS = [
     f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")
@@ -118,6 +118,16 @@ def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
     assert_fails_at("spin", "box2d_v3:matched", pi / 4)
     assert_fails_at("spin", "box2d:shipped", pi / 2 / 0.98)
     assert_fails_at("spin", "box2d_v3:shipped", 4 * atan(pi / 16) / 0.98)
+
+
+def apex_drift(scenario: Scenario, played: Trajectory) -> float:
+    """Mean change of a bouncing ball's apex per bounce, from the first bounce to the last, over the
+    height of the drop.
+
+    nan if it does not bounce twice.
+    """
+    heights = apexes(scenario, played)[1:]
+    return float((heights[-1] - heights[0]) / (len(heights) - 1)) if len(heights) > 1 else np.nan
 
 
 def drift(engine: str | Variant, x: float, runs: int = 1) -> float:
