@@ -297,6 +297,7 @@ def light_marks(
         "y": shortened(height),
         "opacity": 0.35,
         "hoverinfo": "skip",
+        "showlegend": False,
         "marker": {"symbol": look.symbol, "size": 7, "color": look.light},
         "error_x": {
             "type": "data",
