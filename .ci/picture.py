@@ -42,7 +42,9 @@ def pooled_chart(browser: Browser, page: str) -> None:
     """The pooled chart of error against cost, as wide as a README, with its legend in it."""
     tab = browser.new_page(viewport={"width": 980, "height": 1400}, device_scale_factor=2)
     tab.goto(Path(page).resolve().as_uri())
-    tab.add_style_tag(content="#index,fieldset.legend,#pooled figcaption,.saves{display:none!important}")
+    tab.add_style_tag(
+        content="#index,fieldset.legend,#pooled figcaption,.saves{display:none!important}"
+    )
     tab.add_style_tag(content=".stage{grid-template-columns:1fr!important}")
     tab.locator("#pooled .chart .main-svg").first.wait_for()
     tab.evaluate(LEGEND)
