@@ -99,7 +99,7 @@ ADDED: dict[str, list[Added]] = {
             "reports/compare/metrics.py",
             "def toy_metric(view: View) -> Value | None:\n"
             '    """42, whatever was played."""\n    return Value(42.0)\n\n\n',
-            "TRUTH, ITSELF, ENGINE =",
+            "METRICS: dict",
         ),
         Added(
             "reports/compare/metrics.py",
