@@ -294,13 +294,18 @@ def reasons(
 ) -> list[Short]:
     """What most of the error of each is made of at the finest step, by the error budget."""
     tasks = {
-        one.task: partial(budget_of, scene, seed, one.name, finest)
+        one.task: partial(budget_of, scene, seed, played_as(one.name), finest)
         for one in short
-        if one.name in MECHANISMS and isfinite(one.error)
+        if played_as(one.name) in MECHANISMS and isfinite(one.error)
     }
     budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
     measure = "energy" if purpose == "energy" else "position_radii"
     return [Short(one, one.reason or largest(budgets.get(one.task), measure)) for one in short]
+
+
+def played_as(name: str) -> str:
+    """The engine whose numbers it gives to the bit, if it is not its own."""
+    return row_of(name).bits_of or name
 
 
 def largest(budget: Any, measure: str) -> str:
