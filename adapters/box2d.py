@@ -12,6 +12,7 @@ import numpy as np
 
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.friction import must_be_frictionless
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
@@ -139,6 +140,7 @@ class Box2DEngine:
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
+        must_be_frictionless(scene, "Box2D 2.3 as it is set up here")
         self.scene, self.dt, self.steps = scene, dt, 0
         chosen = self.chosen
         # s in one unit of the engine's time, units of its length in one m

@@ -16,6 +16,7 @@ import pyb2d3
 
 from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.friction import must_be_frictionless
 from adapters.matched import Searched
 from scenarios.model import Array, Scene, State
 
@@ -135,6 +136,7 @@ class Box2DV3:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world; the length unit is global to the process, so each profile sets its
         own."""
+        must_be_frictionless(scene, "Box2D 3.1 as it is set up here")
         must_fit(
             position=scene.position,
             velocity=scene.velocity,

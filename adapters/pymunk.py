@@ -11,6 +11,7 @@ import pymunk
 from pymunk import batch
 
 from adapters.engine import ContactImpulse
+from adapters.friction import must_be_frictionless
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
@@ -102,6 +103,7 @@ class Pymunk:
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new space; static disks and walls are shapes on its static body."""
+        must_be_frictionless(scene, "pymunk as it is set up here")
         self.scene, self.dt, self.steps = scene, dt, 0
         self.log: list[ContactImpulse] = []
         self.space = pymunk.Space()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import ContactImpulse
+from adapters.friction import must_be_frictionless
 from reference_impl import exercise
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, Disks, World, make_disks
 from scenarios.model import Array, Scene, State
@@ -40,9 +41,11 @@ class Reference:
         self, variant: ModuleType, *, precision: type = np.float64, **options: Any
     ) -> None:
         self.variant, self.precision, self.options = variant, precision, options
+        self.name = variant.__name__.split(".")[-1]
 
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
+        must_be_frictionless(scene, "this hand-written solver")
         self.dt, self.steps = dt, 0
         self.log: list[ContactImpulse] = []
         disks = make_disks(
@@ -102,9 +105,8 @@ class Reference:
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """The variant's method, and what it leaves free; the rest is the scene."""
-        name = self.variant.__name__.split(".")[-1]
-        method = {setting: (None, value) for setting, value in METHODS.get(name, {}).items()}
-        if name == "ordered":
+        method = {setting: (None, value) for setting, value in METHODS.get(self.name, {}).items()}
+        if self.name == "ordered":
             return method
         return method | {
             "projection split": (self.options.get("split"), SPLITS[self.world.split]),

@@ -10,6 +10,7 @@ import numpy as np
 
 from adapters.engine import ContactImpulse, Unsupported
 from adapters.event_driven.events import EventEngine
+from adapters.friction import must_be_frictionless
 from scenarios.model import Array, Scene, State
 from scenarios.no_truth import NoTruth
 
@@ -25,6 +26,7 @@ class EventDriven:
 
     def load(self, scene: Scene, dt: float) -> None:
         """Find every disk's first event; a start without a single continuation is refused."""
+        must_be_frictionless(scene, "event_driven")
         try:
             self.engine = EventEngine(scene)
             self.engine.advance(0.0)

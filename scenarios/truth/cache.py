@@ -55,6 +55,9 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
         scenario.duration,
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
     ]
+    if scene.friction:  # without it nothing asks how a disk turns
+        torques = [p.torque for p in scenario.thrusts]
+        parts += [scene.friction, scene.inertia, scene.angular_velocity, torques]
     hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
     for part in parts:
         hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())

@@ -110,6 +110,8 @@ def computed(
         raise NoTruth(
             f"{scene.n} disks are more than the {MOST_DISKS} that are computed in many digits"
         )
+    if scene.friction:
+        raise NoTruth("the oracle does not model friction")
     if fault := _out_of_scale(scenario):
         raise NoTruth(fault)
     if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
