@@ -23,7 +23,7 @@ LAYERS = {
     "adapters": [
         "matched safe_path",
         "engine",
-        "advance engine_row first_collisions float32 run runaway",
+        "advance engine_row first_collisions float32 friction run runaway",
         "play",
         "reference pymunk box2d box2d_v3 event_driven",
         "own_solver",
