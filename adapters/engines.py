@@ -27,6 +27,13 @@ def _lesson() -> Engine:
     return Reference(lesson)
 
 
+def _coulomb() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import coulomb
+
+    return Reference(coulomb)
+
+
 def _ordered() -> Engine:
     from adapters.reference import Reference
     from reference_impl import ordered
@@ -118,9 +125,16 @@ ENGINES: dict[str, EngineRow] = {
     "reference:lesson": _Reference(
         _lesson, "hand-written solver of the lesson: explicit Euler, walls that flip", 0.0, FLOAT64
     ),
+    "reference:coulomb": _Reference(
+        _coulomb,
+        "hand-written: the exercise with friction; every pair is asked in every step",
+        1.0,
+        FLOAT64,
+    ),
     "reference:ordered": _Reference(
         _ordered,
-        "hand-written: exact flight, collisions in the order in which they happen within a step",
+        "hand-written: exact flight, collisions in the order in which they happen within a step,"
+        " friction",
         0.5,
         FLOAT64,
     ),

@@ -17,6 +17,7 @@ from scenarios.model import Array, Scene, State
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
 METHODS = {  # of the variants by their module
     "exercise": {"integrator": "symplectic Euler"},
+    "coulomb": {"integrator": "symplectic Euler"},
     "verlet_list": {"integrator": "symplectic Euler"},
     "lesson": {"integrator": "explicit Euler"},
     "ordered": {
@@ -25,6 +26,7 @@ METHODS = {  # of the variants by their module
         "projection": "none",
     },
 }
+WITH_FRICTION = ("coulomb", "ordered")
 
 
 class Reference:
@@ -45,7 +47,8 @@ class Reference:
 
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
-        must_be_frictionless(scene, "this hand-written solver")
+        if self.name not in WITH_FRICTION:
+            must_be_frictionless(scene, f"reference:{self.name}")
         self.dt, self.steps = dt, 0
         self.log: list[ContactImpulse] = []
         disks = make_disks(
@@ -61,6 +64,7 @@ class Reference:
         low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if scene.wrap is None else scene.wrap
         self.world = World(
             restitution=float(scene.restitution),
+            friction=float(scene.friction),
             gravity=np.array(scene.gravity),
             walls=np.array(scene.walls),
             low=np.array(low),
