@@ -26,7 +26,7 @@ METHODS = {  # of the variants by their module
         "projection": "none",
     },
 }
-WITH_FRICTION = ("coulomb", "ordered")
+WITH_FRICTION = ("coulomb", "ordered", "ablated_reference")
 
 
 class Reference:
