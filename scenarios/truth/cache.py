@@ -21,7 +21,7 @@ from scenarios.model import Scenario, frozen
 from scenarios.regular import opened
 
 HERE = Path(__file__).parent
-ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
+ARRAYS = {"legs": 15, "events": 5, "outcomes": 4, "orders": 3}
 """The arrays of a record and how many columns each has."""
 NUMBERS = ("horizon", "error_bound", "bits", "method", "reason", "float64_horizon", "remains")
 
