@@ -6,7 +6,11 @@ from adapters.engine import Unsupported
 from scenarios.model import Scene
 
 
+class Frictionless(Unsupported):
+    """The engine knows no friction, which no engine need know."""
+
+
 def must_be_frictionless(scene: Scene, who: str) -> None:
-    """Raise `Unsupported` for a scene with friction, which the engine `who` does not model."""
+    """Raise `Frictionless` for a scene with friction, which the engine `who` does not model."""
     if scene.friction:
-        raise Unsupported(f"{who} does not model friction, the scene has {scene.friction:g}")
+        raise Frictionless(f"{who} does not model friction, the scene has {scene.friction:g}")

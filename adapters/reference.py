@@ -48,7 +48,7 @@ class Reference:
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
         if self.name not in WITH_FRICTION:
-            must_be_frictionless(scene, f"reference:{self.name}")
+            must_be_frictionless(scene, "this hand-written solver")
         self.dt, self.steps = dt, 0
         self.log: list[ContactImpulse] = []
         disks = make_disks(
