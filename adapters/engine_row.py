@@ -77,6 +77,8 @@ class EngineRow:
         variants: name, which goes behind a "+" -> what `crosscheck stability` plays besides to test
             a reason.
         searched: reads what `crosscheck tune` searches; None: nothing.
+        without_friction: the engine as which it plays a scene without friction, to the bit; "": it
+            is one of its own there.
         source: what distinguishes a solver's file that was saved from its earlier text; "" for an
             engine of this program.
     """
@@ -92,4 +94,5 @@ class EngineRow:
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)
     searched: Callable[[], Searched] | None = None
+    without_friction: str = ""
     source: str = ""

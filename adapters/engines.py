@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from adapters.engine import Engine
 from adapters.engine_row import FLOAT32, FLOAT64, EngineRow, Mark, Variant, Work
 from adapters.matched import Searched
+from scenarios.model import Scene
 
 
 def _exercise(**settings: Any) -> Engine:
@@ -130,6 +132,7 @@ ENGINES: dict[str, EngineRow] = {
         "hand-written: the exercise with friction; every pair is asked in every step",
         1.0,
         FLOAT64,
+        without_friction="reference:exercise",
     ),
     "reference:ordered": _Reference(
         _ordered,
@@ -239,6 +242,13 @@ def row_of(name: str) -> EngineRow:
     if name in ENGINES or not name.endswith(OWN):
         return ENGINES[name]
     return _read.get(name) or read_row(name)
+
+
+def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
+    """The engines of `rows` but those that would play this scene to the bit as another of them."""
+    return [
+        name for name, row in rows.items() if scene.friction or row.without_friction not in rows
+    ]
 
 
 def read_row(name: str) -> EngineRow:

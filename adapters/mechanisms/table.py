@@ -253,7 +253,6 @@ def _box2d_v3_shipped(reported: Mapping[str, Any], scene: Scene, _dt: float) -> 
 
 MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism]]] = {
     "reference:exercise": _exercise,
-    "reference:coulomb": _exercise,
     "reference:lesson": _lesson,
     "pymunk:shipped": _pymunk_shipped,
     "pymunk:matched": partial(_pymunk, profile="matched"),

@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, told_apart
 from adapters.mechanisms.table import FRICTION, Mechanism, mechanisms_of, with_mechanisms
 from adapters.play import play
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Scene
+from tests.reports.terminal.command_line import crosscheck
 
 FLOAT32 = 2.0**-24
 FLOOR = [[[-8.0, 0.0], [8.0, 0.0]]]
@@ -145,3 +146,20 @@ def test_a_scene_without_friction_is_played_as_before(name):
         assert plain.angular_velocity.tobytes() == stated.angular_velocity.tobytes()
         rough = play(ENGINES[name].make(friction=0.01), name, scene, scene.dt(2)).trajectory
         assert rough.position.tobytes() != plain.position.tobytes()
+
+
+def test_an_engine_that_is_another_without_friction_is_played_beside_it_only_with_friction():
+    """So that no scene is played twice to the bit; asked for by itself it is played."""
+    rows, rough = ENGINES, thrown(0.5, 0.2).scene
+    smooth = thrown(0.5, 0.0).scene
+    assert set(rows) - set(told_apart(rows, smooth)) == {"reference:coulomb"}
+    assert told_apart(rows, rough) == list(rows)
+    alone = {"reference:coulomb": rows["reference:coulomb"]}
+    assert told_apart(alone, smooth) == ["reference:coulomb"]
+
+
+def test_what_has_limits_of_its_own_is_driven_to_them():
+    """The cases have no friction, so `reference:coulomb` is refused with the engine it is there."""
+    refused = crosscheck("stability", "--engine", "reference:coulomb")
+    assert refused.exit_code == 2
+    assert "--engine reference:coulomb: plays as reference:exercise here" in refused.output

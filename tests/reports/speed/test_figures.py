@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, told_apart
 from adapters.mechanisms.table import MECHANISMS
 from reports.run.scenes import open_scene
 from reports.speed import budget, explained, figures, ladder, tables
@@ -31,7 +31,7 @@ def kept_row(path: object, scene: str, name: str) -> pd.Series:
     return table[(table.scenario == scene) & (table.name == name)].iloc[0]
 
 
-@pytest.mark.parametrize("name", list(ENGINES))
+@pytest.mark.parametrize("name", told_apart(ENGINES, open_scene("head_on_unequal_e09", 0).scene))
 def test_the_kept_orders_are_those_of_the_code(name: str):
     """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of
     every engine."""
@@ -72,7 +72,9 @@ def test_the_kept_tables_have_every_scene_and_engine():
     )
 
     assert set(zip(orders.scenario, orders.name)) == {
-        (scene, name) for scene in SCENARIOS for name in ENGINES
+        (scene, name)
+        for scene in SCENARIOS
+        for name in told_apart(ENGINES, open_scene(scene, 0).scene)
     }
     assert set(zip(budgets.scenario, budgets.name)) == {
         (scene, name) for scene in SCENARIOS for name in MECHANISMS
