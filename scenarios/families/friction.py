@@ -31,7 +31,7 @@ def friction_bounce(restitution: float, friction: float) -> Scenario:
     # At the edge friction just ends the slip of the rim: it takes 3 mu (1 + e) v_n of a solid disk.
     edge = 3 * mu * (1 + e) * fall
     along = np.array([0.0, 1.0, edge / 2, 5.0, 5.0, 6.0])
-    spin = np.array([24.0, 0.0, edge / 2 / radius, 0.0, -20.0, -48.0])
+    spin = np.array([24.0, 0.0, edge / 2 / radius, 0.0, -20.0, -(6 + 1.5 * edge) / radius])
     n = len(along)
     scene = lay_out(
         position=np.stack([1.5 * np.arange(n) - 5, np.full(n, radius + height)], axis=-1),
