@@ -3,6 +3,7 @@ meet."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -78,12 +79,7 @@ def spinning_disks_meet() -> Scenario:
     def truth(t: Array) -> Trajectory:
         motions, hits = [], list[Collision]()
         for i in range(0, scene.n, 2):
-            two = slice(i, i + 2)
-            given = (scene.position, scene.velocity, scene.angular_velocity)
-            bodies = (scene.radius, scene.mass, scene.inertia)
-            legs, impulse = spinning_pair(
-                *(each[two] for each in (*given, *bodies)), scene.restitution, scene.friction
-            )
+            legs, impulse = spinning_pair(scene, i)
             motions.append(legs.at(t))
             hits.append((float(legs.start[1]), i, i + 1, float(impulse[0])))
         place, rate = (np.concatenate(part, axis=1) for part in zip(*motions))
@@ -290,7 +286,7 @@ def turning_answer(
     )
 
 
-FRICTION = (
+FRICTION: tuple[Callable[..., Scenario], ...] = (
     *(partial(friction_bounce, e, mu) for mu in (0.1, 0.5) for e in (0.0, 0.5, 1.0)),
     spinning_disks_meet,
     spin_to_flight_and_back,

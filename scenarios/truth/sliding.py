@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.model import Array
+from scenarios.model import Array, Scene
 from scenarios.truth.closed_forms import Legs, pair
 
 
@@ -82,28 +82,22 @@ def between_plates(
     return Legs(begins, places, velocities, np.zeros((len(legs), 1)))
 
 
-def spinning_pair(
-    position: Array,
-    velocity: Array,
-    spin: Array,
-    radius: Array,
-    mass: Array,
-    inertia: Array,
-    restitution: float,
-    friction: float,
-) -> tuple[Legs, Array]:
-    """Two spinning disks that fly freely and collide once: their legs (2, 2, 3), and the impulse
-    (1,) N s along the normal, as of `closed_forms.pair`.
+def spinning_pair(scene: Scene, first: int) -> tuple[Legs, Array]:
+    """Disk `first` and the next one fly freely, spin and collide once: their legs (2, 2, 3), and
+    the impulse (1,) N s along the normal, as of `closed_forms.pair`.
 
     Friction acts along the tangent t = (-n_y, n_x), n from the first to the second, on the slip t .
     (v_2 - v_1) - r_1 w_1 - r_2 w_2, which J changes by J (1/m_1 + 1/m_2 + r_1^2/I_1 + r_2^2/I_2).
     """
-    legs, impulse = pair(position, velocity, radius, mass, restitution)
+    two = slice(first, first + 2)
+    position, velocity, spin = scene.position[two], scene.velocity[two], scene.angular_velocity[two]
+    radius, mass, inertia = scene.radius[two], scene.mass[two], scene.inertia[two]
+    legs, impulse = pair(position, velocity, radius, mass, scene.restitution)
     way = legs.position[1, 1] - legs.position[1, 0]
     tangent = np.array([-way[1], way[0]]) / np.hypot(*way)
     slip = (velocity[1] - velocity[0]) @ tangent - radius @ spin
     softness = (1 / mass + radius**2 / inertia).sum()
-    kick = rubbed(slip, softness, friction * impulse[0])
+    kick = rubbed(slip, softness, scene.friction * impulse[0])
     flown = legs.velocity[1] + np.array([[-1.0], [1.0]]) * kick / mass[:, None] * tangent
     spun = spin - radius / inertia * kick
     return Legs(
