@@ -40,8 +40,9 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     for field, tolerance in (
         ("position", 1e-12),
         ("velocity", 2e-12),
-        ("angle", 1e-14),
-        ("angular_velocity", 1e-14),
+        # Nothing changes a spin, but where there is friction.
+        ("angle", 1e-12 if run.scene.friction else 1e-14),
+        ("angular_velocity", 1e-12 if run.scene.friction else 1e-14),
     ):
         np.testing.assert_allclose(
             getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance
@@ -49,6 +50,7 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     reported, listed = found.collisions, exact.collisions
     # it lists only collisions 1e-4 s apart
     last = min(found.t[k - 1], 8.0 if name == "bouncing_ball_e09" else np.inf)
+    last += 1e-8  # what rounding holds 1e-17 m above an incline falls onto it in 1e-9 s
     h = int((listed.t <= last).sum())
     assert h == (reported.t <= last).sum()
     pairs = [
