@@ -1,5 +1,5 @@
-"""What a collision does in the event engine: Newton's restitution along the line of centres,
-and its note; friction is added in friction.py.
+"""What a collision does in the event engine: Newton's restitution along the line of centres, and
+its note; what friction adds is in friction.py.
 
 A collision is logged and counted, so that those without an end are noticed: between which float64
 resolves no time, or between which nothing flies.
