@@ -86,7 +86,7 @@ def simplified(scene: Scene) -> tuple[Scene, ...]:
     alone = {
         name: value[:1]
         for name, value in vars(bare).items()
-        if name not in ("walls", "gravity", "restitution", "wrap")
+        if name not in ("walls", "gravity", "restitution", "friction", "wrap")
     }
     return scene, bare, replace(bare, restitution=EXERCISE), replace(bare, **alone)
 
