@@ -80,6 +80,8 @@ def write_all(folder: Path) -> None:
         folder = place_of(folder, "--export")
         with made_anew(folder, ALL, "--export") as part:
             pages = {part / f"{name}.html": lesson for name, lesson in LESSONS.items()}
+            settings = sum(len(lesson.grid) for lesson in LESSONS.values())
+            say(f"{len(pages)} lessons with {settings} settings of their sliders: takes minutes")
             with writing(part, [*(path.name for path in pages), INDEX]):
                 rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[
                     CONVENTIONS

@@ -34,12 +34,15 @@ ROUNDING = 1e-11  # m: some thousand steps, each of which rounds a height of up 
 
 
 def bouncing(speed: float, gravity: float) -> Scenario:
-    """The lesson's particle between y = 1 and y = 11, thrown upwards."""
+    """The lesson's particle between y = 1 and y = 11, thrown upwards, for 20 m of its way: past
+    both walls."""
     base = ping_pong()
     scene = replace(
         base.scene, velocity=np.array([[0.0, speed]]), gravity=np.array([0.0, -gravity])
     )
-    return with_oracle(replace(base, scene=scene, duration=20.0, sample_interval=1 / 8, truth=None))
+    return with_oracle(
+        replace(base, scene=scene, duration=20.0 / speed, sample_interval=1 / 8, truth=None)
+    )
 
 
 def show_particle(settings: Settings) -> Shown:
@@ -64,7 +67,12 @@ def show_particle(settings: Settings) -> Shown:
             LessonChart("Height", "time in s", "y in m", height),
             LessonChart("Distance from the exact answer", "time in s", "m", played.errors()),
             LessonChart(
-                "Largest error in 20 s, against the step", "dt in ms", "m", errors, "xy", guides
+                f"Largest error in {number(scenario.duration)} s, against the step",
+                "dt in ms",
+                "m",
+                errors,
+                "xy",
+                guides,
             ),
         ],
         played.film,

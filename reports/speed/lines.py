@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping
+from math import isnan
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
@@ -287,9 +288,10 @@ def stranger(line: Mapping[str, Any], scenario: Scenario) -> str:
     for k, row in enumerate(rows):
         if row["scenario"] != scenario.name:
             return f"result[{k}].scenario = {row['scenario']!r}: must be {scenario.name!r}"
-        if "dt_s" in row:
-            substeps = row.get("substeps") or round(scenario.sample_interval / row["dt_s"])
-            if row["dt_s"] != scenario.dt(max(substeps, 1)):
+        if "dt_s" in row and row.get("kind") not in (EMPTY, CALL, READ):  # these have no step size
+            dt = row["dt_s"]
+            asked = 1 if isnan(dt) else round(scenario.sample_interval / dt)
+            if dt != scenario.dt(max(row.get("substeps") or asked, 1)):
                 return (
                     f"result[{k}].dt_s = {row['dt_s']!r}: must divide the scene's sample interval"
                     " as the task does"

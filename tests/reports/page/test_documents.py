@@ -20,6 +20,7 @@ PARTS = {
     BASE,
     MACROS,
     "lessons/conventions.html.j2",
+    "page/error_cost.html.j2",
     "page/own_solvers.html.j2",
     "speed/budget.html.j2",
 }

@@ -166,7 +166,7 @@ def test_of_a_scene_file_that_is_gone_the_copy_is_played(home: Path):
     cell, *_ = [
         line["cell"]
         for line in lines
-        if line.get("scenario") == "two-disks" and line["status"] == "ok"
+        if line.get("scenario") == "two-disks" and line.get("status") == "ok"
     ]
     (home / "out" / "trajectories" / f"{cell}.npz").unlink()
     done = crosscheck(*RESUME, cwd=home)
