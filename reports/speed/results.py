@@ -18,6 +18,7 @@ from reports.compare.pareto import (
     yardstick_of,
 )
 from reports.compare.pooling import POOLED, pooled
+from reports.run.scenes import open_scene
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
@@ -73,9 +74,16 @@ class Results:
         return tables.reached(self.points, self.orders)
 
     @cached_property
+    def poolable(self) -> set[str]:
+        """The scenes that are pooled: those without friction, or all if none is."""
+        opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
+        smooth = {one.name for one in opened if not one.scene.friction}
+        return smooth or {one.name for one in opened}
+
+    @cached_property
     def pooled(self) -> pd.DataFrame:
-        """See `pooling.pooled`."""
-        return pooled(self.points)
+        """See `pooling.pooled`; of the `poolable` scenes."""
+        return pooled(self.points[self.points.scenario.isin(self.poolable)])
 
     @cached_property
     def sweeps(self) -> pd.DataFrame:
@@ -99,7 +107,8 @@ class Results:
         """
         rows = []
         own = yardstick_of(self.reached)
-        for (engine, profile, accuracy), group in self.reached.groupby(
+        reached = self.reached[self.reached.scenario.isin(self.poolable)]
+        for (engine, profile, accuracy), group in reached.groupby(
             ["engine", "profile", "accuracy"], sort=False
         ):
             counts = {
