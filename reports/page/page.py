@@ -153,7 +153,9 @@ def summaries(
         names = overview.names_of(comparisons)
         rows = overview.summary(comparisons, names, untrusted)
         groups = situations.grouped(names, pooled.scores(comparisons))
-        found += [Summary(title, len(comparisons), rows, groups)] if comparisons else []
+        found += (
+            [Summary(title, len(comparisons), rows, groups)] if comparisons or not title else []
+        )
     return found
 
 

@@ -73,17 +73,16 @@ class Results:
         """See `tables.reached`."""
         return tables.reached(self.points, self.orders)
 
-    @cached_property
-    def poolable(self) -> set[str]:
-        """The scenes that are pooled: those without friction, or all if none is."""
+    def poolable(self, table: pd.DataFrame) -> pd.DataFrame:
+        """The rows of scenes without friction, of which is all that is pooled; all if none is."""
         opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
-        smooth = {one.name for one in opened if not one.scene.friction}
-        return smooth or {one.name for one in opened}
+        rough = table.scenario.isin([one.name for one in opened if one.scene.friction])
+        return table if rough.all() else table[~rough]
 
     @cached_property
     def pooled(self) -> pd.DataFrame:
-        """See `pooling.pooled`; of the `poolable` scenes."""
-        return pooled(self.points[self.points.scenario.isin(self.poolable)])
+        """See `pooling.pooled`; of the `poolable` rows."""
+        return pooled(self.poolable(self.points))
 
     @cached_property
     def sweeps(self) -> pd.DataFrame:
@@ -107,8 +106,7 @@ class Results:
         """
         rows = []
         own = yardstick_of(self.reached)
-        reached = self.reached[self.reached.scenario.isin(self.poolable)]
-        for (engine, profile, accuracy), group in reached.groupby(
+        for (engine, profile, accuracy), group in self.poolable(self.reached).groupby(
             ["engine", "profile", "accuracy"], sort=False
         ):
             counts = {
