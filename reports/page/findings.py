@@ -26,7 +26,9 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     scores = pooled.scores(rough)
     scores = scores[scores.middle & ~scores.name.isin(untrusted)]
     groups = grouped(dict.fromkeys(scores.name), scores)
-    said = closest(ranked(position_errors(scores, rough), groups))
+    off = ranked(position_errors(scores, rough), groups)
+    played = [name for name in off.columns if np.isfinite(off[name]).any()]
+    said = closest(off[played or list(off.columns)])  # who refuses friction is not called the last
     return [*sentences, f"With friction, in scenes that nothing above counts: {said}"]
 
 
