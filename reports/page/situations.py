@@ -31,7 +31,7 @@ SITUATIONS = {
     STACKS: "weight and e = 0: contacts that last",
     CROWDS: "disks that meet many others",
     SPIN: "a disk turns; these scenes count above as well",
-    ALL: "of all situations",
+    ALL: "of all situations above",
     FRICTION: "surfaces rub; these scenes count in no other row",
 }
 YOURS, ENGINE = "Your solver", "Engines"
