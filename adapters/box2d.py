@@ -98,13 +98,15 @@ SEARCHED = Searched(
             " alone"
         ),
         "contact.restitution in PreSolve": "Python code in place of the engine's own collision law",
-        "friction, linearDamping, sleeping": "0, 0 and off: as the scene states",
+        "friction": "as the scene states: that of a pair is the root of the product",
+        "linearDamping, sleeping": "0 and off: as the scene states",
     },
 )
 
 
 class Box2DEngine:
-    """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
+    """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default;
+    so is the friction of a scene that has none.
 
     `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of
     time as inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The
@@ -112,12 +114,12 @@ class Box2DEngine:
     continuous collision; or twice what the fastest disk moves in a step where that is more, because
     nothing moves by more than 2 units a step; a scene that comes there all the same is refused.
     Continuous collision, between disks, too, puts collisions at their own time within a step;
-    without gravity at e = 1 there is none, because it creates energy in a gas. No friction, sleep
-    or wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
+    without gravity at e = 1 there is none, because it creates energy in a gas. No sleep or
+    wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
-    profile's), `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of
-    `MATCHED`.
+    profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
+    are keys of `MATCHED`.
     """
 
     listening, wrapping = True, 0.0
@@ -135,11 +137,12 @@ class Box2DEngine:
         self.chosen = (MATCHED if self.matched else SHIPPED) | settings
         self.turning = turning
         self.sleeping = not self.matched if sleeping is None else sleeping
-        self.friction = 0.0 if self.matched and friction is None else friction
+        self.asked_friction = friction
 
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
         self.scene, self.dt, self.steps = scene, dt, 0
+        self.friction = self._friction()
         chosen = self.chosen
         # s in one unit of the engine's time, units of its length in one m
         self.time, self.length = 1.0, 1.0
@@ -179,6 +182,14 @@ class Box2DEngine:
         ]
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.walls = [self._wall(w) for w in range(len(scene.walls))]
+
+    def _friction(self) -> float | None:
+        """Of every shape, whose root of the product is that of a pair; None: the engine's own
+        default, as somebody leaves it who wants no friction and does not think of it."""
+        if self.asked_friction is not None:
+            return self.asked_friction
+        stated = self.matched or self.scene.friction > 0
+        return float(self.scene.friction) if stated else None
 
     def _surface(self) -> dict[str, float]:
         friction = {} if self.friction is None else {"friction": self.friction}

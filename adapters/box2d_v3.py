@@ -79,7 +79,8 @@ SEARCHED = Searched(
         "linear slop, speculative margin": "compiled in; moved by the length unit alone",
         "joint tuning": "no joints here",
         "walls of chains or boxes": "a chain is one-sided, a segment of the scene is not",
-        "friction, damping, sleeping": "0, 0 and off: as the scene states",
+        "friction": "as the scene states: that of a pair is the root of the product",
+        "damping, sleeping": "0 and off: as the scene states",
         "thread_pool": "changes the time alone",
     },
 )
@@ -100,9 +101,10 @@ def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
 
 
 class Box2DV3:
-    """`shipped`: restitution, mass and inertia are set, all else is the engine's default.
+    """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default;
+    so is the friction of a scene that has none.
 
-    `matched`: no friction, sleep, continuous collision, restitution threshold or speed cap. The
+    `matched`: no sleep, continuous collision, restitution threshold or speed cap. The
     length unit is half of the smallest radius: slop and speculative margin are shares of it, and a
     larger margin foresees more collisions, but this is the largest without a spurious collision
     where two disks pass at 1 % of a radius. Contacts are as stiff as the engine lets them be, an
@@ -110,8 +112,8 @@ class Box2DV3:
     spins cannot be lifted: a scene that reaches it is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
-    profile's), `turning` (False: no inertia, so no spin), `friction`; `settings` are keys of
-    `MATCHED`.
+    profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
+    are keys of `MATCHED`.
     """
 
     listening, wrapping = True, 0.0
@@ -127,7 +129,7 @@ class Box2DV3:
     ) -> None:
         self.matched = profile == "matched"
         self.chosen = (MATCHED if self.matched else SHIPPED) | settings
-        self.friction = 0.0 if self.matched and friction is None else friction
+        self.asked_friction = friction
         self.substeps, self.turning = self.chosen["substeps"], turning
         self.sleeping = not self.matched if sleeping is None else sleeping
 
@@ -147,6 +149,7 @@ class Box2DV3:
             gravity=scene.gravity,
         )
         self.scene, self.dt, self.steps = scene, dt, 0
+        self.friction = self._friction()
         self.log: list[ContactImpulse] = []
         self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
@@ -180,6 +183,14 @@ class Box2DV3:
             name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen
         }
         return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
+
+    def _friction(self) -> float | None:
+        """Of every shape, whose root of the product is that of a pair; None: the engine's own
+        default, as somebody leaves it who wants no friction and does not think of it."""
+        if self.asked_friction is not None:
+            return self.asked_friction
+        stated = self.matched or self.scene.friction > 0
+        return float(self.scene.friction) if stated else None
 
     def _shape(self) -> Any:
         friction = {} if self.friction is None else {"friction": self.friction}

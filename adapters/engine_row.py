@@ -77,8 +77,11 @@ class EngineRow:
         variants: name, which goes behind a "+" -> what `crosscheck stability` plays besides to test
             a reason.
         searched: reads what `crosscheck tune` searches; None: nothing.
-        bits_of: the row whose numbers it gives to the last bit, at another cost; where only the
-            numbers count, it does not play beside that one unless asked for. "": of none.
+        bits_of: the engine whose numbers it gives to the last bit, at another cost, in every scene
+            without friction; where only the numbers count, it does not play beside that one unless
+            asked for. "": of none.
+        adds_friction: it plays scenes with friction, which that engine refuses; without friction it
+            is never played beside that one.
         source: what distinguishes a solver's file that was saved from its earlier text; "" for an
             engine of this program.
     """
@@ -95,4 +98,5 @@ class EngineRow:
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)
     searched: Callable[[], Searched] | None = None
     bits_of: str = ""
+    adds_friction: bool = False
     source: str = ""

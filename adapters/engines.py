@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from adapters.engine import Engine
 from adapters.engine_row import FLOAT32, FLOAT64, EngineRow, Mark, Variant, Work
 from adapters.matched import Searched
+from scenarios.model import Scene
 
 
 def _exercise(**settings: Any) -> Engine:
@@ -32,6 +34,13 @@ def _lesson() -> Engine:
     from reference_impl import lesson
 
     return Reference(lesson)
+
+
+def _coulomb() -> Engine:
+    from adapters.reference import Reference
+    from reference_impl import coulomb
+
+    return Reference(coulomb)
 
 
 def _ordered() -> Engine:
@@ -135,9 +144,17 @@ ENGINES: dict[str, EngineRow] = {
         0.0,
         FLOAT64,
     ),
+    "reference:coulomb": _Reference(
+        _coulomb,
+        "hand-written: the exercise with friction; 79 lines, asks every pair",
+        1.0,
+        FLOAT64,
+        bits_of="reference:exercise",
+        adds_friction=True,
+    ),
     "reference:ordered": _Reference(
         _ordered,
-        "hand-written: exact flight, collisions in order; 459 lines, no projection",
+        "hand-written: exact flight, collisions in order, friction; 535 lines, no projection",
         0.5,
         FLOAT64,
     ),
@@ -226,8 +243,10 @@ ENGINES: dict[str, EngineRow] = {
     ),
 }
 
-# whose numbers differ from each other's
+# whose numbers differ from each other's in scenes without friction
 DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
+# who plays where no engine is asked for: those, and who differs from them where there is friction
+UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row.adds_friction}
 
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
@@ -245,6 +264,16 @@ def row_of(name: str) -> EngineRow:
     if name in ENGINES or not name.endswith(OWN):
         return ENGINES[name]
     return _read.get(name) or read_row(name)
+
+
+def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
+    """The engines of `rows` but, in a scene without friction, those that only add friction to
+    another of them."""
+    return [
+        name
+        for name, row in rows.items()
+        if scene.friction or not row.adds_friction or row.bits_of not in rows
+    ]
 
 
 def read_row(name: str) -> EngineRow:

@@ -21,6 +21,7 @@ FIELDS = (
     | batch.BodyFields.ANGULAR_VELOCITY
 )
 
+OF_SHAPES = ("elasticity", "friction")  # the engine multiplies those of a pair
 DEFAULT_BIAS = (1 - 0.1) ** 60
 MATCHED: dict[str, Any] = {
     "iterations": 10,
@@ -59,16 +60,17 @@ SEARCHED = Searched(
         "shape radius of a wall": GEOMETRY,
         "position_func, velocity_func": "Python code in place of the engine's own integrator",
         "pre_solve callbacks": "Python code in place of the engine's own collision law",
-        "damping, friction, sleep_time_threshold": "1, 0 and none by default: as the scene states",
+        "friction": "its root on every shape: the engine multiplies two",
+        "damping, sleep_time_threshold": "1 and none by default: as the scene states",
         "use_spatial_hash, threads": "change the time alone: see the features of crosscheck speed",
     },
 )
 
 
 class Pymunk:
-    """`shipped`: restitution goes into every shape's elasticity, all else is pymunk's default.
+    """`shipped`: restitution and friction go into every shape, all else is pymunk's default.
 
-    `matched`: elasticity sqrt(e), because pymunk multiplies the two of a pair; and `MATCHED`, by
+    `matched`: the roots of both, because pymunk multiplies the two of a pair; and `MATCHED`, by
     `crosscheck tune`: ten iterations, because more cost time and are no nearer; hardly any slop,
     because the default 0.1 is a length in the scene's units; contacts are forgotten as soon as they
     part, because one that touches again within three steps inherits an impulse that it is not given
@@ -108,7 +110,7 @@ class Pymunk:
         self.space.gravity = tuple(scene.gravity)
         self.asked = self._asked()
         for name, value in self.asked.items():
-            if name != "elasticity":
+            if name not in OF_SHAPES:
                 setattr(self.space, name, value)
         if self.spatial_hash is not None:
             self.space.use_spatial_hash(*self.spatial_hash)
@@ -131,10 +133,12 @@ class Pymunk:
     def _asked(self) -> dict[str, Any]:
         scene = self.scene
         if not self.matched:
-            return {"elasticity": float(scene.restitution)} | self.changed
+            of_shapes = {"elasticity": float(scene.restitution), "friction": float(scene.friction)}
+            return of_shapes | self.changed
         chosen = self.chosen
         asked: dict[str, Any] = {
             "elasticity": float(np.sqrt(scene.restitution)),
+            "friction": float(np.sqrt(scene.friction)),
             "iterations": chosen["iterations"],
             "collision_slop": float(chosen["slop"] * scene.radius.min()),
             "collision_bias": chosen["elastic_bias" if scene.restitution == 1 else "bias"],
@@ -157,7 +161,8 @@ class Pymunk:
         self._add_shape(shape, i)
 
     def _add_shape(self, shape: pymunk.Shape, index: int) -> None:
-        shape.elasticity = self.asked["elasticity"]
+        for name in OF_SHAPES:
+            setattr(shape, name, self.asked[name])
         self.space.add(shape)
         self.index[shape] = index
 
@@ -218,6 +223,7 @@ class Pymunk:
             "elasticity": shape.elasticity,
             "restitution of a pair": shape.elasticity**2,
             "friction": shape.friction,
+            "friction of a pair": shape.friction**2,
             **{
                 name: getattr(self.space, name)
                 for name in (

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import ContactImpulse
+from adapters.friction import must_be_frictionless
 from adapters.library_versions import version
 from reference_impl.blocks import ADVANCE, disks_block, disks_of, world_block, world_of
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
@@ -18,6 +19,7 @@ SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-si
 METHODS = {  # of the variants by their module
     "exercise": {"integrator": "symplectic Euler"},
     "neighbours": {"integrator": "symplectic Euler"},
+    "coulomb": {"integrator": "symplectic Euler"},
     "lesson": {"integrator": "explicit Euler"},
     "ordered": {
         "integrator": "parabolas",
@@ -25,6 +27,7 @@ METHODS = {  # of the variants by their module
         "projection": "none",
     },
 }
+WITH_FRICTION = ("coulomb", "ordered", "ablated_reference")
 
 
 class Reference:
@@ -41,9 +44,12 @@ class Reference:
         self, variant: ModuleType, *, precision: type = np.float64, **options: Any
     ) -> None:
         self.variant, self.precision, self.options = variant, precision, options
+        self.name = variant.__name__.split(".")[-1]
 
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
+        if self.name not in WITH_FRICTION:
+            must_be_frictionless(scene, "this hand-written solver")
         self.dt, self.steps = dt, 0
         self.log: list[ContactImpulse] = []
         disks = make_disks(
@@ -58,6 +64,7 @@ class Reference:
         low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if scene.wrap is None else scene.wrap
         world = World(
             restitution=float(scene.restitution),
+            friction=float(scene.friction),
             gravity=np.array(scene.gravity),
             walls=np.array(scene.walls),
             low=np.array(low),
@@ -110,9 +117,8 @@ class Reference:
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """The variant's method, and what it leaves free; the rest is the scene."""
-        name = self.variant.__name__.split(".")[-1]
-        method = {setting: (None, value) for setting, value in METHODS.get(name, {}).items()}
-        if name == "ordered":
+        method = {setting: (None, value) for setting, value in METHODS.get(self.name, {}).items()}
+        if self.name == "ordered":
             return method
         return method | {
             "projection split": (self.options.get("split"), SPLITS[self.world.split]),

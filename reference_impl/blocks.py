@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reference_impl import exercise, lesson, neighbours, ordered
+from reference_impl import coulomb, exercise, lesson, neighbours, ordered
 from reference_impl.compiled import compiled, pasted
 from reference_impl.state import Disks, World
 
@@ -21,8 +21,8 @@ def disks_block(disks: Disks) -> np.ndarray:
 
 
 def world_block(world: World) -> np.ndarray:
-    """(9 + 4w,): a copy of all fields, the walls last; `world_of` gives views of it."""
-    free = [world.restitution, world.split, world.approaching_only]
+    """(10 + 4w,): a copy of all fields, the walls last; `world_of` gives views of it."""
+    free = [world.restitution, world.friction, world.split, world.approaching_only]
     return np.concatenate([free, world.gravity, world.low, world.high, world.walls.reshape(-1)])
 
 
@@ -49,12 +49,13 @@ def world_of(block) -> World:  # type: ignore[no-untyped-def]
     """The world that a block holds."""
     return World(
         restitution=block[0],
-        gravity=block[3:5],
-        walls=block[9:].reshape(((len(block) - 9) // 4, 2, 2)),
-        low=block[5:7],
-        high=block[7:9],
-        split=int(block[1]),
-        approaching_only=block[2] != 0.0,
+        friction=block[1],
+        gravity=block[4:6],
+        walls=block[10:].reshape(((len(block) - 10) // 4, 2, 2)),
+        low=block[6:8],
+        high=block[8:10],
+        split=int(block[2]),
+        approaching_only=block[3] != 0.0,
     )
 
 
@@ -68,6 +69,12 @@ def exercise_advance(disks, world, dt: float, count: int) -> list:  # type: igno
 def neighbours_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
     """`neighbours.advance` of two blocks."""
     return neighbours.advance(disks_of(disks), world_of(world), dt, count)
+
+
+@compiled
+def coulomb_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+    """`coulomb.advance` of two blocks."""
+    return coulomb.advance(disks_of(disks), world_of(world), dt, count)
 
 
 @compiled
@@ -85,6 +92,7 @@ def ordered_advance(disks, world, dt: float, count: int) -> list:  # type: ignor
 ADVANCE: dict[str, Callable[..., list]] = {  # by the variant's module
     exercise.__name__: exercise_advance,
     neighbours.__name__: neighbours_advance,
+    coulomb.__name__: coulomb_advance,
     lesson.__name__: lesson_advance,
     ordered.__name__: ordered_advance,
 }

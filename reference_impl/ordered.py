@@ -9,7 +9,7 @@ s = 0 is the end, s = -dt the start.
 Every search asks the pairs of a neighbour list. Where collisions accumulate (a ball that bounces
 ever lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is
 the last one, and after `MOST` collisions a disk the rest of a step goes unresolved, which shows as
-overlap. Compiled by numba, as `exercise` is.
+overlap. It knows friction. Compiled by numba, as `exercise` is.
 """
 
 from math import inf, sqrt
@@ -64,7 +64,8 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
             break
         resolve(disks, world, acceleration, near, dt, k, first, count, collisions)
         k += 1
-    turn(disks, acceleration, dt, count)
+    if world.friction == 0.0:
+        turn(disks, acceleration, dt, count)
     return collisions
 
 
@@ -102,6 +103,8 @@ def fly_until_meeting(  # type: ignore[no-untyped-def]
     first = inf, NOBODY, NOBODY
     while k < count:
         fly(disks, acceleration, dt)
+        if world.friction > 0.0:
+            turn(disks, acceleration, dt, 1)
         take_step(near, acceleration.strongest * dt * dt)
         if used_up(near):
             break
@@ -137,7 +140,8 @@ def fly(disks: Disks, acceleration: Accelerations, dt: float) -> None:
 
 @kernel
 def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> None:
-    """The angles and spins of all steps, at last, as no collision asks for them."""
+    """The angles and spins of `count` steps: of all at last, as no collision asks for them without
+    friction."""
     angle, spin, turning = disks.angle, disks.angular_velocity, acceleration.turning
     for run in range(len(acceleration.moving)):
         begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
@@ -434,6 +438,8 @@ def collide(disks: Disks, world: World, acceleration, i: int, j: int, s: float, 
     fly_anew(disks, acceleration, i, wi * nx, wi * ny, J, hold, s)
     if j >= 0:
         fly_anew(disks, acceleration, j, -wj * nx, -wj * ny, J, hold, s)
+    if world.friction > 0.0:
+        rub(disks, acceleration, i, j, path, nx, ny, world.friction * J, world.friction * hold, s)
     return J - hold * s
 
 
@@ -447,6 +453,76 @@ def fly_anew(  # type: ignore[no-untyped-def]
         move(disks.position, disks.remainder, i, axis, (hold * (s * s / 2) - J * s) * w)
         disks.velocity[i, axis] += (J - hold * s) * w
         acceleration[i, axis] += hold * w
+
+
+@compiled
+def rub(  # type: ignore[no-untyped-def]
+    disks: Disks,
+    acceleration,
+    i: int,
+    j: int,
+    path,
+    nx: float,
+    ny: float,
+    most: float,
+    most_held: float,
+    s: float,
+) -> None:
+    """Coulomb's friction from s on: at most the impulse `most` at once, then at most the force
+    `most_held`, which brakes until the surfaces do not slide and from then on keeps them so.
+
+    The slip is that of i against j where they touch, along t = (-ny, nx). It is exact for one
+    contact that lasts; of two of the same disk the second does not know that the first turns it.
+    """
+    spin, torque, inertia, radius = (
+        disks.angular_velocity,
+        disks.torque,
+        disks.inertia,
+        disks.radius,
+    )
+    slip = (path[3] + path[5] * s) * nx - (path[2] + path[4] * s) * ny
+    growth = path[5] * nx - path[4] * ny  # of the slip in m/s2, as long as nothing brakes
+    weight = 0.0
+    for k in (i, j):
+        if k >= 0:
+            turning = torque[k] / inertia[k]
+            slip -= radius[k] * (spin[k] + turning * s)
+            growth -= radius[k] * turning
+            weight += 1.0 / disks.mass[k] + radius[k] * radius[k] / inertia[k]
+    J = min(max(-slip / weight, -most), most)
+
+    # the force brakes until `stopped`, and holds from then on
+    slip += J * weight
+    brake = -most_held if slip > 0.0 else most_held
+    slowing = growth + brake * weight
+    stopped = s if slip == 0.0 else min(s - slip / slowing, 0.0) if slip * slowing < 0.0 else 0.0
+    hold = min(max(-growth / weight, -most_held), most_held) if stopped < 0.0 else brake
+    impulse = J + brake * (stopped - s) - hold * stopped
+    way = -J * s + (brake * (s * s - stopped * stopped) + hold * stopped * stopped) / 2
+    drag(disks, acceleration, i, -ny, nx, impulse, way, hold)
+    if j >= 0:
+        drag(disks, acceleration, j, ny, -nx, impulse, way, hold)
+
+
+@compiled
+def drag(  # type: ignore[no-untyped-def]
+    disks: Disks,
+    acceleration,
+    i: int,
+    tx: float,
+    ty: float,
+    impulse: float,
+    way: float,
+    hold: float,
+) -> None:
+    """By the end of the step disk i has got `impulse` N s along t where it is touched, moved by
+    `way` kg m over its mass, and is under the force `hold`."""
+    for axis, t in enumerate((tx, ty)):
+        move(disks.position, disks.remainder, i, axis, way * t / disks.mass[i])
+        disks.velocity[i, axis] += impulse * t / disks.mass[i]
+        acceleration[i, axis] += hold * t / disks.mass[i]
+    disks.angular_velocity[i] -= impulse * disks.radius[i] / disks.inertia[i]
+    disks.angle[i] -= way * disks.radius[i] / disks.inertia[i]
 
 
 @compiled

@@ -41,6 +41,7 @@ class World(NamedTuple):
     split: int = BY_INVERSE_MASS
     # False: an impulse on separating pairs too, as the formula is printed
     approaching_only: bool = True
+    friction: float = 0.0  # Coulomb's coefficient; only `coulomb` and `ordered` know it
 
 
 def make_disks(  # type: ignore[no-untyped-def]

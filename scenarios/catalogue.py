@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from scenarios.families.crowds import CROWDS
 from scenarios.families.exercise import EXERCISE
+from scenarios.families.friction import FRICTION
 from scenarios.families.lesson import LESSON
 from scenarios.families.pairs import PAIRS
 from scenarios.families.rows import ROWS
@@ -22,12 +23,13 @@ FAMILIES: dict[str, dict[str, Build]] = {
         ("Walls, floors and fixed disks", WALLS),
         ("Disks in a row", ROWS),
         ("Thrusts and spin", THRUSTS),
+        ("Friction", FRICTION),
         ("The exercise", EXERCISE),
         ("Crowds", CROWDS),
     )
 }
 SCENARIOS = {name: build for family in FAMILIES.values() for name, build in family.items()}
-RANDOM = {"falling_box", "asteroids", "gas_of_100"}
+RANDOM = {"falling_box", "asteroids", "gas_of_100", "frictional_box"}
 """Scenarios that are random (seed n); the others are the same for every seed."""
 
 

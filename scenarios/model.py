@@ -36,6 +36,7 @@ class Scene:
     radius: Array  # (n,) m, positive
     mass: Array  # (n,) kg, positive; `inf` makes the disk static (it must be at rest)
     restitution: float  # normal speed after a collision over that before it, 0 to 1, one for all
+    friction: float = 0.0  # Coulomb's coefficient, 0 or more, one for all disks and walls
     angle: Array = DEFAULT  # (n,) rad, default 0
     angular_velocity: Array = DEFAULT  # (n,) rad/s, default 0
     inertia: Array = DEFAULT  # (n,) kg m2, default m r2 / 2 of a solid disk
@@ -48,7 +49,8 @@ class Scene:
     def __post_init__(self) -> None:
         given = {name: value for name, value in vars(self).items() if value is not None}
         for name, value in (self._defaults() | given).items():
-            object.__setattr__(self, name, value if name == "restitution" else frozen(value))
+            one = name in ("restitution", "friction")
+            object.__setattr__(self, name, value if one else frozen(value))
         check_scene(self)
 
     def _defaults(self) -> dict[str, Array]:

@@ -19,11 +19,11 @@ MAY_IMPORT = {
 # its layer "".
 LAYERS = {
     "scenarios": ["regular faults", "model", "no_truth", "truth", "families", "files", "catalogue"],
-    "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines", "record", "exact"],
+    "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines sliding", "record", "exact"],
     "adapters": [
         "matched safe_path",
         "engine",
-        "advance engine_row first_collisions float32 library_versions run runaway",
+        "advance engine_row first_collisions float32 friction library_versions run runaway",
         "play",
         "reference pymunk box2d box2d_v3 event_driven",
         "own_solver",

@@ -37,6 +37,16 @@ NO_FRICTION_IN_BOUNCE = (
     "every shape has friction 0.6, bounded by the normal impulse before restitution is added: 0.6 /"
     " (1 + e)"
 )
+CONE_WITHOUT_E = (
+    "friction is bounded by the normal impulse before restitution is added: mu / (1 + e)"
+)
+PRODUCT_OF_FRICTION = (
+    "the frictions of the two shapes are multiplied, so mu on every shape gives mu2"
+)
+CARRIED_OFF = (
+    "a gap is measured between the points that touched, which turn with the disk: it seems wider by"
+    " r (1 - cos), so that a disk which turns is pressed less"
+)
 NORMALISED_EULER = (
     "(cos, sin) += w h (-sin, cos) and then normalised turns by atan(w h) a substep h = dt / 4"
 )
@@ -143,6 +153,40 @@ DEPARTURES = [
         NO_FRICTION_IN_BOUNCE,
         BOX2D_TYPES
         + "b2DefaultSurfaceMaterial, friction = 0.6f; src/contact_solver.c: b2ApplyRestitutionTask",
+    ),
+    # A ratio of two momenta that round as often as a collision does; or, at rest, some speeds of 4
+    # m/s.
+    *(
+        Departure(
+            "pymunk:shipped",
+            probe,
+            0.04,
+            512 * FLOAT64,
+            PRODUCT_OF_FRICTION,
+            "Munk2D src/cpArbiter.c, cpArbiterUpdate: arb->u = a->u * b->u",
+        )
+        for probe in ("friction_0", "friction_0.5", "friction_1", "friction_at_rest")
+    ),
+    *(
+        Departure(
+            engine,
+            f"friction_{e:g}",
+            0.2 / (1 + e),
+            8 * FLOAT32,
+            CONE_WITHOUT_E,
+            "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask",
+        )
+        for engine in ("box2d_v3:shipped", "box2d_v3:matched")
+        for e in (0.5, 1.0)
+    ),
+    # Which of 256 substeps press the disk hangs on digits of float32.
+    Departure(
+        "box2d_v3:matched",
+        "friction_at_rest",
+        0.19903,
+        1e-5,
+        CARRIED_OFF,
+        "Box2D 3.1 src/contact_solver.c: b2SolveContactTwoPointsTask, moving anchors",
     ),
     # 1024 substeps, each of which rounds cos and sin.
     *(

@@ -3,7 +3,9 @@ the scene states."""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial, wraps
 
 import numpy as np
 
@@ -18,8 +20,10 @@ from adapters.conformance.probe import (
     scene_of,
 )
 from adapters.engine_row import EngineRow
+from adapters.friction import Frictionless
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
+FRICTION = 0.2  # that the scenes of the probes of friction state
 ROUNDINGS = (
     # a relative velocity, an effective mass, a target, an impulse, two updates: a collision rounds
     # no more often
@@ -136,6 +140,55 @@ def friction(row: EngineRow) -> ProbeReading:
     return ProbeReading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
 
 
+def where_modelled(read: Callable[..., ProbeReading]) -> Callable[..., ProbeReading]:
+    """A probe of friction, which a solver need not know, if it says so."""
+
+    @wraps(read)
+    def asked(row: EngineRow, **parameters: float) -> ProbeReading:
+        try:
+            return read(row, **parameters)
+        except Frictionless as refusal:
+            return ProbeReading("not modelled", "not modelled", note=str(refusal))
+
+    return asked
+
+
+@where_modelled
+def friction_in_bounce(row: EngineRow, restitution: float) -> ProbeReading:
+    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin so
+    fast that they slide all through it."""
+    scene = replace(head_on(2.0, spin=40.0), restitution=restitution, friction=FRICTION)
+    with loaded(row, scene) as engine:
+        before = engine.read().velocity[1]
+        engine.step(24)
+        taken = engine.read().velocity[1] - before
+    ratio = float(abs(taken[1] / taken[0])) if taken[0] else np.nan
+    return ProbeReading(ratio, FRICTION, ROUNDINGS * row.rounding)
+
+
+@where_modelled
+def friction_at_rest(row: EngineRow) -> ProbeReading:
+    """Deceleration over g of a disk that slides on a floor and does not bounce, from 1/8 s to
+    3/8 s; a velocity rounds twice a step."""
+    steps, gravity, speed = 64, 10.0, 4.0
+    scene = scene_of(
+        restitution=0.0,
+        position=[[0.0, 0.5]],
+        velocity=[[speed, 0.0]],
+        radius=[0.5],
+        mass=[1.0],
+        gravity=[0.0, -gravity],
+        walls=[[[-8.0, 0.0], [8.0, 0.0]]],
+    )
+    with loaded(row, replace(scene, friction=FRICTION)) as engine:
+        engine.step(steps // 2)  # by then it lies on the floor
+        early = float(engine.read().velocity[0, 0])
+        engine.step(steps)
+        late = float(engine.read().velocity[0, 0])
+    bound = row.rounding * ROUNDINGS * steps * speed / (gravity * steps * DT)
+    return ProbeReading((early - late) / (gravity * steps * DT), FRICTION, bound)
+
+
 PHYSICS: dict[str, Probe] = {
     "free_flight": Probe(
         "How far is a thrown disk from the parabola after 1 s? (m)", free_flight, "departs"
@@ -168,5 +221,22 @@ PHYSICS: dict[str, Probe] = {
     "restitution_wall": Probe(
         "What is e of a wall collision at 2 m/s, where 0.5 is stated?", wall_restitution, "departs"
     ),
-    "friction": Probe("What coefficient of friction acts between two disks?", friction, "departs"),
+    "friction": Probe(
+        "What coefficient of friction acts between two disks, where none is stated?",
+        friction,
+        "departs",
+    ),
+    **{
+        f"friction_{e:g}": Probe(
+            f"What friction acts in a bounce with e = {e:g}, where {FRICTION} is stated?",
+            partial(friction_in_bounce, restitution=e),
+            "departs",
+        )
+        for e in (0.0, 0.5, 1.0)
+    },
+    "friction_at_rest": Probe(
+        f"What friction brakes a disk that slides on a floor, where {FRICTION} is stated?",
+        friction_at_rest,
+        "departs",
+    ),
 }

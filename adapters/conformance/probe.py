@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,16 +86,15 @@ def simplified(scene: Scene) -> tuple[Scene, ...]:
     alone = {
         name: value[:1]
         for name, value in vars(bare).items()
-        if name not in ("walls", "gravity", "restitution", "wrap")
+        if name not in ("walls", "gravity", "restitution", "friction", "wrap")
     }
     return scene, bare, replace(bare, restitution=EXERCISE), replace(bare, **alone)
 
 
 def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
     """A scene from plain lists, by the names of its fields."""
-    return Scene(
-        restitution=restitution, **{name: frozen(values) for name, values in arrays.items()}
-    )
+    fields: dict[str, Any] = {name: frozen(values) for name, values in arrays.items()}
+    return Scene(restitution=restitution, **fields)
 
 
 def one_disk(

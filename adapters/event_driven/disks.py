@@ -23,14 +23,15 @@ Ints = NDArray[np.int64]
 Links = NDArray[np.uint32]
 Disks = NDArray[np.void]  # (n,) of DISK
 Runs = NDArray[np.void]  # (n,) of RUN
+Spins = NDArray[np.void]  # (n,) of SPIN
 # ends a chain; without a sign, so that nobody must ask whether to count from the end
 NONE = np.uint32(2**32 - 1)
 NOBODY = -(2**31)
 DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)  # what the loop says
 BASE, STOP = 0, 1  # columns of Arena.clock
 LOGGED, WHO, WHOM, LEFT = range(4)  # and of Arena.counters
-# by itself: + side (left, right, bottom, top); the wall's end; + 3 wall + part
-EDGE, WRAP, END, WALL = 0, 4, 8, 9
+# by itself: + side (left, right, bottom, top); the wall's end; no more slip; + 3 wall + part
+EDGE, WRAP, END, GRIP, WALL = 0, 4, 8, 9, 10
 
 # A disk in three lines of the cache: what a search for contacts reads of others, its record, what
 # only some need.
@@ -85,6 +86,20 @@ RUN = np.dtype(
     ]
 )
 
+# How each disk turns, where friction makes that matter.
+SPIN = np.dtype(
+    [
+        ("t", "f8"),  # s, when the next three were so
+        ("angle", "f8"),  # rad
+        ("spin", "f8"),  # rad/s
+        ("rate", "f8"),  # rad/s2
+        ("free_rate", "f8"),  # rad/s2, of torques alone
+        ("turns", "f8"),  # 1 / inertia
+        ("sliding", "i4"),  # the sign of the slip on the wall it lies on; 0: it rolls
+    ],
+    align=True,
+)
+
 
 class Grid(NamedTuple):
     """Cells at least as wide as the largest disk; in a torus leaving the grid shifts the disk, else
@@ -113,6 +128,7 @@ class Rules(NamedTuple):
     # units in the last place of the time: a disk that collides 64 times within so many has no
     # single continuation
     crowd: float
+    friction: float
 
 
 class Walls(NamedTuple):
@@ -140,6 +156,7 @@ class Arena(NamedTuple):
     # back
     counters: Ints
     runs: Runs  # untouched where there is no scenery
+    spins: Spins  # untouched where there is no friction
 
 
 @inlined

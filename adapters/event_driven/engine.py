@@ -48,19 +48,20 @@ class EventDriven:
         if self.forced and count:
             turning = self.torque / self.scene.inertia
             self.settle()  # it turned freely up to here
-            self.accelerate(self.scene.gravity + self.force / self.scene.mass[:, None])
+            self.accelerate(self.scene.gravity + self.force / self.scene.mass[:, None], turning)
             self.advance(1)
-            self.accelerate(np.broadcast_to(self.scene.gravity, (self.scene.n, 2)))
+            self.accelerate(np.broadcast_to(self.scene.gravity, (self.scene.n, 2)), 0 * turning)
             self.settle(turning)
             self.force[:], self.torque[:] = 0.0, 0.0
             self.forced.clear()
             count -= 1
         self.advance(count)
 
-    def accelerate(self, acceleration: Array) -> None:
-        """Give each disk with a force its row of acceleration (n, 2) m/s2 from now on."""
+    def accelerate(self, acceleration: Array, turning: Array) -> None:
+        """Give each disk with a force its row of acceleration (n, 2) m/s2 from now on, and of
+        angular acceleration (n,) rad/s2."""
         for disk in sorted(self.forced):
-            self.engine.accelerate(disk, self.steps * self.dt, acceleration[disk])
+            self.engine.accelerate(disk, self.steps * self.dt, acceleration[disk], turning[disk])
 
     def advance(self, count: int) -> None:
         """Let the events of `count` steps happen."""
@@ -84,7 +85,9 @@ class EventDriven:
 
     def read(self) -> State:
         """Every disk flown from its own last event to now."""
-        return State(*self.engine.look(self.steps * self.dt), *self.turn())
+        now = self.steps * self.dt
+        turned = self.engine.look_turned(now) if self.scene.friction else self.turn()
+        return State(*self.engine.look(now), *turned)
 
     def collisions(self) -> list[ContactImpulse]:
         """Every collision in the step at whose end it had happened."""

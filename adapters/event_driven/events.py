@@ -27,6 +27,7 @@ from adapters.event_driven.disks import (
     REENTRY,
     ROUND_END,
     RUN,
+    SPIN,
     STOP,
     WHO,
     WHOM,
@@ -36,6 +37,7 @@ from adapters.event_driven.disks import (
     Scenery,
     Walls,
 )
+from adapters.event_driven.friction import look_turned
 from adapters.event_driven.queue import empty_queue
 from scenarios.model import Array, Scene
 from scenarios.no_truth import NoTruth
@@ -81,12 +83,13 @@ class EventEngine:
             log=np.zeros((LOG_ROWS, 5)),
             counters=np.zeros(4, np.int64),
             runs=np.zeros(scene.n, RUN).view(np.recarray),
+            spins=spins_of(scene),
         )
         self.kept: list[Array] = []
         # events since refuse_crawl has looked, and when that was, s
         self.spent, self.since = 0, 0.0
         self.scenery: Scenery = (
-            (True,) if rules.falling or rules.wrapped or len(scene.walls) else ()
+            (True,) if rules.falling or rules.wrapped or len(scene.walls) or rules.friction else ()
         )
         event_loop.begin(self.arena.disks, self.arena.head, self.arena.tree, grid)
         self.refuse_pairs()
@@ -157,12 +160,13 @@ class EventEngine:
             self.kept.append(self.arena.log[: counters[LOGGED]].copy())
             counters[LOGGED] = 0
 
-    def accelerate(self, disk: int, at: float, acceleration: Array) -> None:
+    def accelerate(self, disk: int, at: float, acceleration: Array, rate: float = 0.0) -> None:
         """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so,
-        (2,) m/s2."""
+        (2,) m/s2, and its spin at `rate` rad/s2, where there is friction."""
         self.arena = self.arena._replace(rules=self.arena.rules._replace(falling=True, mixed=True))
         self.scenery = (True,)
-        event_loop.accelerate(self.arena, self.scenery, disk, at, acceleration[0], acceleration[1])
+        ax, ay = acceleration
+        event_loop.accelerate(self.arena, self.scenery, disk, at, ax, ay, rate)
 
     def look(self, at: float) -> tuple[Array, Array]:
         """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing
@@ -170,6 +174,13 @@ class EventEngine:
         out = np.empty((self.scene.n, 4))
         event_loop.look(self.arena.disks, self.arena.clock[BASE], at, out)
         return out[:, :2], out[:, 2:]
+
+    def look_turned(self, at: float) -> tuple[Array, Array]:
+        """Angle and angular velocity (n,) rad, rad/s at `at` s of a scene with friction, else those
+        of the start."""
+        out = np.empty((self.scene.n, 2))
+        look_turned(self.arena.spins, self.arena.clock[BASE], at, out)
+        return out[:, 0], out[:, 1]
 
     @property
     def collisions(self) -> Array:
@@ -286,6 +297,7 @@ def rules_of(scene: Scene, leaning: bool) -> Rules:
         scene.wrap is not None,
         scene.restitution > SLOWEST,
         crowd,
+        float(scene.friction),
     )
 
 
@@ -360,3 +372,11 @@ def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
     disks["pair_time"] = disks["own_time"] = np.inf
     disks["last"], disks["wall"], disks["corner"] = NOBODY, -1, -1
     return disks.view(np.recarray)
+
+
+def spins_of(scene: Scene) -> NDArray[np.void]:
+    """How the disks turn at t = 0."""
+    spins = np.zeros(scene.n, SPIN)
+    spins["angle"], spins["spin"] = scene.angle, scene.angular_velocity
+    spins["turns"] = np.where(scene.static, 0.0, 1 / scene.inertia)
+    return spins.view(np.recarray)

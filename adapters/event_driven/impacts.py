@@ -1,5 +1,5 @@
-"""What a collision does in the event engine: Newton's restitution along the line of centres,
-without friction; and its note.
+"""What a collision does in the event engine: Newton's restitution along the line of centres, and
+its note; what friction adds is in friction.py.
 
 A collision is logged and counted, so that those without an end are noticed: between which float64
 resolves no time, or between which nothing flies.
@@ -25,6 +25,7 @@ from adapters.event_driven.disks import (
     Arena,
     Walls,
 )
+from adapters.event_driven.friction import drag, rub_wall
 from adapters.event_driven.rest import COLLISIONS, hold, jolt, rattles, rests, second_wall, slow
 from adapters.event_driven.search import ROUNDING, image
 
@@ -153,6 +154,9 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
     changed = a.last != -1 - w
     impulse, cosine = collide_wall(walls, a, w, part, arena.rules.restitution)
+    rubs = arena.rules.friction > 0.0
+    if rubs:
+        rub_wall(arena, i, w, part, impulse)
     jolt(walls, a)
     crowded = note(arena, a, i, -1 - w, impulse, cosine)
     run.walls += 1
@@ -163,13 +167,18 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
         acceleration = sqrt(a.free_ax * a.free_ax + a.free_ay * a.free_ay)
         trapped = rattles(run, a, closing, acceleration, changed or arena.rules.lasting)
     mixed, corner = arena.rules.mixed, -1
-    if part == 0 and (crowded or trapped or (mixed and slow(a))):
+    # With friction a second contact that lasts is not modelled.
+    if part == 0 and not rubs and (crowded or trapped or (mixed and slow(a))):
         corner = second_wall(walls, arena.grid, a, w)
     may_rest = part == 0 and mixed and (walls_only or not trapped)
     if may_rest and rests(walls, a, w, corner, crowded, trapped):
         if impulse == 0.0:  # a contact whose impulses begin without a collision
             tell(arena, a.t, i, -1 - w, 0.0, 1.0)
+        if rubs:
+            drag(arena, i)
         return GOES_ON
+    if rubs:
+        drag(arena, i)
     if trapped:
         stop(arena, run.start, i, -1 - w)
     to_and_fro = False

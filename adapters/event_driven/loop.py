@@ -16,6 +16,7 @@ from adapters.event_driven.disks import (
     EDGE,
     END,
     GOES_ON,
+    GRIP,
     LEFT,
     LOG_FULL,
     LOGGED,
@@ -32,11 +33,13 @@ from adapters.event_driven.disks import (
     Links,
     Runs,
     Scenery,
+    Spins,
     cross,
     fly,
     settle,
     unlink,
 )
+from adapters.event_driven.friction import drag, find_grip, roll, rub_disks
 from adapters.event_driven.impacts import (
     change,
     collide,
@@ -71,7 +74,7 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
         if arena.counters[LOGGED] == len(arena.log):
             return LOG_FULL
         if now > EPOCH:
-            begin_epoch(arena.disks, tree, arena.runs, clock)
+            begin_epoch(arena.disks, tree, arena.runs, arena.spins, clock)
             continue
         status, partner, side = happen(arena, scenery, i, now)
         if status != GOES_ON:
@@ -121,6 +124,8 @@ def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> N
     if fresh:
         a.pair_time = inf
     find_own(arena, scenery, a)
+    if len(scenery) and arena.rules.friction > 0.0:
+        find_grip(arena, i)
     find_pair(arena, scenery, i, beyond)
     put(arena.tree, i, min(a.pair_time, a.own_time))
 
@@ -131,9 +136,14 @@ def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
     a, b = arena.disks[i], arena.disks[j]
     new_to_a, new_to_b = a.last != j, b.last != i
     impulse, cosine = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
+    if len(scenery) and arena.rules.friction > 0.0:
+        rub_disks(arena, i, j, impulse)
     if len(scenery) and arena.rules.falling:
         jolt(arena.walls, a)
         jolt(arena.walls, b)
+    if len(scenery) and arena.rules.friction > 0.0:
+        drag(arena, i)
+        drag(arena, j)
     if b.weight > 0.0:
         b.count += 1
     crowded = note(arena, a, i, j, impulse, cosine)
@@ -151,10 +161,13 @@ def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
 @kernel
 def alone(arena: Arena, i: int) -> int:
     """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of
-    its wall."""
+    its wall, or slides no more."""
     code = arena.disks[i].own_code
     if code >= WALL:
         return collision_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
+    if code == GRIP:
+        roll(arena, i)
+        return GOES_ON
     return leave(arena, i) if code == END else wrap(arena, i, code - WRAP)
 
 
@@ -166,6 +179,8 @@ def leave(arena: Arena, i: int) -> int:
     speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.free_ax, a.free_ay)
     take_off(a)
     a.wall, a.count = -2 - w, a.count + 1
+    if arena.rules.friction > 0.0:
+        drag(arena, i)
     a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
     stop(arena, a.t, i, -1 - w)
     return GOES_ON if speed2 >= press * a.radius else ROUND_END
@@ -202,7 +217,7 @@ def covered(disks: Disks, i: int) -> int:
 
 
 @kernel
-def begin_epoch(disks: Disks, tree: Tree, runs: Runs, clock: Array) -> None:
+def begin_epoch(disks: Disks, tree: Tree, runs: Runs, spins: Spins, clock: Array) -> None:
     """Count all times from EPOCH s later."""
     clock[BASE] += EPOCH
     for i in range(len(disks)):
@@ -212,6 +227,7 @@ def begin_epoch(disks: Disks, tree: Tree, runs: Runs, clock: Array) -> None:
         a.own_time -= EPOCH
         a.mark_time -= EPOCH
         runs[i].start -= EPOCH
+        spins[i].t -= EPOCH
     for k in range(len(tree)):
         tree[k].time -= EPOCH
 
@@ -233,13 +249,18 @@ def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
 
 
 @kernel
-def accelerate(arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float) -> None:
+def accelerate(
+    arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float, rate: float
+) -> None:
     """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax,
-    ay)."""
+    ay), and its spin by `rate`, which only friction makes use of."""
     a, now = arena.disks[i], at - arena.clock[BASE]
     fly(a, now, scenery)
     a.free_ax, a.free_ay = ax, ay
     bear(arena.walls, a)
+    if arena.rules.friction > 0.0:
+        arena.spins[i].free_rate = rate
+        drag(arena, i)
     change(a)
     ask_again(a, arena.tree, i, now)
 

@@ -61,6 +61,7 @@ class AblatedReference(Reference):
     alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order
         has it.
     mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`.
+    friction: of a pair; None: the scene's.
     `parameters`: fields of `adapters.mechanisms.ablated_reference.Parameters`.
     """
 
@@ -71,11 +72,13 @@ class AblatedReference(Reference):
         substeps: int = 1,
         alpha: float | None = None,
         mixing: str = "as stated",
+        friction: float | None = None,
         precision: type = np.float64,
         **parameters: Any,
     ) -> None:
         super().__init__(ablated_reference, precision=precision)
         self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
+        self.friction = friction
         self.moves = substeps * self.order.count("move")
         # the solver is compiled once: an int in place of a float would be another
         kinds = Parameters._field_defaults
@@ -98,7 +101,8 @@ class AblatedReference(Reference):
         super().load(scene, dt)
         self.disks.inertia[scene.static] = np.inf
         self.world = self.world._replace(
-            restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution))
+            restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution)),
+            friction=float(scene.friction if self.friction is None else self.friction),
         )
 
     def _advance(self, count: int) -> None:
@@ -119,6 +123,7 @@ class AblatedReference(Reference):
             "mixing": self.mixing,
             "substeps": self.substeps,
             "alpha": self.alpha,
+            "friction": self.friction,
         } | self.on._asdict()
         return {
             name: (value, value)

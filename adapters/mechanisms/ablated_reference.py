@@ -6,7 +6,7 @@ pairs, walls is the exercise, to the bit. It asks all pairs and is for some hund
 by numba, as `exercise` is.
 """
 
-from math import inf, pi, sqrt
+from math import atan, inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from adapters.mechanisms.contacts import (
     apply_pair,
     by_colour,
     by_island,
+    carried_off,
     closing,
     detect,
     drive_to_target,
@@ -26,7 +27,8 @@ from adapters.mechanisms.contacts import (
     turn,
 )
 from reference_impl.compiled import compiled
-from reference_impl.exercise import collide, collide_wall, touching, touching_wall, wrap
+from reference_impl.coulomb import collide, collide_wall
+from reference_impl.exercise import touching, touching_wall, wrap
 from reference_impl.state import Disks, World
 
 Collision = tuple[int, int, int, float]  # step, i, j or -1 - wall, impulse N s
@@ -77,7 +79,9 @@ class Parameters(NamedTuple):
     project: bool = True  # of `pairs`: an overlap is undone at once
     project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
-    friction: float = 0.0  # of `bounce`, `soften` and `relax`
+    lever: float = 0.0  # of the gap, by which friction's lever arm is longer than the radius
+    rub_first: bool = False  # of `bounce`: friction before the normal impulse of the same pass
+    rub_restituted: bool = True  # of `restitute`: what it adds allows more friction
     correction_share: float = 0.0  # of the overlap beyond the slop, each iteration or `nudge`
     correction_iterations: int = 3
     correction_most: float = inf  # m, that one of them moves at most
@@ -87,6 +91,7 @@ class Parameters(NamedTuple):
     touching: bool = False  # whether they are at just this distance
     memory: int = 1  # steps, for which a contact that is lost keeps its impulses
     skin: float = 0.0  # m, by which walls are thicker than they are
+    carried: bool = False  # of `soften`: a disk's turning carries along the point that touches
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
     push_speed: float = 0.0  # m/s, of position correction, at most
@@ -100,7 +105,7 @@ def advance(
     does."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
-        kept.start[:], kept.moved[:] = disks.position, 0.0
+        kept.start[:], kept.moved[:], kept.turned[:] = disks.position, 0.0, 0.0
         for stage in on.order:
             act(stage, disks, world, on, kept, h, k, collisions)
         for c in range(kept.found[0]):
@@ -139,9 +144,9 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
     elif stage == AIM:
         aim(disks.velocity, world.restitution, on.threshold, kept)
     elif stage == WARM_START:
-        warm_start(disks, kept)
+        warm_start(disks, on, kept)
     elif stage == BOUNCE:
-        bounce(disks, on, kept)
+        bounce(disks, world, on, kept)
     elif stage == CAP:
         cap(disks.velocity, on.cap, h)
     elif stage == POSITION_CORRECTION:
@@ -149,11 +154,11 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
     elif stage == NUDGE:
         nudge(disks.mass, on, kept, h)
     elif stage == SOFTEN:
-        soften(disks, on, kept, h, True)
+        soften(disks, world, on, kept, h, True)
     elif stage == RELAX:
-        soften(disks, on, kept, h, False)
+        soften(disks, world, on, kept, h, False)
     elif stage == RESTITUTE:
-        restitute(disks, kept)
+        restitute(disks, world, on, kept)
 
 
 @compiled
@@ -183,6 +188,7 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
                 moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * acceleration
                 disks.position[i, axis] = kept.start[i, axis] + moved[i, axis]
                 kept.nudge[i, axis] = 0.0
+            kept.turned[i] += atan(disks.angular_velocity[i] * h)  # as b2IntegrateRotation does
             disks.angle[i] += (
                 disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]
             )
@@ -212,8 +218,8 @@ def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[C
 def meet(
     disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list[Collision]
 ) -> None:
-    """One pair, by the exercise; where nothing is to be projected, both are set back to where they
-    met."""
+    """One pair, by the exercise with friction; where nothing is to be projected, both are set back
+    to where they met."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
     _, nx, ny = gap_of(disks, world, i, j)
@@ -227,6 +233,7 @@ def meet(
             world.high,
             world.split,
             world.approaching_only,
+            world.friction,
         )
     impulse = collide(disks, i, j, law) if j >= 0 else collide_wall(disks, i, -1 - j, law)
     if not (on.project if j >= 0 else on.project_walls):
@@ -248,7 +255,7 @@ def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # typ
 
 
 @compiled
-def warm_start(disks: Disks, kept: Contacts) -> None:
+def warm_start(disks: Disks, on: Parameters, kept: Contacts) -> None:
     """Begin with the impulses that the contacts had in the last step.
 
     What one had before that is not given, but counts as if it were, and may be taken back (Munk2D,
@@ -260,17 +267,21 @@ def warm_start(disks: Disks, kept: Contacts) -> None:
             continue
         i, j, nx, ny = contact.i, contact.j, contact.nx, contact.ny
         apply_pair(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse)
-        turn(disks, contact, contact.slide)
+        turn(disks, contact, contact.slide, on.lever)
 
 
 @compiled
-def bounce(disks: Disks, on: Parameters, kept: Contacts) -> None:
+def bounce(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """Sequential impulses: go through all contacts again and again; an impulse may be taken
     back."""
     for _ in range(on.iterations):
         for c in range(kept.found[0]):
-            rub(disks, kept.rows[c], on.friction)
-            drive_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
+            contact = kept.rows[c]
+            if on.rub_first:
+                rub(disks, contact, world.friction, on.lever)
+            drive_to_target(disks, contact, contact.target, 1.0, 0.0)
+            if not on.rub_first:
+                rub(disks, contact, world.friction, on.lever)
 
 
 @compiled
@@ -332,7 +343,9 @@ def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: igno
 
 
 @compiled
-def soften(disks: Disks, on: Parameters, kept: Contacts, h: float, biased: bool) -> None:
+def soften(
+    disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, biased: bool
+) -> None:
     """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft
     step).
 
@@ -342,6 +355,8 @@ def soften(disks: Disks, on: Parameters, kept: Contacts, h: float, biased: bool)
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         gap = gap_along(kept.moved, contact)
+        if on.carried:
+            gap += carried_off(disks.radius, kept.turned, contact)
         target, share, memory = 0.0, 1.0, 0.0
         if gap > 0.0:
             target = -gap / h
@@ -353,12 +368,15 @@ def soften(disks: Disks, on: Parameters, kept: Contacts, h: float, biased: bool)
             share = 1.0 - memory
             target = min(-omega / stiff * gap, on.push_speed)
         drive_to_target(disks, contact, target, share, memory)
-        rub(disks, contact, on.friction)
+        rub(disks, contact, world.friction, on.lever)
 
 
 @compiled
-def restitute(disks: Disks, kept: Contacts) -> None:
+def restitute(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """One sweep that gives every contact which was pressed the velocity it was aimed at."""
     for c in range(kept.found[0]):
-        if kept.rows[c].target != 0.0 and kept.rows[c].strongest > 0.0:
-            drive_to_target(disks, kept.rows[c], kept.rows[c].target, 1.0, 0.0)
+        contact = kept.rows[c]
+        if contact.target != 0.0 and contact.strongest > 0.0:
+            drive_to_target(disks, contact, contact.target, 1.0, 0.0)
+            if on.rub_restituted:
+                rub(disks, contact, world.friction, on.lever)

@@ -5,7 +5,7 @@ A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points 
 that of the moment it was found. Compiled by numba, as `exercise` is.
 """
 
-from math import inf
+from math import cos, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ class Contacts(NamedTuple):
     rows: np.ndarray  # of CONTACT, enough for twice as many as there can be
     start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
     moved: np.ndarray  # (n, 2) m: what they have moved since
+    turned: np.ndarray  # (n,) rad: what they have turned since
     nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
     # (n, n + w, 4): impulse, slide, colour, and how many steps ago that was; 0 if long ago
     before: np.ndarray
@@ -54,6 +55,7 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
         rows=np.zeros(2 * most + 1, CONTACT).view(np.recarray),
         start=place,
         moved=np.zeros_like(place),
+        turned=np.zeros(n),
         nudge=np.zeros((n, 2)),
         before=np.zeros((n, n + walls, 4)),
     )
@@ -229,6 +231,17 @@ def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
 
 
 @compiled
+def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-def]
+    """m, by which the gap seems wider because the points that touched have turned with the disks
+    (Box2D 3.1, b2SolveContact: moving anchors)."""
+    i, j = contact.i, contact.j
+    gap = (radius[i] + contact.gap / 2) * (1.0 - cos(turned[i]))
+    if j >= 0:
+        gap += (radius[j] + contact.gap / 2) * (1.0 - cos(turned[j]))
+    return gap
+
+
+@compiled
 def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
     """m/s along n, negative while they close in."""
     speed = v[i, 0] * nx + v[i, 1] * ny
@@ -265,27 +278,29 @@ def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
 
 
 @compiled
-def rub(disks: Disks, contact, friction: float) -> None:  # type: ignore[no-untyped-def]
-    """Stop the sliding of the surfaces where they touch, by at most `friction` times what
-    presses."""
+def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: ignore[no-untyped-def]
+    """Stop the sliding of the surfaces where they touch, by at most `friction` times what presses.
+
+    The lever arms are longer than the radii by the share `lever` of the gap: 1/2 in its middle.
+    """
     i, j, spin, inertia = contact.i, contact.j, disks.angular_velocity, disks.inertia
-    arm = disks.radius[i] + contact.gap / 2
+    arm = disks.radius[i] + contact.gap * lever
     speed = closing(disks.velocity, i, j, -contact.ny, contact.nx) - arm * spin[i]
     weight = inverse_mass(disks.mass, i, j) + arm * arm / inertia[i]
     if j >= 0:
-        other = disks.radius[j] + contact.gap / 2
+        other = disks.radius[j] + contact.gap * lever
         speed -= other * spin[j]
         weight += other * other / inertia[j]
     most, before = friction * contact.impulse, contact.slide
     contact.slide = min(max(before - speed / weight, -most), most)
-    turn(disks, contact, contact.slide - before)
+    turn(disks, contact, contact.slide - before, lever)
 
 
 @compiled
-def turn(disks: Disks, contact, by: float) -> None:  # type: ignore[no-untyped-def]
+def turn(disks: Disks, contact, by: float, lever: float) -> None:  # type: ignore[no-untyped-def]
     """N s more along the tangent, which turns both the same way round."""
     i, j, inertia = contact.i, contact.j, disks.inertia
     apply_pair(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
-    disks.angular_velocity[i] -= (disks.radius[i] + contact.gap / 2) * by / inertia[i]
+    disks.angular_velocity[i] -= (disks.radius[i] + contact.gap * lever) * by / inertia[i]
     if j >= 0:
-        disks.angular_velocity[j] -= (disks.radius[j] + contact.gap / 2) * by / inertia[j]
+        disks.angular_velocity[j] -= (disks.radius[j] + contact.gap * lever) * by / inertia[j]

@@ -126,9 +126,12 @@ def _pymunk_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> lis
     from adapters.pymunk import Pymunk
 
     as_stated = partial(Pymunk, "shipped", elasticity=float(np.sqrt(scene.restitution)))
+    rough = partial(Pymunk, "shipped", friction=float(np.sqrt(scene.friction)))
+    mixed = [Mechanism(FRICTION, {"friction": reported["friction of a pair"]}, without=rough)]
     return [
         Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated),
         *_pymunk(reported, scene, dt, "shipped"),
+        *(mixed if scene.friction else []),
     ]
 
 
@@ -167,7 +170,17 @@ def _box2d_matched(reported: Mapping[str, Any], scene: Scene, dt: float) -> list
         elastic_bullet=False,
     )
     swept = [Mechanism(SWEPT, without=unswept)] if reported["continuous collision"] else []
-    return [*_box2d(reported, scene, dt, "matched"), *swept]
+    rubbed = _box2d_friction(reported) if scene.friction else []
+    return [*_box2d(reported, scene, dt, "matched"), *rubbed, *swept]
+
+
+def _box2d_friction(
+    reported: Mapping[str, Any], without: Callable[[], Engine] | None = None
+) -> list[Mechanism]:
+    # Where the two touch is in the middle of the gap (b2WorldManifold::Initialize); friction is
+    # solved before the normal impulse (b2ContactSolver::SolveVelocityConstraints).
+    rubs = {"friction": reported["friction"], "lever": 0.5, "rub_first": True}
+    return [Mechanism(FRICTION, rubs, (IMPULSE,), without)]
 
 
 def _box2d_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
@@ -176,9 +189,7 @@ def _box2d_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list
     shipped = partial(Box2DEngine, "shipped")
     return [
         *_box2d(reported, scene, dt, "shipped"),
-        Mechanism(
-            FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)
-        ),
+        *_box2d_friction(reported, None if scene.friction else partial(shipped, friction=0.0)),
         # b2_polygonRadius, which an edge has, too: twice the slop.
         Mechanism(SKIN, {"skin": 2 * reported["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
         Mechanism(
@@ -194,6 +205,7 @@ def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Me
         "order": BOX2D_V3,
         "touching": True,
         "margin": 0.02 * reported["length unit in m"],
+        "carried": True,
         "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }
@@ -203,13 +215,23 @@ def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Me
     ]
 
 
-def _box2d_v3_matched(reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+def _box2d_v3_friction(
+    reported: Mapping[str, Any], without: Callable[[], Engine] | None = None
+) -> list[Mechanism]:
+    # Where the two touch is in the middle of the gap (b2CollideCircles); what the sweep for
+    # restitution adds to the normal impulse allows no more friction (b2ApplyRestitutionTask).
+    rubs = {"friction": reported["friction"], "lever": 0.5, "rub_restituted": False}
+    return [Mechanism(FRICTION, rubs, (IMPULSE,), without)]
+
+
+def _box2d_v3_matched(reported: Mapping[str, Any], scene: Scene, _dt: float) -> list[Mechanism]:
     from adapters.box2d_v3 import MATCHED
 
-    return _box2d_v3(reported, MATCHED)
+    rubbed = _box2d_v3_friction(reported) if scene.friction else []
+    return [*_box2d_v3(reported, MATCHED), *rubbed]
 
 
-def _box2d_v3_shipped(reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
+def _box2d_v3_shipped(reported: Mapping[str, Any], scene: Scene, _dt: float) -> list[Mechanism]:
     from adapters.box2d_v3 import SHIPPED, Box2DV3
 
     shipped = partial(Box2DV3, "shipped")
@@ -224,9 +246,7 @@ def _box2d_v3_shipped(reported: Mapping[str, Any], _scene: Scene, _dt: float) ->
             without=partial(shipped, restitution_threshold=0.0),
         ),
         *_box2d_v3(reported, SHIPPED),
-        Mechanism(
-            FRICTION, {"friction": reported["friction"]}, (IMPULSE,), partial(shipped, friction=0.0)
-        ),
+        *_box2d_v3_friction(reported, None if scene.friction else partial(shipped, friction=0.0)),
         Mechanism(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
     ]
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import FLOAT64, EngineRow
+from adapters.friction import must_be_frictionless
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import EXERCISE, restitution_of
@@ -76,6 +77,7 @@ class Student:
 
     def load(self, scene: Scene, dt: float) -> None:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
+        must_be_frictionless(scene, self.path.name)
         process = self.process
         self.forces = np.zeros((scene.n, 3))
         self.asked: list[dict[str, Any]] = []

@@ -14,6 +14,7 @@ from reports.commands.own_solvers import lines
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
+from reports.page.situations import by_friction
 from reports.run.archive import Archive
 from reports.run.arguments import refusing
 from reports.run.folders import found
@@ -67,11 +68,13 @@ def print_summary(report: Report, page: str) -> None:
     for column in overview.SUMMARY.values():
         # ten engines are to fit into 80 columns
         headings += [column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")]
-    names = overview.names_of(report.comparisons)
-    found = overview.summary(report.comparisons, names, report.untrusted)
-    rows = [[name, *(cell.text for cell in cells)] for name, cells in found.items()]
-    print_table(console, headings, rows, title_of(len(report.comparisons)))
-    console.print()
+    for comparisons in filter(None, by_friction(report.comparisons)):
+        names = overview.names_of(comparisons)
+        found = overview.summary(comparisons, names, report.untrusted)
+        rows = [[name, *(cell.text for cell in cells)] for name, cells in found.items()]
+        rough = any(each.scenario.scene.friction for each in comparisons)
+        print_table(console, headings, rows, title_of(len(comparisons), rough))
+        console.print()
     print_list(
         console, [*report.findings, *lines(report.said), *off_grid(report), statuses(report)]
     )
@@ -80,13 +83,17 @@ def print_summary(report: Report, page: str) -> None:
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
 
 
-def title_of(scenes: int) -> str:
-    """What the numbers of the summary are."""
+def title_of(scenes: int, rough: bool = False) -> str:
+    """What the numbers of the summary are; `rough`: of scenes with friction."""
+    kind = " with friction" if rough else ""
     if scenes == 1:
-        return "Largest error in the scene, at the middle one of its step sizes; lower is better"
+        return (
+            f"Largest error in the scene{kind}, at the middle one of its step sizes; lower is"
+            " better"
+        )
     return (
-        f"Largest error in a scene, at the middle one of its step sizes: median of {scenes} scenes;"
-        " lower is better"
+        f"Largest error in a scene, at the middle one of its step sizes: median of {scenes} scenes"
+        f"{kind}; lower is better"
     )
 
 

@@ -54,7 +54,9 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
 
     The impulse acts along the normal; at restitution e an impulse J between two disks of the
     reduced mass m takes J2 (1 - e) / (1 + e) / 2 m from the energy (J = (1 + e) m v, and m v2 (1 -
-    e2) / 2; any textbook of mechanics).
+    e2) / 2; any textbook of mechanics). Friction adds an impulse along the tangent: what changes
+    the disk's velocity from just before the collision to just after it; and takes what the spins
+    and that motion lose.
     """
     assert scenario.truth is not None
     scene, collisions = scenario.scene, truth.collisions
@@ -68,10 +70,15 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
         if not size:  # a contact at rest
             continue
         other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
-        impulse = size * (x[i] - other) / np.linalg.norm(x[i] - other)
+        normal = (x[i] - other) / np.linalg.norm(x[i] - other)
+        impulse = size * normal
+        if scene.friction:
+            rub, rubbed = friction_of(scenario, t, i, j, normal)
+            impulse = impulse + rub
         bodies = ((i, impulse), (j, -impulse)) if j >= 0 else ((i, impulse),)
         moved = [(k, change) for k, change in bodies if not scene.static[k]]
         lost = size**2 * (1 - e) / (1 + e) / 2 * sum(inverse[k] for k, _ in moved)
+        lost += rubbed if scene.friction else 0.0
         rows.append((t, *(moved[0][1] if len(moved) == 1 else (0.0, 0.0)), lost))
         disks += [(k, t, *(change * inverse[k])) for k, change in moved]
     table, by_disk = np.array(rows).reshape(-1, 4), np.array(disks).reshape(-1, 4)
@@ -79,6 +86,26 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
     limits = np.searchsorted(by_disk[:, 0], np.arange(scene.n + 1))
     columns = table[:, 0], table[:, 1:3], table[:, 3], limits, by_disk[:, 1], by_disk[:, 2:]
     return Jumps(*map(np.ascontiguousarray, columns))
+
+
+def friction_of(scenario: Scenario, t: float, i: int, j: int, normal: Array) -> tuple[Array, float]:
+    """(2,) N s on disk i along the tangent of its collision at `t` s in the truth, and J that
+    friction takes.
+
+    From the last float64 before that time to it, between which nothing else happens to the disk.
+    """
+    assert scenario.truth is not None
+    scene, tangent = scenario.scene, np.array([-normal[1], normal[0]])
+    two = scenario.truth(np.array([np.nextafter(t, 0.0), t]))
+    k = i if not scene.static[i] else j
+    change = scene.mass[k] * (two.velocity[1, k] - two.velocity[0, k]) @ tangent
+    kick = change if k == i else -change
+    moving = [body for body in (i, j) if body >= 0 and not scene.static[body]]
+    along = two.velocity[:, moving] @ tangent
+    turns = np.where(np.isinf(scene.inertia), 0.0, scene.inertia)[moving]
+    energy = along**2 @ scene.mass[moving] / 2
+    energy = energy + two.angular_velocity[:, moving] ** 2 @ turns / 2
+    return kick * tangent, float(energy[0] - energy[1])
 
 
 def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float) -> Array:

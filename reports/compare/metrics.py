@@ -14,6 +14,7 @@ from inspect import getdoc
 import numpy as np
 
 from reports.compare import collision_metrics as collisions
+from reports.compare import friction_metrics as friction
 from reports.compare import laws, scales, violations
 from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
@@ -312,5 +313,14 @@ METRICS: dict[str, Metric] = {
     ),
     "collision_delay_max_dt": Metric(
         collisions.collision_delay_max_dt, "dt", (TRUTH, ENGINE), title="Detection delay, largest"
+    ),
+    "tangential_velocity_error": Metric(
+        friction.tangential_velocity_error,
+        "m/s",
+        (TRUTH,),
+        title="Tangential velocity after a collision, largest error",
+    ),
+    "slip_at_rest": Metric(
+        friction.slip_at_rest, "m/s", (TRUTH,), title="Slip where a disk should roll, largest"
     ),
 }

@@ -123,10 +123,19 @@ class View:
 
     @cached_property
     def angular_velocity_deviation(self) -> Array:
-        """(k, n) rad/s between the two; no collision changes a spin, so that none is late or
-        early."""
+        """(k, n) rad/s between the two; 0 where it is not compared.
+
+        Without friction no collision changes a spin, so that none is late or early; with it, those
+        within `WINDOW` dt of a collision of the disk are not compared.
+        """
         assert self.other is not None
-        return np.abs(self.played.angular_velocity - self.other.angular_velocity)
+        deviation: Array = np.abs(self.played.angular_velocity - self.other.angular_velocity)
+        if not self.scenario.scene.friction:
+            return deviation
+        free = collision_free(self.other, self.dt)
+        if self.jumps is None:
+            free = free & collision_free(self.played, self.dt)
+        return np.where(free, deviation, 0.0)
 
     @cached_property
     def momentum_deviation(self) -> Array:

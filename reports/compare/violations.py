@@ -88,8 +88,9 @@ def knows_impulses(scenario: Scenario) -> bool:
 
 
 def keeps_energy(scenario: Scenario) -> bool:
-    """Whether no collision takes energy and no thrust brings any."""
-    return scenario.scene.restitution == 1 and not scenario.thrusts
+    """Whether no collision and no friction takes energy and no thrust brings any."""
+    scene = scenario.scene
+    return scene.restitution == 1 and not scene.friction and not scenario.thrusts
 
 
 def time_on(thrust: Thrust, t: Array) -> Array:

@@ -10,14 +10,30 @@ import pandas as pd
 from adapters.engines import OWN as OWN_PROFILE
 from reports.compare.comparison import Comparison
 from reports.page import pooled
-from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, grouped
+from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
 from reports.page.style import number
 from reports.terminal.counts import counted
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
     """Who is closest, what settings are worth, where each fails; before them the reader's own
-    solver, after them what orders collisions by time. None who is `untrusted`."""
+    solver, after them what orders collisions by time; last of all who is closest where there is
+    friction, if other scenes have none. None who is `untrusted`."""
+    smooth, rough = by_friction(comparisons)
+    sentences = findings_alike(smooth, untrusted)
+    if not rough:
+        return sentences
+    scores = pooled.scores(rough)
+    scores = scores[scores.middle & ~scores.name.isin(untrusted)]
+    groups = grouped(dict.fromkeys(scores.name), scores)
+    off = ranked(position_errors(scores, rough), groups)
+    played = [name for name in off.columns if np.isfinite(off[name]).any()]
+    said = closest(off[played or list(off.columns)])  # who refuses friction is not called the last
+    return [*sentences, f"With friction, in scenes that nothing above counts: {said}"]
+
+
+def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
+    """The findings of scenes that all have friction or all have none."""
     scores = pooled.scores(comparisons)
     scores = scores[scores.middle & ~scores.name.isin(untrusted)]
     groups = grouped(dict.fromkeys(scores.name), scores)
@@ -25,9 +41,7 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     off = position_errors(scores, comparisons)
     for name in refused.keys() & off.columns:
         off.loc[off.index.isin(refused[name]), name] = np.nan
-    apart = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
-    # where nothing else was played, these are all there is to speak of
-    engines = off if len(apart) == off.shape[1] else off.drop(columns=apart)
+    engines = ranked(off, groups)
     statuses = [
         run.status
         for comparison in comparisons
@@ -38,6 +52,13 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     own = [how_right(name, off, FAR_OFF, refused.get(name, {})) for name in groups.get(YOURS, [])]
     exact = [how_right(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
     return sentences if engines is off else [*own, *sentences, *exact]
+
+
+def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFrame:
+    """The columns of `position_errors` of who is ranked: all but the reader's own solver and what
+    orders collisions by time; where nothing else was played, these."""
+    apart = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
+    return off if len(apart) == off.shape[1] else off.drop(columns=apart)
 
 
 def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:

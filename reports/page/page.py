@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -51,6 +51,16 @@ class ScenarioSection:
     pairs: dict[str, list[overview.OverviewCell]]
 
 
+class Summary(NamedTuple):
+    """A table of medians: its heading, "" for the first; how many scenes it is of; the rows of
+    `overview.summary`; and the groups that they stand in."""
+
+    title: str
+    scenes: int
+    rows: Mapping[str, list[overview.OverviewCell]]
+    groups: Mapping[str, list[str]]
+
+
 def write_page(
     path: Path,
     comparisons: Sequence[Comparison],
@@ -78,10 +88,12 @@ def write_page(
     common = overview.common_settings(comparisons)
     looks = style.looks_of((*names, style.TRUTH))
     sections = [section_of(comparison, names, common) for comparison in comparisons]
+    smooth, rough = situations.by_friction(comparisons)
     scores = pooled.scores(comparisons)
+    without_friction = pooled.scores(smooth)
     answers = situations.answers(scores[scores.middle], situated(comparisons), untrusted)
     drawings = pooled.drawings(scores, answers, untrusted)
-    first = error_cost.error_cost(scores, clock, untrusted)
+    first = error_cost.error_cost(without_friction, clock, untrusted)
     html = render(
         "page/page.html.j2",
         generator=GENERATOR,
@@ -98,12 +110,12 @@ def write_page(
         engines=versions_of(comparisons),
         steps=step_range(comparisons),
         columns=overview.SUMMARY,
-        summary=overview.summary(comparisons, names, untrusted),
-        groups=situations.grouped(names, scores),
+        summaries=summaries(smooth, rough, untrusted),
         error_cost=first,
         error_cost_key=error_cost.KEY,
         error_cost_charts=packed_charts(first.drawings) if first else "",
         answers=answers,
+        whole=situations.whole(answers),
         far_off=situations.FAR_OFF,
         pooled=drawings,
         charted=pooled.with_marks(drawings),
@@ -130,6 +142,21 @@ def write_page(
         searched=by_engine(searched()),
     )
     put_text(path, html)
+
+
+def summaries(
+    smooth: Sequence[Comparison], rough: Sequence[Comparison], untrusted: Set[str]
+) -> list[Summary]:
+    """The table of medians, and where there are scenes with friction beside others one of these."""
+    found = []
+    for comparisons, title in ((smooth, ""), (rough, "Summary of the scenes with friction")):
+        names = overview.names_of(comparisons)
+        rows = overview.summary(comparisons, names, untrusted)
+        groups = situations.grouped(names, pooled.scores(comparisons))
+        found += (
+            [Summary(title, len(comparisons), rows, groups)] if comparisons or not title else []
+        )
+    return found
 
 
 def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:

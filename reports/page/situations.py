@@ -11,15 +11,17 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.engines import OWN as OWN_PROFILE
+from reports.compare.comparison import Comparison
 from scenarios.model import Scenario, Trajectory
 
-FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN = (
+FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION = (
     "Flight",
     "Single collisions",
     "Rows",
     "Stacks and rest",
     "Crowds",
     "Spin",
+    "Friction",
 )
 ALL = "All scenes"
 SITUATIONS = {
@@ -29,7 +31,8 @@ SITUATIONS = {
     STACKS: "weight and e = 0: contacts that last",
     CROWDS: "disks that meet many others",
     SPIN: "a disk turns; these scenes count above as well",
-    ALL: "of all situations",
+    ALL: "of all situations above",
+    FRICTION: "surfaces rub; these scenes count in no other row",
 }
 YOURS, ENGINE = "Your solver", "Engines"
 OWN, EXACT = "Solvers of this project", "Solvers of this project that order collisions by time"
@@ -39,11 +42,14 @@ COLUMNS = ["scenario", "name", "error", "angle", "cost"]
 
 
 def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
-    """The situation of a scene, of the first five of `SITUATIONS`, and `SPIN` if a disk turns.
+    """The situation of a scene, of the first five of `SITUATIONS`, and `SPIN` if a disk turns;
+    `FRICTION` alone of a scene with friction.
 
     truth: whose collisions say who meets whom; without one all disks may meet.
     """
     scene = scenario.scene
+    if scene.friction:
+        return [FRICTION]
     moving = int(np.isfinite(scene.mass).sum())
     turns = bool(scene.angular_velocity.any()) or any(t.torque for t in scenario.thrusts)
     met = None if truth is None else partners(truth)
@@ -58,6 +64,14 @@ def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
     else:
         found = CROWDS
     return [found, SPIN] if turns else [found]
+
+
+def by_friction(comparisons: Sequence[Comparison]) -> tuple[list[Comparison], list[Comparison]]:
+    """The scenes without friction, of which medians, findings and pictures are, and those with
+    friction, which are summed up by themselves; where all have friction, these are the first."""
+    smooth = [each for each in comparisons if not each.scenario.scene.friction]
+    rough = [each for each in comparisons if each.scenario.scene.friction]
+    return (smooth, rough) if smooth else (rough, [])
 
 
 def partners(truth: Trajectory) -> dict[int, set[int]]:
@@ -147,22 +161,22 @@ def grouped(names: Iterable[str], scores: pd.DataFrame) -> dict[str, list[str]]:
 def answers(
     scores: pd.DataFrame, situations: Mapping[str, Sequence[str]], untrusted: Set[str]
 ) -> list[Answer]:
-    """A row a situation that has a scene with an exact answer, and one for all of them if there are
-    more.
+    """A row a situation that has a scene with an exact answer, and one for all without friction if
+    there are more.
 
     scores: columns `COLUMNS`: errors in radii and in rad, inf without a result, angle nan where it
         was not read; cost in µs per simulated second.
     situations: scene -> what `situations_of` says. Who is `untrusted` is left out.
     """
     scores = scores[~scores.name.isin(untrusted)]
-    if scores.empty:
-        return []
-    groups = grouped(dict.fromkeys(scores.name), scores)
-    ranked = next(groups[group] for group in (ENGINE, OWN, EXACT, YOURS) if group in groups)
+    rough = scores.scenario.map(lambda scene: FRICTION in situations[scene]).astype(bool)
     rows: list[Answer] = []
     for title, meaning in SITUATIONS.items():
-        members = [s for s in dict.fromkeys(scores.scenario) if title in [*situations[s], ALL]]
-        here = scores[scores.scenario.isin(members)]
+        of_kind = scores[rough if title == FRICTION else ~rough]
+        members = [s for s in dict.fromkeys(of_kind.scenario) if title in [*situations[s], ALL]]
+        here = of_kind[of_kind.scenario.isin(members)]
+        groups = grouped(dict.fromkeys(of_kind.name), of_kind)
+        ranked = next((groups[each] for each in (ENGINE, OWN, EXACT, YOURS) if each in groups), [])
         by_angle = title == SPIN and not here.angle.isna().all()
         if by_angle:
             here = here.assign(error=here.angle.fillna(np.inf))
@@ -171,6 +185,12 @@ def answers(
                 answer(title, meaning, "rad" if by_angle else "radii", here, groups, ranked)
             )
     return rows
+
+
+def whole(rows: Sequence[Answer]) -> Answer | None:
+    """Of the rows of `answers` that of all scenes without friction, or the last that there is."""
+    smooth = [row for row in rows if row.title != FRICTION]
+    return next(reversed(smooth or rows), None)
 
 
 def answer(

@@ -59,6 +59,7 @@ PATHS = {
     "diamond": "M0,-5L5,0L0,5L-5,0Z",
     "cross": "M-1.5,-4.4H1.5V-1.5H4.4V1.5H1.5V4.4H-1.5V1.5H-4.4V-1.5H-1.5Z",
     "triangle-down": "M0,4.6L4.3,-3H-4.3Z",
+    "triangle-left": "M-4.6,0L3,4.3V-4.3Z",
     "hexagon": "M-2.3,-4H2.3L4.6,0L2.3,4H-2.3L-4.6,0Z",
     "pentagon": "M0,-4.6L4.4,-1.4L2.7,3.7H-2.7L-4.4,-1.4Z",
     "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
@@ -74,11 +75,17 @@ PALETTE = (
     Mark("#3d6b1f", "#a4d67a", "pentagon"),
     Mark("#7a4a21", "#e0a878", "bowtie"),
 )
-DASHED = {"shipped": (6, 3), "lesson": (2, 3), "ordered": (9, 3, 2, 3), "neighbours": (7, 5)}
+DASHED = {
+    "shipped": (6, 3),
+    "lesson": (2, 3),
+    "ordered": (9, 3, 2, 3),
+    "neighbours": (7, 5),
+    "coulomb": (12, 3),
+}
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 # Of an engine with more than two profiles: filled and open tell two of them apart where there is
 # no colour and no line, the others have a shape of their own.
-SHAPED = {"ordered": "hourglass", "neighbours": "x"}
+SHAPED = {"ordered": "hourglass", "neighbours": "x", "coulomb": "triangle-left"}
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep
 # to pale on dark.

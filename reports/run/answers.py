@@ -150,7 +150,7 @@ def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
     collisions = truth.collisions
     angles = np.full(len(collisions), np.nan)  # a closed form does not need them
     return TruthRecord(
-        legs=np.zeros((0, 12)),
+        legs=np.zeros((0, 15)),
         events=np.stack(
             [collisions.t, collisions.i, collisions.j, collisions.impulse, angles], axis=-1
         ),

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from adapters.engines import DISTINCT, ENGINES, OWN, read_row
+from adapters.engines import ENGINES, OWN, UNASKED, read_row
 from adapters.own_solver.file import KINDS, NotASolver
 from reports.run.scenes import open_scene, with_steps
 from reports.terminal.exits import FolderTaken, refuse
@@ -84,7 +84,7 @@ def checked_scenes(
     return scenes
 
 
-def checked_engines(asked: Sequence[str], unasked: Collection[str] = DISTINCT) -> list[str]:
+def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) -> list[str]:
     """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; a NAME
     for its rows of `unasked`, and if none is asked all of these."""
     chosen: set[str] = set()

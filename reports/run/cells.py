@@ -76,6 +76,7 @@ def scene_hash(scenario: Scenario) -> str:
     ]
     arrays += [scene.inertia, scene.walls, scene.gravity, np.array(scene.restitution)]
     arrays += [scene.wrap] if scene.wrap is not None else []
+    arrays += [np.array(scene.friction)] if scene.friction else []
     for array in arrays:
         digest.update(repr(array.shape).encode() + array.tobytes())
     for t in scenario.thrusts:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from adapters.conformance.conform import no_answer
 from adapters.engine_row import EngineRow
+from adapters.engines import told_apart
 from adapters.run import Run
 from reports.run.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
 from reports.run.cells import Cell, content_key, scene_hash
@@ -244,9 +245,9 @@ def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Call
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():
         question = replace(scenario, truth=None)  # the answer stays with the judge
-        for name, row in plan.engines.items():
+        for name in told_apart(plan.engines, scenario.scene):
             for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
-                tasks[cell] = partial(play_here, cell, row, question)
+                tasks[cell] = partial(play_here, cell, plan.engines[name], question)
     return tasks
 
 

@@ -45,7 +45,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     seconds, load."""
     names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
     looks = style.looks_of(names)
-    found = middle_scores(results)
+    answers = situations.answers(middle_scores(results), situated(results), set())
     html = render(
         "speed/speed.html.j2",
         generator=GENERATOR,
@@ -56,7 +56,8 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         names=results.names,
         about=about,
         pooled=pooled_section(results),
-        answers=situations.answers(found, situated(results), set()),
+        answers=answers,
+        whole=situations.whole(answers),
         far_off=situations.FAR_OFF,
         links=neighbours(path, "speed"),
         sizes=sizes_section(results),

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from adapters.engine import Engine
-from adapters.engines import row_of
+from adapters.engines import row_of, told_apart
 from adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sweep
 from reports.run.scenes import open_scene
 from reports.speed import ladder
@@ -102,10 +102,12 @@ class SpeedPlan:
         answered = {seeded for seeded, samples in reach.items() if samples}
         for scene, seed in (seeded for seeded in self.seeded_scenes if seeded in answered):
             if scene in self.scenes:
-                step_sizes = self.effort.ladder(open_scene(scene, seed))
+                scenario = open_scene(scene, seed)
+                step_sizes = self.effort.ladder(scenario)
+                rows = {name: row_of(name) for name in self.engines}
                 yield from (
-                    Measurement(SCENE, scene, seed, name, PLAIN, row_of(name).make, step_sizes)
-                    for name in self.engines
+                    Measurement(SCENE, scene, seed, name, PLAIN, rows[name].make, step_sizes)
+                    for name in told_apart(rows, scenario.scene)
                 )
             if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)

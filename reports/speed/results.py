@@ -18,6 +18,7 @@ from reports.compare.pareto import (
     yardstick_of,
 )
 from reports.compare.pooling import POOLED, pooled
+from reports.run.scenes import open_scene
 from reports.speed import explained, models, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
@@ -72,10 +73,16 @@ class Results:
         """See `tables.reached`."""
         return tables.reached(self.points, self.orders)
 
+    def poolable(self, table: pd.DataFrame) -> pd.DataFrame:
+        """The rows of scenes without friction, of which is all that is pooled; all if none is."""
+        opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
+        rough = table.scenario.isin([one.name for one in opened if one.scene.friction])
+        return table if rough.all() else table[~rough]
+
     @cached_property
     def pooled(self) -> pd.DataFrame:
-        """See `pooling.pooled`."""
-        return pooled(self.points)
+        """See `pooling.pooled`; of the `poolable` rows."""
+        return pooled(self.poolable(self.points))
 
     @cached_property
     def sweeps(self) -> pd.DataFrame:
@@ -99,7 +106,7 @@ class Results:
         """
         rows = []
         own = yardstick_of(self.reached)
-        for (engine, profile, accuracy), group in self.reached.groupby(
+        for (engine, profile, accuracy), group in self.poolable(self.reached).groupby(
             ["engine", "profile", "accuracy"], sort=False
         ):
             counts = {

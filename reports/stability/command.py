@@ -34,6 +34,7 @@ from reports.stability.results import (
     table,
 )
 from reports.stability.touching import TOUCHING, AtGap
+from reports.stability.variants import VARIANTS
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
@@ -85,8 +86,10 @@ def find_limits(
             " plays it"
         )
         refuse([f"--engine {file}: {how}" for file in files])
+    if not (apart := [name for name in chosen if name in VARIANTS]):
+        refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in chosen])
     plan = StabilityPlan(
-        cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
+        cases, maps, touching, apart, form, affordable(workers or os.cpu_count() or 1), command
     )
     with opening(out):
         out = place_of(out)

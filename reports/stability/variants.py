@@ -57,7 +57,10 @@ CHANGED = tuple(
 )
 VARIANTS: dict[str, Variant] = {
     variant.name: variant
-    for variant in (*(Variant(name, row.make) for name, row in ENGINES.items()), *CHANGED)
+    for variant in (
+        *(Variant(name, row.make) for name, row in ENGINES.items() if not row.adds_friction),
+        *CHANGED,
+    )
 }
 
 

@@ -91,7 +91,8 @@ def of_run(
     played, moving = run.trajectory, ~scene.static
     energy = laws.energy(played, scene)
     # Where the scene keeps its energy, both ways; else only a rise is certainly wrong.
-    least = energy[0] if scene.restitution == 1 else np.minimum.accumulate(energy)
+    keeps = scene.restitution == 1 and not scene.friction
+    least = energy[0] if keeps else np.minimum.accumulate(energy)
     rise = float(np.max(np.abs(energy - least))) / (scales.energy(scenario) or 1.0)
     if truth is None:
         return np.nan, rise, 0, 0

@@ -209,6 +209,7 @@ def _scenario(file: SceneTable, source: str) -> Scenario:
             walls=np.reshape(walls, (-1, 2, 2)),
             gravity=np.array(file.gravity),
             restitution=file.restitution,
+            friction=file.friction,
             wrap=np.array([file.wrap.low, file.wrap.high]) if file.wrap else None,
         ),
         duration=file.duration,
@@ -312,6 +313,7 @@ def scene_text(scenario: Scenario) -> str:
         "substeps": list(scenario.substeps),
         "gravity": scene.gravity.tolist(),
         "restitution": scene.restitution,
+        **({"friction": scene.friction} if scene.friction else {}),
     }
     blocks = [(f"# from {_toml(scenario.source)}", top)]
     blocks += [("[[disk]]", _disk_row(scene, i)) for i in range(scene.n)]

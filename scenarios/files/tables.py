@@ -186,6 +186,7 @@ class SceneTable(_Table):
     )
     gravity: Pair = Field([0.0, 0.0], description="two finite numbers [x, y] (m/s2)")
     restitution: Strict = Field(ge=0, le=1, description="from 0 to 1")
+    friction: Size = Field(0.0, ge=0, description="finite and at least 0")
     disk: list[DiskTable] = Field(
         min_length=1, max_length=MOST_DISKS, description=f"1 to {MOST_DISKS} [[disk]] tables"
     )

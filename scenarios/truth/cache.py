@@ -21,7 +21,7 @@ from scenarios.model import Scenario, frozen
 from scenarios.regular import opened
 
 HERE = Path(__file__).parent
-ARRAYS = {"legs": 12, "events": 5, "outcomes": 4, "orders": 3}
+ARRAYS = {"legs": 15, "events": 5, "outcomes": 4, "orders": 3}
 """The arrays of a record and how many columns each has."""
 NUMBERS = ("horizon", "error_bound", "bits", "method", "reason", "float64_horizon", "remains")
 
@@ -55,6 +55,9 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
         scenario.duration,
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
     ]
+    if scene.friction:  # without it nothing asks how a disk turns
+        torques = [p.torque for p in scenario.thrusts]
+        parts += [scene.friction, scene.inertia, scene.angular_velocity, torques]
     hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
     for part in parts:
         hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())

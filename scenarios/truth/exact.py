@@ -116,7 +116,8 @@ def computed(
         raise NoTruth(
             "a thrust that turns with its disk makes paths whose contacts no polynomial gives"
         )
-    forced = [thrust for thrust in thrusts if thrust.force.any()]
+    # Without friction nothing asks how a disk turns.
+    forced = [p for p in thrusts if p.force.any() or (scene.friction and p.torque)]
     clock = clock or Clock()
     record = certified(scenario, forced, clock) if kind is None and has_balls() else None
     return record or two_precisions(scenario, forced, kind or digits, clock)
@@ -195,16 +196,18 @@ def spread(path: Path, until: float) -> float:
 
 def widths(path: Path) -> Array:
     """(l, 3) of every leg: when it begins, s, how wide its balls are then, m, and by how much they
-    widen, m/s."""
+    widen, m/s; where there is friction its angle counts, too, 1 rad as 1 m."""
     rows = []
     for leg in (leg for legs in path.legs for leg in legs):
-        x, y, u, v, late = (float(ball.rad()) for ball in (leg.x, leg.y, leg.vx, leg.vy, leg.t))
-        speed = max(float(abs(leg.vx)), float(abs(leg.vy)))
+        angle, spin = leg.turn[:2] if leg.turn else (leg.x, leg.vx)
+        places, rates = (leg.x, leg.y, angle), (leg.vx, leg.vy, spin)
+        late, speed = float(leg.t.rad()), max(float(abs(rate)) for rate in rates)
         rows.append(
             (
                 float(leg.t),
-                max(x, y) + late * speed,
-                max(u, v) + sum(float(x.rad()) for x in leg.hop or ()),
+                max(float(place.rad()) for place in places) + late * speed,
+                max(float(rate.rad()) for rate in rates)
+                + sum(float(x.rad()) for x in leg.hop or ()),
             )
         )
     return np.array(rows)
@@ -261,6 +264,7 @@ def _out_of_scale(scenario: Scenario) -> str:
         "wall": scene.walls,
         "velocity": scene.velocity,
         "gravity": scene.gravity,
+        "friction": np.array(scene.friction),
         "duration": np.array([scenario.duration]),
         "acceleration by a thrust": np.array(
             [p.force / scene.mass[p.disk] for p in scenario.thrusts]
@@ -306,6 +310,9 @@ def _apart(one: Leg, other: Leg, left: float) -> float:
     """m between two flights at their start and, at worst, `left` s later."""
     place = max(abs(float(one.x - other.x)), abs(float(one.y - other.y)))
     speed = max(abs(float(one.vx - other.vx)), abs(float(one.vy - other.vy)))
+    if one.turn is not None and other.turn is not None:
+        place = max(place, abs(float(one.turn.angle - other.turn.angle)))
+        speed = max(speed, abs(float(one.turn.spin - other.turn.spin)))
     late = abs(float(one.t - other.t)) * max(abs(float(one.vx)), abs(float(one.vy)))
     if (one.hop is None) != (other.hop is None):
         return np.inf

@@ -59,30 +59,38 @@ def float64_horizon(scenario: Scenario, path: Path) -> float:
     return nearby.diverged
 
 
-def roundings(scene: Scene) -> tuple[Array, Array]:
-    """Two (n, d, 2): what 2^-52 of the largest coordinate, or speed, in each of d numbers moves.
+def roundings(scene: Scene) -> tuple[Array, Array, Array]:
+    """Two (n, d, 2) and one (n, d): what 2^-52 of the largest coordinate, speed or spin in each of
+    d numbers moves.
 
     Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded
-    across it either.
+    across it either; friction may move disks across. Without it spins decide nothing.
     """
     lined = (
         (scene.position == scene.position[0]).all(axis=0)
         & ~scene.velocity.any(axis=0)
         & (scene.gravity == 0)
+        & (scene.friction == 0)
     )
     free = np.argwhere(~scene.static[:, None] & ~lined)
-    dx, dv = np.zeros((2, scene.n, 2 * len(free), 2))
+    turns = np.flatnonzero(~scene.static) if scene.friction else np.zeros(0, int)
+    dx, dv = np.zeros((2, scene.n, 2 * len(free) + len(turns), 2))
+    dw = np.zeros((scene.n, 2 * len(free) + len(turns)))
     for k, (i, axis) in enumerate(free):
         dx[i, k, axis] = EPS * np.abs(scene.position).max()
         dv[i, len(free) + k, axis] = EPS * np.abs(scene.velocity).max()
-    return dx, dv
+    # A rim moves at the spin of its disk, or at the speed that friction made it of.
+    rim = max(np.abs(scene.velocity).max(), np.abs(scene.radius * scene.angular_velocity).max())
+    for k, i in enumerate(turns):
+        dw[i, 2 * len(free) + k] = EPS * rim / scene.radius[i]
+    return dx, dv, dw
 
 
 class Body(NamedTuple):
     """One side of a collision: its motion along the path, what it is off by, its acceleration
-    before and after, 1/mass.
+    before and after, 1/mass; and for friction the same of how it turns, its radius and 1/inertia.
 
-    Shapes (2,), m, m/s, m/s2; `dx` and `dv` (d, 2).
+    Shapes (2,), m, m/s, m/s2; `dx` and `dv` (d, 2); `dw` (d,).
     """
 
     x: Array
@@ -92,6 +100,11 @@ class Body(NamedTuple):
     before: Array
     after: Array
     weight: float
+    spin: float = 0.0
+    dw: Array | float = 0.0
+    rates: tuple[float, float] = (0.0, 0.0)  # before and after
+    radius: float = 0.0
+    inverse_inertia: float = 0.0
 
 
 class Nearby:
@@ -101,9 +114,9 @@ class Nearby:
     Attributes:
         moving: the disks that are not static.
         t: (n,) s, the time that each disk has been carried to; `leg`: (n,) on which of its legs
-        that is. dx, dv: (n, d, 2) m, m/s, how far each disk is off then, for a rounding of each of
-        d numbers. struck, v: (n,) s and (n, 2) m/s, when each disk collided last, and its velocity
-        after that.
+        that is. dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, how far each disk is off then, for
+        a rounding of each of d numbers. struck, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, when
+        each disk collided last, and its velocity after that.
         instant: s, when the latest collision was; `late`: (d,) s, by how much each rounding delays
             it.
         diverged: s, when the first disk is off by too much; inf: none is so far.
@@ -113,8 +126,11 @@ class Nearby:
         scene = scenario.scene
         self.scene, self.path, self.moving = scene, path, np.flatnonzero(~scene.static).tolist()
         self.t, self.leg = np.zeros(scene.n), [0] * scene.n
-        self.dx, self.dv = roundings(scene)
+        self.dx, self.dv, self.dw = roundings(scene)
         self.struck, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
+        self.spin = np.zeros(scene.n)
+        turns = ~scene.static & np.isfinite(scene.inertia)
+        self.inverse_inertia = np.where(turns, 1 / scene.inertia, 0.0)
         self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
         self.starts_and_stops = {
             edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)
@@ -176,15 +192,17 @@ class Nearby:
         self.leg[i] += 1
         # A collision has seen to what follows it, and a thrust starts and stops when it does.
         if t != self.struck[i] and t not in self.starts_and_stops:
-            self.dv[i] += np.outer(
-                self.release(i, before, t), acceleration(before) - acceleration(leg)
-            )
+            late = self.release(i, before, t)
+            self.dv[i] += np.outer(late, acceleration(before) - acceleration(leg))
+            self.dw[i] += late * (rate(before) - rate(leg))
         for contact in leg.held:
             self.hold(i, contact.j if contact.kind == "wall" and len(leg.held) == 1 else None)
 
     def release(self, i: int, leg: Leg, t: float) -> Array:
-        """(d,) s, how much later disk i leaves what held it: the end of its wall, or a disk that is
-        struck."""
+        """(d,) s, how much later disk i leaves what held it, the end of its wall, or a disk that is
+        struck; or how much later it slides no more."""
+        if leg.turn is not None and leg.held and leg.held == self.path.legs[i][self.leg[i]].held:
+            return self.grips(i, leg)
         spans = [
             self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0]
             for c in leg.held
@@ -194,6 +212,16 @@ class Nearby:
             late: Array = -self.dx[i] @ spans[0] / speed
             return late
         return self.late if t == self.instant else np.zeros_like(self.late)
+
+    def grips(self, i: int, leg: Leg) -> Array:
+        """(d,) s, how much later disk i has lost the slip with which it slides along its wall."""
+        contact, arm = leg.held[0], float(self.scene.radius[i])
+        start, end = self.scene.walls[contact.j]
+        way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
+        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / (
+            acceleration(leg) @ way + arm * rate(leg)
+        )
+        return late
 
     def hold(self, i: int, wall: int | None) -> None:
         """Leave disk i the freedom along a wall, or none."""
@@ -227,12 +255,44 @@ class Nearby:
         shift = two.dx - one.dx + dv * late
         tilt = (shift - np.outer(shift @ normal, normal)) / reach
         faster = tilt @ dv + (two.dv - one.dv + (two.before - one.before) * late) @ normal
-        kick, change = impulse * normal, impulse * tilt - np.outer((1 + e) / share * faster, normal)
+        more = -(1 + e) / share * faster
+        kick, change = impulse * normal, impulse * tilt + np.outer(more, normal)
+        rub, rubs = 0.0, np.zeros_like(more)
+        if self.scene.friction:
+            rub, rubs = self.rub(one, two, normal, tilt, impulse, more)
+            tangent, turned = perpendicular(normal), perpendicular(tilt)
+            kick, change = kick + rub * tangent, change + rub * turned + np.outer(rubs, tangent)
         for disk, body, side in ((event.i, one, -one.weight), (event.j, two, two.weight)):
             if side:
                 self.dx[disk] -= side * kick * late
                 self.dv[disk] += side * change + (body.before - body.after) * late
                 self.v[disk], self.struck[disk] = body.v + side * kick, t
+                arm = body.radius * body.inverse_inertia
+                self.dw[disk] += (body.rates[0] - body.rates[1]) * self.late - arm * rubs
+                self.spin[disk] = body.spin - arm * rub
+
+    def rub(
+        self, one: Body, two: Body, normal: Array, tilt: Array, impulse: float, more: Array
+    ) -> tuple[float, Array]:
+        """N s, the impulse of friction on `two` along the tangent, and (d,) how far it is off; see
+        `oracle/friction`.
+
+        tilt, more: (d, 2) and (d,) N s, how far normal and impulse are off.
+        """
+        tangent, dv, late = perpendicular(normal), two.v - one.v, self.late[:, None]
+        softness = one.weight + two.weight
+        slip = float(tangent @ dv)
+        slips = (two.dv - one.dv + (two.before - one.before) * late) @ tangent
+        slips += perpendicular(tilt) @ dv
+        for body in (one, two):
+            softness += body.radius**2 * body.inverse_inertia
+            slip -= body.radius * body.spin
+            slips -= body.radius * (body.dw + body.rates[0] * self.late)
+        most = self.scene.friction * impulse
+        if abs(slip) <= most * softness:
+            return -slip / softness, -slips / softness
+        way = -1.0 if slip > 0 else 1.0
+        return way * most, way * self.scene.friction * more
 
     def body(self, i: int, t: float) -> Body:
         """Disk i at `t` s, as the collisions of that instant have left it so far."""
@@ -245,7 +305,18 @@ class Nearby:
         struck = self.struck[i] == t
         before, v = (after, self.v[i]) if struck else (acceleration(legs[k]), v)
         weight = 0.0 if self.scene.static[i] else 1 / float(self.scene.mass[i])
-        return Body(x, v, self.dx[i], self.dv[i], before, after, weight)
+        body = Body(x, v, self.dx[i], self.dv[i], before, after, weight)
+        turn = legs[k].turn
+        if turn is None:
+            return body
+        rates = rate(legs[k]), rate(legs[k + 1] if follows else legs[k])
+        return body._replace(
+            spin=self.spin[i] if struck else float(turn.spin) + rates[0] * (t - float(legs[k].t)),
+            dw=self.dw[i],
+            rates=(rates[1], rates[1]) if struck else rates,
+            radius=float(self.scene.radius[i]),
+            inverse_inertia=float(self.inverse_inertia[i]),
+        )
 
     def other(self, event: Event, one: Body) -> tuple[Body, float]:
         """The other side of a collision, and the radius, m, at which its normal turns: none at the
@@ -266,6 +337,17 @@ def along(leg: Leg, t: float) -> tuple[Array, Array]:
     since, x, y, vx, vy, ax, ay = t - float(leg.t), *map(float, leg[1:7])
     v, a = np.array([vx, vy]), np.array([ax, ay])
     return np.array([x, y]) + (v + a * since / 2) * since, v + a * since
+
+
+def rate(leg: Leg) -> float:
+    """rad/s2, at which a disk turns on a leg; 0 where nothing asks for it."""
+    return 0.0 if leg.turn is None else float(leg.turn.rate)
+
+
+def perpendicular(vector: Array) -> Array:
+    """Vectors (..., 2) turned by 90 degrees to the left."""
+    turned: Array = vector[..., ::-1] * [-1.0, 1.0]
+    return turned
 
 
 def acceleration(leg: Leg) -> Array:

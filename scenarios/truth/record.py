@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.truth.closed_forms import Collision, answer, world_thrusts
+from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
 from scenarios.truth.horizon import DIVERGED, float64_horizon
 from scenarios.truth.oracle.path import Event, Path
 
@@ -20,7 +20,7 @@ ROUNDINGS = 4 * EPS
 # `walls.bouncing_ball_e09`
 LEAST = 1e-4
 TOUCH = 1e-6  # m, what is closer to a wall at the end may be in contact with it
-NONE: Array = frozen(np.zeros((0, 1)))
+NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +28,10 @@ class TruthRecord:
     """An exact motion as its flights, and how far it can be trusted.
 
     Attributes:
-        legs: (l, 12) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for
+        legs: (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for
             good beside that: normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0.
-            Disk by disk in order of time.
+            Where there is friction angle rad, spin rad/s and its rate rad/s2; else 0. Disk by disk
+            in order of time.
         events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
             |v_n| / |v|; an impulse of 0 is no collision: from there on the disk rests on the other.
         horizon: s; nothing is said of what comes later.
@@ -63,11 +64,14 @@ class TruthRecord:
         later times are left out."""
         t = np.asarray(t, float)
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
+        turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
+        angle, spin = turning.angle.copy(), turning.angular_velocity.copy()
         for i in range(scene.n):
             legs = self.legs[self.legs[:, 0] == i]
             leg = legs[np.maximum(np.searchsorted(legs[:, 1], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
-        turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
+            if scene.friction:
+                angle[:, i], spin[:, i] = flight(t - leg[:, 1], *leg[:, 12:15].T)
         # What lies there from the start counts as a contact that begins with no impulse; later ones
         # began before.
         collisions: list[Collision] = [
@@ -75,7 +79,6 @@ class TruthRecord:
             for at, i, j, kick, _ in self.events
             if kick or not at
         ]
-        angles = turning.angle, turning.angular_velocity
         until, reason = self.horizon, self.reason
         if self.float64_horizon < until:
             until, reason = (
@@ -83,7 +86,14 @@ class TruthRecord:
                 "beyond it the rounding of float64 makes any engine diverge",
             )
         return answer(
-            scene, t, (position, velocity), collisions, angles, until, self.error_bound, reason
+            scene,
+            t,
+            (position, velocity),
+            collisions,
+            (angle, spin),
+            until,
+            self.error_bound,
+            reason,
         )
 
 
@@ -124,7 +134,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         for collision in bounces(scenario.scene, leg, stop)
     ]
     outcomes = [
-        [k, i, *map(float, v)]
+        [k, i, *map(float, v[:2])]
         for k, one in enumerate(path.outcomes)
         for i, v in one.velocities.items()
         if i < scenario.scene.n
@@ -170,7 +180,7 @@ def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
 
 
 def legs_of(path: Path, end: float) -> Array:
-    """(l, 12), as of `TruthRecord.legs`, those that begin before `end` s."""
+    """(l, 15), as of `TruthRecord.legs`, those that begin before `end` s."""
     flights = [
         (i, leg)
         for i, legs in enumerate(path.legs)
@@ -178,7 +188,10 @@ def legs_of(path: Path, end: float) -> Array:
         if float(leg.t) < end or leg is legs[0]
     ]
     return np.array(
-        [[i, *map(float, leg.numbers), *[0.0] * (11 - len(leg.numbers))] for i, leg in flights]
+        [
+            [i, *map(float, (*leg[:7], *(leg.hop or NO_HOP), *(leg.turn or NO_TURN)))]
+            for i, leg in flights
+        ]
     )
 
 
@@ -256,11 +269,12 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     near = span[touched.any(axis=0)]
     names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
     momentum = (mass[:, None] * v).sum(axis=0)
-    # Round a fixed disk, or round the end of a wall, the normal turns: no direction keeps its
-    # momentum.
+    # Round a fixed disk, or round the end of a wall, the normal turns, and friction acts along a
+    # wall: no direction keeps its momentum.
     if (
         any(scene.static[i] for i in disks if i < scene.n)
         or (touched & ((share <= 0) | (share >= 1))).any()
+        or (scene.friction and len(near))
     ):
         near = np.eye(2)
     exception = " but for gravity" if scene.gravity.any() else ""
@@ -276,7 +290,8 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
             f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their"
             f" momentum that way, {momentum @ way:.6g} N s, stays{exception}"
         )
-    yield (
-        f"{names}: their kinetic energy, {(mass * (v**2).sum(axis=1)).sum() / 2:.6g} J, can only"
-        f" fall{exception}"
-    )
+    energy = (mass * (v**2).sum(axis=1)).sum() / 2
+    if scene.friction:
+        spin = np.array([leg[13] + leg[14] * (end - leg[1]) for leg in last])
+        energy += (np.where(spin, scene.inertia[ours] * spin**2, 0.0)).sum() / 2
+    yield f"{names}: their kinetic energy, {energy:.6g} J, can only fall{exception}"

@@ -306,7 +306,7 @@ class RefusesAll(Sound):
     """An engine that can model nothing."""
 
     def load(self, scene, dt):
-        super().load(scene, dt)
+        super().load(replace(scene, friction=0.0), dt)
         raise Unsupported("no disks here")
 
 

@@ -110,6 +110,20 @@ def test_the_shares_of_a_thrust_add_up_to_its_length(start, lasts, dt, at_once):
 
 
 @pytest.mark.parametrize("name", ENGINES)
+def test_an_engine_plays_friction_or_says_that_it_does_not(name):
+    """None leaves it out and says nothing: a disk that slides along the floor turns in the end."""
+    one = from_catalogue("slip_to_roll")
+    run = played(name, one, one.dt(1))
+    if run.status == "unsupported":
+        assert "does not model friction, the scene has 0.2" in run.reason
+    else:
+        assert run.trajectory is not None
+        # By the exact answer it rolls at 8 rad/s. pymunk as shipped has friction 0.2 times 0.2, and
+        # turns at 2 mu g t / r = 4.7 rad/s after 1.5 s.
+        assert -10 < run.trajectory.angular_velocity[-1, 0] < -4
+
+
+@pytest.mark.parametrize("name", ENGINES)
 def test_a_disk_that_leaves_the_box_is_set_onto_the_opposite_edge_and_keeps_its_velocity(name):
     """As in the exercise: onto the edge, however far it was beyond; the other coordinate stays."""
     scene = Scene(

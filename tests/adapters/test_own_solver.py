@@ -77,10 +77,11 @@ def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
     [
         ("head_on_equal_e1", "the file has e = 0.9, the scene needs 1"),
         ("wall_to_wall", "the exercise has no walls"),
+        ("spinning_disks_meet", "does not model friction, the scene has 0.2"),
     ],
 )
 def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
-    """Its restitution is written into it, and it has no walls."""
+    """Its restitution is written into it, and it has neither walls nor friction."""
     engine = engine_file(RIGHT).make()
     question = scenario(scene)
     played = play(engine, "x:own", question, question.dt(question.substeps[0]))

@@ -83,7 +83,7 @@ def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples
     ):
         if name in asked:
             setattr(space, name, asked[name])
-    elasticity, bodies = asked["elasticity"], []
+    elasticity, friction, bodies = asked["elasticity"], asked["friction"], []
     for i in range(scene.n):
         if scene.static[i]:
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -93,12 +93,12 @@ def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples
             body.angular_velocity = float(scene.angular_velocity[i])
         body.position, body.angle = tuple(scene.position[i].tolist()), float(scene.angle[i])
         disk = pymunk.Circle(body, float(scene.radius[i]))
-        disk.elasticity = elasticity
+        disk.elasticity, disk.friction = elasticity, friction
         space.add(body, disk)
         bodies.append(body)
     for start, end in scene.walls.tolist():
         wall = pymunk.Segment(space.static_body, start, end, 0)
-        wall.elasticity = elasticity
+        wall.elasticity, wall.friction = elasticity, friction
         space.add(wall)
 
     def step(number: int) -> None:

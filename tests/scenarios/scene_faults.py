@@ -119,6 +119,21 @@ FAULTS = [
     ("restitution = 0.9", "", "restitution: missing; must be from 0 to 1"),
     (
         "restitution = 0.9",
+        "restitution = 0.9\nfriction = -0.5",
+        "friction = -0.5: must be finite and at least 0",
+    ),
+    (
+        "restitution = 0.9",
+        "restitution = 0.9\nfriction = inf",
+        "friction = inf: must be finite and at least 0",
+    ),
+    (
+        "restitution = 0.9",
+        "restitution = 0.9\nfriction = 1e-12",
+        "friction = 1e-12: out of scale; must be from 1e-09 to 1e+09 (SI)",
+    ),
+    (
+        "restitution = 0.9",
         "restitution = 1\ngravity = 9.81",
         "gravity = 9.81: of type float; must be two finite",
     ),

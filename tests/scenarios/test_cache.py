@@ -85,10 +85,12 @@ def test_what_decides_the_answer_decides_the_key():
             replace(ONE, duration=3.0),
             replace(ONE, scene=replace(ONE.scene, restitution=0.8)),
             replace(ONE, scene=replace(ONE.scene, velocity=ONE.scene.velocity * (1 + 2**-52))),
+            replace(ONE, scene=replace(ONE.scene, friction=0.25)),
+            replace(ONE, scene=replace(ONE.scene, friction=0.25, inertia=ONE.scene.mass)),
             replace(ONE, thrusts=[oracle.Thrust(0, 0.0, 1.0, np.ones(2))]),
         )
     }
-    assert len(keys) == 5
+    assert len(keys) == 7
     assert truth_cache.key_of(replace(ONE, name="other", substeps=(3,)), False) in keys
 
 

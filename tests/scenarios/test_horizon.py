@@ -37,12 +37,13 @@ def asked(scene: Scene, duration: float, thrusts: tuple[Thrust, ...] = ()) -> Sc
     return Scenario("asked", "?", "", scene, duration, duration / 50, thrusts=thrusts)
 
 
-def moved(scene: Scene, by: tuple[Array, Array], k: int, scale: float) -> Scene:
+def moved(scene: Scene, by: tuple[Array, Array, Array], k: int, scale: float) -> Scene:
     """The scene with what number k of the roundings moves, times `scale`."""
     return replace(
         scene,
         position=scene.position + scale * by[0][:, k],
         velocity=scene.velocity + scale * by[1][:, k],
+        angular_velocity=scene.angular_velocity + scale * by[2][:, k],
     )
 
 
@@ -75,6 +76,14 @@ TWO = dict(
     mass=[1.0, 2.5],
 )
 ALONE = dict(position=[[0.25, 1.5]], velocity=[[0.75, -0.5]], radius=[0.25], mass=[1.5])
+SPUN = dict(**TWO, angular_velocity=[6.0, -1.5])
+SLID = dict(
+    position=[[0.25, 0.5]],
+    velocity=[[1.5, 0.0]],
+    radius=[0.5],
+    mass=[2.0],
+    angular_velocity=[4.0],
+)
 CHANGES: dict[str, Scenario] = {
     "a flight": asked(lay_out(**ALONE, gravity=DOWN, restitution=1.0), 0.5),
     "two disks": asked(lay_out(**TWO, restitution=0.75), 1.5),
@@ -139,8 +148,22 @@ CHANGES: dict[str, Scenario] = {
         1.6,
     ),
     "many": asked(boxed(3), 3.0),
+    "two disks that slide on each other": asked(
+        lay_out(**SPUN, friction=0.05, restitution=0.5), 1.5
+    ),
+    "two disks that grip each other": asked(lay_out(**SPUN, friction=2.0, restitution=0.5), 1.5),
+    "a bounce on the end of a wall, with friction": asked(
+        lay_out(**ALONE, friction=0.25, walls=[[[1.0, -1.0], [1.0, 0.875]]], restitution=0.5), 1.5
+    ),
+    "a slide that becomes a roll": asked(
+        lay_out(**SLID, gravity=DOWN, walls=FLOOR, friction=0.25, restitution=0.5), 1.5
+    ),
+    "a bounce in which a slide ends": asked(
+        lay_out(**ALONE, gravity=DOWN, walls=FLOOR, friction=0.5, restitution=0.5), 2.0
+    ),
+    "many with friction": asked(replace(boxed(3), friction=0.25), 2.0),
 }
-LYING = {"a collision on a disk that lies": 1}
+LYING = {"a collision on a disk that lies": 1, "a slide that becomes a roll": 0}
 
 
 @pytest.mark.parametrize(
@@ -153,7 +176,7 @@ def test_what_a_rounding_becomes_is_the_derivative_of_the_motion(name: str):
     for k in range(by[0].shape[1]):
         if name in LYING and (by[0][LYING[name], k, 1] or by[1][LYING[name], k, 1]):
             continue  # it is kept on the floor
-        size = NEAR / max(by[0][:, k].max(), by[1][:, k].max())
+        size = NEAR / max(each[:, k].max() for each in by)
         there, here = (
             ends(replace(one, scene=moved(one.scene, by, k, sign * size))) for sign in (1, -1)
         )

@@ -254,7 +254,7 @@ def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(
             Touch(Contact("wall", 0, 1, 1), -gmpy2.sin(angle), gmpy2.cos(angle)),
         ]
         found = Matter(k, [one], k.exact(restitution), False).outcomes(
-            touches, {0: (k.exact(-1.0), k.exact(-0.3))}
+            touches, {0: (k.exact(-1.0), k.exact(-0.3), k.exact(0.0))}
         )[0]
 
     assert len(found) == outcomes

@@ -49,6 +49,8 @@ class Ahead:
             if c.kind == "wall"
             for side in (1, -1)
         )
+        if bodies.sliding[i]:
+            yield from ((0.0, c._replace(kind="grip")) for c in held)
         count = soonest(
             bodies.table,
             bodies.radii,
@@ -89,6 +91,8 @@ class Ahead:
             return self._time_to_edge(contact, now)
         if contact.kind == "end":
             return self._time_to_end(contact, now)
+        if contact.kind == "grip":
+            return self._time_to_grip(contact, now)
         if contact.kind == "wall":
             return self._time_to_wall(contact, now)
         return self._time_to_body(contact, now, limit)
@@ -158,6 +162,16 @@ class Ahead:
         )
         left = wall.length - foot if contact.side > 0 else foot
         return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
+
+    def _time_to_grip(self, contact: Contact, now: Number) -> Number | None:
+        """s until a disk that slides along a wall with friction has no slip any more."""
+        bodies, i = self.bodies, contact.i
+        leg, way = bodies.legs[i], bodies.sliding[i]
+        assert leg.turn is not None
+        slower = -way * bodies.slip(contact, (leg.ax, leg.ay, leg.turn.rate))
+        if self.k.sign(slower) <= 0:
+            return None
+        return way * bodies.slip(contact, bodies.velocity_at(i, now)) / slower
 
     def _time_to_edge(self, contact: Contact, now: Number) -> Number | None:
         i, axis, side = contact.i, contact.j, contact.side

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenarios.model import Array, Scene, Thrust
+from scenarios.truth.oracle.friction import Grip, limited
 from scenarios.truth.oracle.numbers import Number, Numbers
 from scenarios.truth.oracle.ties import Contact, Matter, Touch, Velocity
 
@@ -32,9 +33,17 @@ class Hop(NamedTuple):
     fall: Number
 
 
+class Turn(NamedTuple):
+    """How a disk turns from the start of a leg on: angle rad, spin rad/s, its rate rad/s2."""
+
+    angle: Number
+    spin: Number
+    rate: Number
+
+
 class Leg(NamedTuple):
     """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the
-    wall; and on what the disk rests meanwhile."""
+    wall; on what the disk rests meanwhile; and how it turns, where there is friction."""
 
     t: Number
     x: Number
@@ -45,11 +54,7 @@ class Leg(NamedTuple):
     ay: Number
     hop: Hop | None = None
     held: tuple[Contact, ...] = ()
-
-    @property
-    def numbers(self) -> list[Number]:
-        """All of them in one list."""
-        return [*self[:7], *(self.hop or ())]
+    turn: Turn | None = None
 
 
 class Frame(NamedTuple):
@@ -74,7 +79,11 @@ class Bodies:
         held: (b,) the contacts each rests on: gap 0, no speed and no acceleration across it.
         separated: pairs that touched, and did not approach, when the two had had so many events.
         leaning: (b,) the same of walls, at the start of the leg.
-        matter: masses and restitution.
+        matter: masses, restitution and friction.
+        rates: (b,) rad/s2, how torques change the spin of each; asked for only with friction.
+        gripping: (b,) the wall along which the contact point of each has no speed, exactly, since
+            the collision that began its leg.
+        sliding: (b,) the sign of that speed where a disk rests on a wall with friction.
     """
 
     def __init__(self, scene: Scene, k: Numbers) -> None:
@@ -91,6 +100,13 @@ class Bodies:
             for row in np.hstack([positions, velocities, accelerations]).tolist()
         ]
         self.legs = [Leg(*row) for row in rows]
+        if scene.friction:
+            turns = np.zeros((len(ends) + scene.n, 3))
+            turns[: scene.n, :2] = np.stack([scene.angle, scene.angular_velocity], axis=-1)
+            self.legs = [
+                leg._replace(turn=Turn(*map(exact, turn)))
+                for leg, turn in zip(self.legs, turns.tolist())
+            ]
         self.kind = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
         if not scene.gravity.any():
             self.kind = [STATIC] * len(self.legs)
@@ -104,11 +120,27 @@ class Bodies:
         self.asleep = np.zeros(len(self.legs), bool)
         mass = [exact(m) if np.isfinite(m) else None for m in scene.mass.tolist()]
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
-        self.matter = Matter(k, inverse, exact(scene.restitution), scene.restitution == 0)
+        self.matter = Matter(
+            k, inverse, exact(scene.restitution), scene.restitution == 0, self._grip()
+        )
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
         self.separated: dict[tuple[int, int], tuple[int, int]] = {}
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
+        self.nought, self.rates = nought, [nought for _ in self.legs]
+        self.gripping: list[Contact | None] = [None for _ in self.legs]
+        self.sliding = [0 for _ in self.legs]
+
+    def _grip(self) -> Grip | None:
+        """What friction needs to know; None where there is none."""
+        scene, exact = self.scene, self.k.exact
+        if not scene.friction:
+            return None
+        turns = np.isfinite(scene.inertia) & ~scene.static
+        inertia = zip(scene.inertia.tolist(), turns.tolist())
+        inverse = [exact(1.0) / exact(each) if turn else exact(0.0) for each, turn in inertia]
+        none = [exact(0.0)] * (len(self.legs) - scene.n)
+        return Grip(exact(scene.friction), self.radius, inverse + none)
 
     def partner(self, contact: Contact) -> int:
         """The other disk, or -1 - wall."""
@@ -144,8 +176,19 @@ class Bodies:
         )
 
     def velocity_at(self, i: int, now: Number) -> Velocity:
-        """vx, vy m/s."""
-        return self.state_at(i, now)[2:]
+        """vx, vy m/s, and rad/s where there is friction."""
+        _, _, vx, vy = self.state_at(i, now)
+        return vx, vy, self.turn_at(i, now).spin
+
+    def turn_at(self, i: int, now: Number) -> Turn:
+        """How body i is turned; nothing where there is no friction to ask for it."""
+        leg = self.legs[i]
+        if leg.turn is None:
+            return Turn(self.nought, self.nought, self.nought)
+        if leg.t is now:
+            return leg.turn
+        (angle, spin, rate), s = leg.turn, now - leg.t
+        return Turn(angle + (spin + rate * s / 2) * s, spin + rate * s, rate)
 
     def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
         """Body i goes on from here with velocity v, held by what holds it; set exactly beside a
@@ -153,16 +196,23 @@ class Bodies:
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
-        self.begin(i, Leg(now, x, y, *v, *self.acceleration(i)))
+        self.begin(i, self.leg(i, now, x, y, v))
+
+    def leg(self, i: int, now: Number, x: Number, y: Number, v: Velocity) -> Leg:
+        """A leg of body i from (x, y) m with velocity v, as it is held."""
+        (vx, vy, spin), (ax, ay, rate) = v, self.acceleration(i)
+        turn = None if self.matter.grip is None else Turn(self.turn_at(i, now).angle, spin, rate)
+        return Leg(now, x, y, vx, vy, ax, ay, turn=turn)
 
     def across(self, edge: Contact, now: Number) -> None:
         """Set a disk that has reached an edge of the wrap onto the opposite one."""
         assert self.scene.wrap is not None
         i, place = edge.i, list(self.state_at(edge.i, now))
         place[edge.j] = self.k.exact(float(self.scene.wrap[0 if edge.side > 0 else 1, edge.j]))
+        spin = self.turn_at(i, now).spin
         self.held[i] = ()
         x, y, vx, vy = place
-        self.begin(i, Leg(now, x, y, vx, vy, *self.acceleration(i)))
+        self.begin(i, self.leg(i, now, x, y, (vx, vy, spin)))
 
     def set_thrusts(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
         """Body i is accelerated by all of `thrusts` from now on."""
@@ -172,22 +222,39 @@ class Bodies:
             a = [each + exact(float(force)) * inverse for each, force in zip(a, thrust.force)]
         kind = 2 + i if thrusts else (FALLING if self.scene.gravity.any() else STATIC)
         self.free[i] = kind, a[0], a[1]
+        if self.matter.grip is not None:
+            torque = exact(float(sum(thrust.torque for thrust in thrusts)))
+            turns = self.matter.grip.inverse_inertia[i]
+            self.rates[i] = torque * turns if any(p.torque for p in thrusts) else self.nought
         held = tuple(
             c
             for c in self.held[i]
             if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0
         )
-        self.hold(i, now, held, self.velocity_at(i, now))
+        rolls = bool(self.held[i]) and not self.sliding[i]
+        self.hold(i, now, held, self.velocity_at(i, now), rolls)
         # What held it still touches.
         self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
 
-    def hold(self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity) -> None:
-        """Body i goes on with velocity v, resting on these contacts: the end of what it did
-        before."""
+    def hold(
+        self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity, rolls: bool = False
+    ) -> None:
+        """Body i goes on with velocity v, resting on these contacts: the end of what it did before.
+
+        rolls: it has no slip, exactly, on the one wall it rests on with friction.
+        """
         self.asleep[i] = False
         self.held[i] = contacts
+        if contacts and self.matter.grip is not None:
+            self.sliding[i] = 0 if rolls else self.k.sign(self.slip(contacts[0], v))
         x, y, _, _ = self.state_at(i, now)
-        self.begin(i, Leg(now, x, y, *v, *self.acceleration(i)))
+        self.begin(i, self.leg(i, now, x, y, v))
+
+    def slip(self, contact: Contact, v: Velocity) -> Number:
+        """m/s along the wall of a contact, from its start to its end, of the point that touches
+        it."""
+        _, _, tx, ty, _ = self.walls[contact.j]
+        return tx * v[0] + ty * v[1] + contact.side * self.radius[contact.i] * v[2]
 
     def begin(self, i: int, leg: Leg) -> None:
         """Put body i on a new leg."""
@@ -196,22 +263,52 @@ class Bodies:
         self.table[i], self.shape[i] = row, shape_of(row)
         self.count[i] += 1
         self.leaning[i] = set()
+        self.gripping[i] = None
 
-    def acceleration(self, i: int) -> tuple[Number, Number]:
-        """ax, ay m/s2 of body i as it is held; sets what kind it is, too."""
+    def acceleration(self, i: int) -> tuple[Number, Number, Number]:
+        """ax, ay m/s2 and rad/s2 of body i as it is held; sets what kind it is, too."""
         kind, ax, ay = self.free[i]
+        rate = self.rates[i]
         walls = [c for c in self.held[i] if c.kind == "wall"]
         if len(self.held[i]) > 1 or len(walls) < len(self.held[i]):
             kind, ax, ay = STATIC, self.k.exact(0.0), self.k.exact(0.0)
         elif walls:
             _, _, tx, ty, _ = self.walls[walls[0].j]
-            along = tx * ax + ty * ay
+            along, load = tx * ax + ty * ay, -self.outward(walls[0], ax, ay)
             if kind == FALLING:
                 level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
                 kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
+            if self.matter.grip is not None and not (kind == STATIC and self.lies(i)):
+                kind = 2 + i
+                along, rate = self.rubbed(walls[0], along, load, self.matter.grip)
             ax, ay = along * tx, along * ty
         self.kind[i] = kind
-        return ax, ay
+        return ax, ay, rate
+
+    def lies(self, i: int) -> bool:
+        """Whether nothing asks for friction on a body that rests on a level wall: no slip and no
+        torque."""
+        return not self.sliding[i] and self.rates[i] is self.nought
+
+    def rubbed(
+        self, contact: Contact, along: Number, load: Number, grip: Grip
+    ) -> tuple[Number, Number]:
+        """m/s2 along a wall and rad/s2 of a disk that rests on it, with friction; notes if it
+        begins to slide.
+
+        along, load: m/s2, its acceleration along the wall without friction, and into it.
+        """
+        i, k, w = contact.i, self.k, self.matter.inverse_mass[contact.i]
+        # All per mass: of the friction 1 m/s2 along the wall is so much more of the slip.
+        softness, most = 1 + grip.softness(i) / w, grip.friction * load
+        driven = along + contact.side * self.radius[i] * self.rates[i]
+        if self.sliding[i]:
+            force = -self.sliding[i] * most
+        else:
+            force, rolls = limited(k, -driven / softness, most)
+            self.sliding[i] = 0 if rolls else k.sign(driven)
+        turning = contact.side * self.radius[i] * grip.inverse_inertia[i] * force / w
+        return along + force, self.rates[i] + turning
 
     def remember(self, touches: Sequence[Touch], collision: set[int]) -> None:
         """After the collisions of one instant: these contacts touch, exactly, and do not
@@ -251,8 +348,9 @@ class Bodies:
         return px + foot * tx - away * ty, py + foot * ty + away * tx
 
     def upright(self, one: Contact, other: Contact) -> bool:
-        """Whether two contacts with walls stand at right angles, exactly."""
-        if one.kind != "wall" or other.kind != "wall":
+        """Whether a collision on one of two walls leaves the speed across the other: they stand at
+        right angles, exactly, and there is no friction."""
+        if one.kind != "wall" or other.kind != "wall" or self.matter.grip is not None:
             return False
         direction = self.scene.walls[other.j, 1], self.scene.walls[other.j, 0]
         return square_to(self.scene.walls[one.j], *direction)

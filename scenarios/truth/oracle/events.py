@@ -46,6 +46,12 @@ class Motion:
         )
         self.thrusts = thrusts
         self.idle = 0
+        self.by_itself = {
+            "edge": self.wrap,
+            "end": self.leave,
+            "rest": self.stop,
+            "grip": self.roll,
+        }
 
     def run(self) -> Path:
         """Everything up to `until`, or up to where the motion has no answer."""
@@ -85,8 +91,8 @@ class Motion:
         i, contacts = self.next_contacts(soonest)
         if not contacts:
             self.predict(i)
-        elif len(contacts) == 1 and contacts[0].kind in ("edge", "end", "rest"):
-            {"edge": self.wrap, "end": self.leave, "rest": self.stop}[contacts[0].kind](contacts[0])
+        elif len(contacts) == 1 and contacts[0].kind in self.by_itself:
+            self.by_itself[contacts[0].kind](contacts[0])
         else:
             self.collide(contacts)
         return True
@@ -212,12 +218,16 @@ class Motion:
 
     def refuse_corners(self, contacts: Sequence[Contact]) -> None:
         """No answer where a disk that touches another comes to an edge of the wrap, or to the end
-        of its wall."""
+        of its wall, or stops to slide."""
+        comes = {
+            "edge": "comes to the edge of the wrap",
+            "end": "comes to the end of wall {}",
+            "grip": "slides no more along wall {}",
+        }
         for contact in contacts:
-            if contact.kind in ("edge", "end"):
-                end = f"the end of wall {contact.j}"
-                where = "the edge of the wrap" if contact.kind == "edge" else end
-                reason = f"disk {contact.i} comes to {where} while it touches another"
+            if contact.kind in comes:
+                what = comes[contact.kind].format(contact.j)
+                reason = f"disk {contact.i} {what} while it touches another"
                 raise Ends(float(self.now), reason, [contact.i])
 
     def after_one(self, touch: Touch, v: Velocities) -> Outcome:
@@ -257,11 +267,15 @@ class Motion:
         bounce = walls[0] if len(outcome.blows) == 1 and walls else None
         for i in sorted(touched):
             bodies.held[i] = tuple(c for c in bodies.held[i] if c in outcome.still)
-            v = outcome.velocities[i]
+            vx, vy, spin = outcome.velocities[i]
             for still in (c for c in outcome.still if c.kind == "wall" and c.i == i):
-                v = bodies.slide(still, *v)
-            bodies.fly(i, self.now, v, bounce)
+                vx, vy = bodies.slide(still, vx, vy)
+            if bodies.matter.grip is not None:
+                bodies.held[i] = ()  # whether it slides is asked when it is pressed onto that again
+            bodies.fly(i, self.now, (vx, vy, spin), bounce)
         bodies.remember(touches, touched)
+        if bounce is not None and outcome.blows[0].grips:
+            bodies.gripping[bounce.i] = bounce
         # What was carried by a disk that is struck is carried no longer.
         dropped = {
             i
@@ -297,8 +311,18 @@ class Motion:
         """The bounces of a disk on a wall have died out: it rests."""
         bodies, i = self.bodies, contact.i
         wall = contact._replace(kind="wall")
-        bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now))
+        bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now), True)
         self.rest(wall)
+        self.follow_up({i})
+
+    def roll(self, contact: Contact) -> None:
+        """A disk that slides along a wall with friction has lost its slip: it rolls, if friction is
+        enough for that."""
+        bodies, i, side = self.bodies, contact.i, contact.side
+        vx, vy, spin = bodies.velocity_at(i, self.now)
+        # The spin at which there is no slip, to all digits.
+        spin = spin - side * bodies.slip(contact, (vx, vy, spin)) / bodies.radius[i]
+        bodies.hold(i, self.now, bodies.held[i], (vx, vy, spin), True)
         self.follow_up({i})
 
     def leave(self, contact: Contact) -> None:
@@ -328,7 +352,7 @@ class Motion:
             )
             bodies.remember([self.ahead.touch(Contact("body", i, corner), self.now)], set())
         else:
-            bodies.hold(i, self.now, (following,), v)
+            bodies.hold(i, self.now, (following,), v, not bodies.sliding[i])
         self.follow_up({i})
 
     def wrap(self, contact: Contact) -> None:

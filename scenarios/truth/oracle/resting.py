@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.model import Array, Thrust
 from scenarios.no_truth import NoTruth
 from scenarios.truth.oracle.ahead import Ahead, collinear, key
-from scenarios.truth.oracle.bodies import FALLING, STATIC, Bodies, Hop, Leg, rational
+from scenarios.truth.oracle.bodies import FALLING, STATIC, Bodies, Hop, Leg, rational, square_to
 from scenarios.truth.oracle.filter import moved, touching
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact
@@ -35,14 +35,14 @@ def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust
     bodies, k, i = ahead.bodies, ahead.k, contact.i
     leg, wall = bodies.legs[i], bodies.walls[contact.j]
     fall = -bodies.outward(contact, leg.ax, leg.ay)
-    if k.sign(fall) <= 0:
+    if k.sign(fall) <= 0 or not slip_stays(ahead, contact, thrusts):
         return None
     speed = bodies.outward(contact, leg.vx, leg.vy)
     stop = now + 2 * speed / (fall * (1 - bodies.matter.restitution))
     vx, vy = along(bodies, contact, leg.vx, leg.vy)
     ax, ay = along(bodies, contact, leg.ax, leg.ay)
     hop = Hop(-contact.side * wall.ty, contact.side * wall.tx, speed, fall)
-    bounces = Leg(now, leg.x, leg.y, vx, vy, ax, ay, hop)
+    bounces = Leg(now, leg.x, leg.y, vx, vy, ax, ay, hop, turn=leg.turn)
     edges = [edge for thrust in thrusts if thrust.disk == i for edge in (thrust.start, thrust.stop)]
     if any(float(now) < edge <= float(stop) * SAFE for edge in edges):
         return None
@@ -51,6 +51,18 @@ def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust
     bodies.begin(i, bounces)
     bodies.asleep[i] = True
     return stop
+
+
+def slip_stays(ahead: Ahead, contact: Contact, thrusts: Sequence[Thrust]) -> bool:
+    """Whether friction does nothing in the bounces of a disk: there is none, or the disk bounces
+    without slip on a level wall, and nothing turns it."""
+    bodies, i = ahead.bodies, contact.i
+    if bodies.matter.grip is None:
+        return True
+    falls = bodies.free[i][0] == FALLING and square_to(
+        ahead.scene.walls[contact.j], ahead.scene.gravity
+    )
+    return falls and bodies.gripping[i] == contact and not any(p.torque for p in thrusts)
 
 
 def along(bodies: Bodies, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
@@ -78,7 +90,8 @@ def untouched(
     own = (np.hypot(vx, vy) + np.hypot(ax, ay) * left / 2) * left + rise
     states = np.array([moved(row, float(leg.t)) for row in table])
     heights = np.array([hop_height(each) for each in bodies.legs])
-    others = travel(bodies, states, left, thrusts)
+    energy = spin_energy(bodies, leg.t)
+    others = travel(bodies, states, left, thrusts, energy)
     distance = np.hypot(states[:, 0] - x, states[:, 1] - y) - bodies.radii - bodies.radii[i]
     slack = FAR * (np.abs(states[:, :2]).max() + 1)
     needed = (own + others) * SAFE
@@ -134,18 +147,29 @@ def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
     )
 
 
-def travel(bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust]) -> Array:
+def travel(
+    bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust], spins: float
+) -> Array:
     """(b,) m, how far each body gets within `left` s at most, from states (b, 6) as of `moved`; see
-    `untouched`."""
+    `untouched`. spins: J, that friction may make flight of."""
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
     accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
     acceleration = float(np.hypot(*bodies.scene.gravity)) + sum(accelerations)
     hops = np.array([0.0 if leg.hop is None else float(leg.hop.speed) ** 2 for leg in bodies.legs])
     energy = (mass[moves] * ((states[moves, 2:4] ** 2).sum(axis=1) + hops[moves])).sum() / 2
+    energy += spins
     speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * acceleration * left
     rise: Array = np.sqrt(2 / mass) * speed * left
     return rise
+
+
+def spin_energy(bodies: Bodies, now: Number) -> float:
+    """J, of all that turns, where there is friction; 0 where there is none."""
+    scene = bodies.scene
+    turns = np.isfinite(scene.inertia) & ~scene.static
+    spins = np.array([float(bodies.turn_at(i, now).spin) for i in range(scene.n)])
+    return float((scene.inertia[turns] * spins[turns] ** 2).sum() / 2)
 
 
 def hop_height(leg: Leg) -> float:
@@ -167,14 +191,15 @@ def press(ahead: Ahead, contact: Contact, now: Number) -> bool:
     if held:
         still = not bodies.table[i, 2:4].any()
         _, ax, ay = bodies.free[i]
-        if len(held) > 1 or held[0].kind != "wall":
+        if len(held) > 1 or held[0].kind != "wall" or bodies.matter.grip is not None:
             return False
         wedged = (
             still and bodies.k.sign(bodies.outward(held[0], *bodies.slide(contact, ax, ay))) < 0
         )
         if not wedged and not bodies.upright(held[0], contact):
             return False
-    bodies.hold(i, now, (*held, contact), along(bodies, contact, *v))
+    rolls = bodies.gripping[i] == contact and bodies.legs[i].t is now
+    bodies.hold(i, now, (*held, contact), (*along(bodies, contact, *v[:2]), v[2]), rolls)
     return True
 
 
@@ -194,6 +219,8 @@ def lie_down(ahead: Ahead) -> list[Contact]:
         for ends in ((c.i, c.j), (c.j, c.i))
     ]
     still = [not row.any() for row in bodies.table[:, 2:4]]
+    if bodies.matter.grip is not None:
+        pairs = []  # with friction more than one contact that lasts is refused
     while upper := next(
         (c for c in pairs if still[c.i] and not bodies.held[c.i] and _carries(bodies, c)), None
     ):

@@ -40,11 +40,13 @@ class EventTruth:
     def __call__(self, t: Array) -> Trajectory:
         """The answer at the times t (k,) s, increasing."""
         scene, thrusts = self.scenario.scene, self.scenario.thrusts
-        motion, collisions, _, _ = self.play(scene, np.asarray(t)[np.asarray(t) <= self.horizon])
+        within = np.asarray(t)[np.asarray(t) <= self.horizon]
+        motion, collisions, turning, _, _ = self.play(scene, within)
         reached = np.asarray(t)[: len(motion[0])]
-        turned = world_thrusts(scene, thrusts, reached)
         rows = [(float(at), int(i), int(j), float(impulse)) for at, i, j, impulse in collisions]
-        turning = (turned.angle, turned.angular_velocity)
+        if not scene.friction:
+            turned = world_thrusts(scene, thrusts, reached)
+            turning = (turned.angle, turned.angular_velocity)
         return answer(scene, reached, motion, rows, turning, self.horizon, ERROR_BOUND)
 
     @property
@@ -61,11 +63,11 @@ class EventTruth:
     def ended(self) -> tuple[float, str]:
         """Until when the runs from nearby starts agree, s, and why no longer."""
         scene, times = self.scenario.scene, self.scenario.times
-        (position, _), _, end, reason = self.play(scene, times)
+        (position, _), _, _, end, reason = self.play(scene, times)
         agree = len(position)
         for seed in range(PERTURBATIONS):
             try:
-                (other, _), _, _, _ = self.play(perturbed(scene, seed), times[:agree])
+                (other, _), _, _, _, _ = self.play(perturbed(scene, seed), times[:agree])
             except (
                 NoTruth
             ):  # disks that touch may overlap when they are moved by a unit in the last place
@@ -84,12 +86,13 @@ class EventTruth:
             "float64 cannot decide: a start one unit in the last place away leads elsewhere",
         )
 
-    def play(self, scene: Scene, t: Array) -> tuple[Motion, Array, float, str]:
+    def play(self, scene: Scene, t: Array) -> tuple[Motion, Array, Motion, float, str]:
         """Position and velocity (k, n, 2) at as many of the times as are reached, collisions (h,
-        4); when and why it ends."""
+        4); angles and spins (k, n) as friction has them; when and why it ends."""
         engine = EventEngine(scene)
         edges = {edge for thrust in self.scenario.thrusts for edge in (thrust.start, thrust.stop)}
         seen: list[tuple[Array, Array]] = []
+        turned: list[tuple[Array, Array]] = []
         end, reason = np.inf, ""
         try:
             for at in sorted(
@@ -99,13 +102,15 @@ class EventTruth:
                 if at in edges:
                     self.set_accelerations(engine, scene, at)
                 seen += [engine.look(at)] * int((t == at).sum())
+                turned += [engine.look_turned(at)] * int((t == at).sum())
         except NoTruth as refusal:
             end, reason = refusal.at, str(refusal)
         shape = (len(seen), scene.n, 2)
         position, velocity = (
             np.array([look[part] for look in seen]).reshape(shape) for part in range(2)
         )
-        return (position, velocity), engine.collisions, end, reason
+        turning = tuple(np.array([each[k] for each in turned]).reshape(shape[:2]) for k in (0, 1))
+        return (position, velocity), engine.collisions, (turning[0], turning[1]), end, reason
 
     def set_accelerations(self, engine: EventEngine, scene: Scene, at: float) -> None:
         """Give every disk under a thrust the acceleration it has from `at` s on."""

@@ -40,8 +40,9 @@ def test_the_closed_forms_are_met_up_to_the_horizon(name):
     for field, tolerance in (
         ("position", 1e-12),
         ("velocity", 2e-12),
-        ("angle", 1e-14),
-        ("angular_velocity", 1e-14),
+        # Nothing changes a spin, but where there is friction.
+        ("angle", 1e-12 if run.scene.friction else 1e-14),
+        ("angular_velocity", 1e-12 if run.scene.friction else 1e-14),
     ):
         np.testing.assert_allclose(
             getattr(found, field)[:k], getattr(exact, field)[:k], rtol=0, atol=chaos * tolerance

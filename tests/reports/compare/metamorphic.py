@@ -77,6 +77,7 @@ class Change:
             radius=self.length * scene.radius[order],
             mass=self.mass * scene.mass[order],
             restitution=scene.restitution,
+            friction=scene.friction,
             angle=(self.flip * scene.angle + self.turn)[order],
             angular_velocity=(self.flip / self.time * scene.angular_velocity)[order],
             inertia=self.mass * self.length**2 * scene.inertia[order],

@@ -109,7 +109,17 @@ def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_
 
 
 @pytest.mark.parametrize(
-    "name", ["falling_box", "gas_of_100", "oblique_e09", "asteroids", "galperin_31"]
+    "name",
+    [
+        "falling_box",
+        "gas_of_100",
+        "oblique_e09",
+        "asteroids",
+        "galperin_31",
+        "frictional_box",
+        "spinning_disks_meet",
+        "spin_to_flight_and_back",
+    ],
 )
 def test_collisions_take_the_energy_and_the_walls_the_momentum_that_the_truth_loses(name: str):
     """What the jumps say, added up from the start, is what the truth has less."""

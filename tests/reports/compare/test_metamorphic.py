@@ -98,11 +98,28 @@ SCENES: dict[str, Callable[[], Scenario]] = {
     "wrapped": lambda: asked(
         "wrapped", crowd(restitution=0.9, wrap=[[-3.0, -2.0], [3.0, 2.0]]), 1.0, 0.02
     ),
+    # One slides on the floor until it rolls, the other bounces.
+    "rough": lambda: asked(
+        "rough",
+        lay_out(
+            position=[[0.0, 0.25], [3.0, 1.0]],
+            velocity=[[1.0, 0.0], [1.5, 0.0]],
+            radius=[0.25, 0.5],
+            mass=[1.0, 2.0],
+            angular_velocity=[0.0, 3.0],
+            restitution=0.5,
+            friction=0.2,
+            walls=[[[-2.0, 0.0], [9.0, 0.0]]],
+            gravity=[0.0, -9.81],
+        ),
+        0.7,
+        0.02,
+    ),
 }
 
 # What a change cannot be asked of: a moving frame moves walls, what stands still and gravity's
 # energy; the wrap stands along the axes and is as long as it is.
-WALLED = ("elastic", "room", "falling", "grid", "thrust to the walls", "wrapped")
+WALLED = ("elastic", "room", "falling", "grid", "thrust to the walls", "wrapped", "rough")
 LEFT_OUT = {("boosted", name) for name in WALLED} | {
     (name, "wrapped") for name in ("turned", "turned by a quarter and mirrored")
 }

@@ -12,12 +12,14 @@ import pytest
 from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
-from reports.compare.comparison import Comparison
+from adapters.play import play
+from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
+from reports.page.page import situated, summaries
 from reports.page.pooled import scores
-from reports.page.situations import CROWDS, FLIGHT, ROWS, SINGLE, SPIN, STACKS
+from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
 from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened
@@ -54,6 +56,51 @@ def test_without_an_answer_all_disks_may_meet():
     """Twenty disks are then a crowd, two are not."""
     assert situations.situations_of(scenario("gas_of_100"), None)[0] == CROWDS
     assert situations.situations_of(scenario("head_on_equal_e1"), None)[0] == SINGLE
+
+
+@pytest.fixture(scope="module")
+def with_friction() -> tuple[list[Comparison], list[Comparison]]:
+    """Comparisons of two scenes without friction and of two with it, each through two engines."""
+
+    def compared(name: str) -> Comparison:
+        names = ["reference:exercise", "pymunk:matched"]
+        names += ["reference:coulomb"] if scenario(name).scene.friction else []
+        one = replace(scenario(name), substeps=(1, 2))
+        runs = [
+            play(ENGINES[row].make(), row, one, dt) for row in names for dt in map(one.dt, (1, 2))
+        ]
+        return compare(one, runs)
+
+    smooth = [compared("head_on_equal_e09"), compared("oblique_e09")]
+    return smooth, [compared("friction_bounce_e1_mu01"), compared("slip_to_roll")]
+
+
+def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
+    """Summary, situations and findings of a run without them are to the letter those of one with
+    them; what they add stands behind."""
+    smooth, rough = with_friction
+    alone, both = (summaries(each, apart, set()) for each, apart in ((smooth, []), with_friction))
+    assert both[0] == alone[0]
+    assert [table.scenes for table in both] == [2, 2]
+    assert both[1].rows["reference:exercise"][-1].text == "2 of 2"
+    assert situations.by_friction([*smooth, *rough]) == with_friction
+    assert situations.by_friction(rough) == (rough, [])
+
+    whole = [*smooth, *rough]
+    rows, few = (
+        situations.answers(scores(each), situated(each), set()) for each in (whole, smooth)
+    )
+    assert rows[-1].title == FRICTION
+    assert rows[:-1] == few
+    assert situations.whole(rows) == few[-1]
+
+    said, less = (findings.findings(each, set()) for each in (whole, smooth))
+    assert said[:-1] == less
+    assert said[-1].startswith("With friction, in scenes that nothing above counts: Closest to")
+    # the control: in one heap, the medians would be others
+    names = overview.names_of(smooth)
+    heap = overview.summary(whole, names, set())
+    assert heap["pymunk:matched"][0].value != alone[0].rows["pymunk:matched"][0].value
 
 
 def score(errors: dict[str, list[float]]) -> pd.DataFrame:

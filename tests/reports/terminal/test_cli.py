@@ -75,7 +75,7 @@ def test_a_run_writes_its_files(small_run: Path):
     assert set(runs.status) == {"ok"}
     assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
     assert "header" in lines[0]
-    assert lines[-1]["footer"]["tasks"] == 8 + 4  # and the conformance of four engines
+    assert lines[-1]["footer"]["tasks"] == 8 + 5  # and the conformance of five engines
     assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
     assert (small_run / "report.html").stat().st_size < 8e6
 

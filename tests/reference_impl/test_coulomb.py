@@ -1,0 +1,218 @@
+"""`reference:coulomb` and `reference:ordered` with friction: the impact law of two disks, and one
+disk that slides and rolls."""
+
+from __future__ import annotations
+
+from math import atan, cos, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapters.engine import Unsupported
+from adapters.engines import ENGINES
+from adapters.play import play
+from adapters.reference import Reference
+from reference_impl import coulomb, exercise, lesson, neighbours, ordered
+from scenarios.catalogue import scenario
+from scenarios.model import Scene
+
+ROUNDING = 2.0**-53
+FLOOR = [[[-8.0, 0.0], [8.0, 0.0]]]
+
+
+def after(scene, t, dt, variant):
+    """The state after t s."""
+    engine = Reference(variant)
+    engine.load(scene, dt)
+    engine.step(round(t / dt))
+    return engine.read()
+
+
+@pytest.mark.parametrize("name", ["asteroids", "box_billiard", "disk_between_static_disks"])
+def test_with_friction_0_it_is_the_exercise_to_the_bit(name):
+    """Pairs, walls, the wrap, static disks, forces."""
+    scene = scenario(name)
+    one, other = (
+        play(Reference(variant), "one:run", scene, scene.dt(2)).trajectory
+        for variant in (exercise, coulomb)
+    )
+    for what in ("position", "velocity", "angle", "angular_velocity"):
+        assert getattr(one, what).tobytes() == getattr(other, what).tobytes()
+    assert one.collisions.impulse.tobytes() == other.collisions.impulse.tobytes()
+
+
+@pytest.mark.parametrize("variant", [exercise, neighbours, lesson])
+def test_what_the_exercise_and_the_lesson_ask_for_has_no_friction(variant):
+    """They say so, and play nothing."""
+    with pytest.raises(Unsupported, match=r"does not model friction, the scene has 0\.3"):
+        Reference(variant).load(thrown(0.5, 0.3), 0.01)
+
+
+def thrown(e, mu):
+    """A solid disk of 1 kg and 0.25 m that meets a floor at (5, -5) m/s."""
+    return Scene(
+        position=[[-4.0, 1.0]],
+        velocity=[[5.0, -5.0]],
+        radius=[0.25],
+        mass=[1.0],
+        restitution=e,
+        friction=mu,
+        walls=FLOOR,
+    )
+
+
+@pytest.mark.parametrize("variant", [coulomb, ordered])
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 0.5, 2.0])
+def test_a_bounce_takes_up_coulombs_impulse(variant, e, mu):
+    """mu (1 + e) m v_n while it slides, v_t / (1/m + r2/I) = v_t / 3 if it ends rolling; turning
+    clockwise."""
+    end = after(thrown(e, mu), 0.5, 1 / 60, variant)
+    J = min(mu * (1 + e) * 5.0, 5.0 / 3)
+    # The normal of a floor of 16 m is known to some roundings of 16 m over a radius, and turns
+    # velocities and the impulse by as much.
+    tilt = 8 * ROUNDING * 16 / 0.25
+    assert end.velocity[0] == pytest.approx([5.0 - J, 5.0 * e], abs=10 * tilt)
+    assert end.angular_velocity[0] == pytest.approx(-J * 0.25 / (1 / 32), abs=80 * tilt)
+
+
+@given(
+    e=st.floats(0.1, 1),  # at 0 they stay together, and touch again and again by rounding
+    mu=st.floats(0, 3),
+    spins=st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
+    offset=st.floats(-0.6, 0.6),
+    masses=st.tuples(st.floats(0.1, 10), st.floats(0.1, 10)),
+)
+def test_two_disks_that_rub_keep_momentum_and_angular_momentum_and_make_no_energy(
+    e, mu, spins, offset, masses
+):
+    """And the impulse along the surfaces is at most mu times that along the normal."""
+    scene = Scene(
+        position=[[-0.65, offset / 2], [0.65, -offset / 2]],
+        velocity=[[3.0, 0.0], [-2.0, 0.5]],
+        angular_velocity=spins,
+        radius=[0.25, 0.5],
+        mass=masses,
+        restitution=e,
+        friction=mu,
+    )
+    engine = Reference(ordered)
+    engine.load(scene, 1.0)
+    engine.step()
+    before, end = scene.state, engine.read()
+    assert len(engine.collisions()) == 1
+    # Some twenty products of up to 10 kg, 5 m/s and 50 rad/s.
+    digits = 200 * ROUNDING
+    assert quantities(scene, end) == pytest.approx(quantities(scene, before), rel=digits, abs=1e-12)
+    assert energy(scene, end) <= energy(scene, before) * (1 + digits)
+
+    taken = scene.mass[0] * (end.velocity[0] - before.velocity[0])
+    normal = engine.collisions()[0].impulse
+    along = np.sqrt(max(taken @ taken - normal**2, 0.0))
+    assert along <= mu * normal * (1 + 1e-6) + 1e-6  # the root of a difference halves the digits
+
+
+def quantities(scene, state):
+    """Momentum and angular momentum about the origin."""
+    x, v, m = state.position, state.velocity, scene.mass
+    turning = m * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) + scene.inertia * state.angular_velocity
+    return [*(m @ v), turning.sum()]
+
+
+def energy(scene, state):
+    """J, of motion."""
+    speed2 = (state.velocity**2).sum(axis=1)
+    return float((scene.mass @ speed2 + scene.inertia @ state.angular_velocity**2) / 2)
+
+
+def placed(mu, slope=0.0, speed=0.0, spin=0.0, e=0.0):
+    """A disk of 0.25 m on a floor, or on a slope that falls to the right by that angle."""
+    return Scene(
+        position=[[0.0, 0.25]],
+        velocity=[[speed, 0.0]],
+        angular_velocity=[spin],
+        radius=[0.25],
+        mass=[1.0],
+        restitution=e,
+        friction=mu,
+        gravity=[10 * sin(slope), -10 * cos(slope)],
+        walls=FLOOR,
+    )
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize("rate", [16, 60, 960])
+def test_ordered_slides_and_then_rolls_as_the_closed_form(e, rate):
+    """-mu g for v0 / (3 mu g) = 1/2 s, then 2/3 v0, whether that is a whole number of steps or
+    not."""
+    scene = placed(0.2, speed=3.0, e=e)
+    for t in (0.25, 1.0):
+        end, slid = after(scene, t, 1 / rate, ordered), min(t, 0.5)
+        # Each of 960 steps rounds places of metres, and a normal of a floor of 16 m.
+        assert end.position[0, 0] == pytest.approx(
+            3 * slid - slid**2 + 2 * (t - slid), abs=rate * 100 * ROUNDING
+        )
+        assert end.velocity[0, 0] == pytest.approx(3 - 2 * slid, abs=rate * 100 * ROUNDING)
+        assert end.angular_velocity[0] == pytest.approx(-16 * slid, abs=rate * 800 * ROUNDING)
+
+
+def test_ordered_changes_from_sliding_to_rolling_within_a_step():
+    """At 0.5 s, in the middle of a step of 1/15 s: position and angle as if there were no steps."""
+    end = after(placed(0.2, speed=3.0), 1.0, 1 / 15, ordered)
+    assert end.position[0, 0] == pytest.approx(2.25, abs=100 * ROUNDING)
+    assert end.angle[0] == pytest.approx(-(8 * 0.25 + 8 * 0.5), abs=800 * ROUNDING)
+
+
+@pytest.mark.parametrize("variant", [coulomb, ordered])
+def test_backspin_brings_a_disk_back(variant):
+    """At 1 m/s with 20 rad/s of backspin it ends rolling at (2 v0 - r w) / 3 = -1 m/s."""
+    end = after(placed(0.2, speed=1.0, spin=20.0), 2.0, 1 / 60, variant)
+    assert end.velocity[0, 0] == pytest.approx(-1.0, abs=1e-10)
+    assert end.angular_velocity[0] == pytest.approx(4.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("variant", [coulomb, ordered])
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_on_a_slope_a_disk_rolls_up_to_three_times_the_friction(variant, share):
+    """tan(angle) <= mu (1 + m r2/I): g sin / (1 + 1/2) down to there, g (sin - mu cos) beyond."""
+    mu = 0.2
+    slope = atan(share * 3 * mu)
+    end = after(placed(mu, slope), 0.5, 1 / 60, variant)
+    rolling, sliding = sin(slope) / 1.5, sin(slope) - mu * cos(slope)
+    speed = 5 * (rolling if share < 1 else sliding)
+    spin = -speed / 0.25 if share < 1 else -5 * mu * cos(slope) * 8
+    assert end.velocity[0, 0] == pytest.approx(speed, abs=1e-11)
+    assert end.angular_velocity[0] == pytest.approx(spin, abs=1e-10)
+
+
+def test_a_static_disk_is_rubbed_but_does_not_turn():
+    """Mass and inertia without end."""
+    scene = Scene(
+        position=[[0.0, 0.0], [1.2, 0.1]],
+        velocity=[[0.0, 0.0], [-2.0, 1.0]],
+        radius=[0.5, 0.5],
+        mass=[np.inf, 1.0],
+        restitution=0.5,
+        friction=0.4,
+    )
+    for variant in (coulomb, ordered):
+        end = after(scene, 0.5, 1 / 64, variant)
+        assert end.angular_velocity[0] == 0.0
+        assert (end.position[0] == 0.0).all()
+        assert end.angular_velocity[1] != 0.0
+
+
+def test_a_torque_turns_a_disk_on_a_floor_into_motion():
+    """What rolls under a torque M moves at a = M r / (I + m r2)."""
+    engine = ENGINES["reference:ordered"].make()
+    engine.load(placed(0.5), 1 / 64)
+    for _ in range(64):
+        engine.apply_force(0, np.zeros(2), 0.3)
+        engine.step()
+    end = engine.read()
+    speed = -0.3 * 0.25 / (1 / 32 + 1 / 16)
+    # 64 steps round
+    assert end.velocity[0, 0] == pytest.approx(speed, abs=1e-12)
+    assert end.angular_velocity[0] == pytest.approx(-speed / 0.25, abs=1e-11)
