@@ -17,3 +17,7 @@ pasted = njit(cache=True, error_model="numpy", forceinline=True)
 # it calls private. It is pasted where it is called, because handing over all the arrays takes
 # longer than most kernels do.
 kernel = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[call-overload]
+
+# What calls nearly all of a solver is typed and optimised with its caller alone: as a function of
+# its own, everything below it would be compiled once more for each of them.
+merged = njit(cache=True, error_model="numpy", inline="always")

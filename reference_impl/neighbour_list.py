@@ -222,8 +222,10 @@ def sort_into_cells(x, radius, side: float) -> Cells:  # type: ignore[no-untyped
         start[of[i] + 1] += 1
         disk[q], number[q] = i, of[i]
         place[q, 0], place[q, 1], place[q, 2] = x[i, 0], x[i, 1], radius[i]
-    start[count + 1 :] = n + start[1:3]
-    disk[n:], place[n:] = disk[: m - n], place[: m - n]
+    start[count + 1], start[count + 2] = n + start[1], n + start[2]
+    for q in range(n, m):
+        disk[q] = disk[q - n]
+        place[q, 0], place[q, 1], place[q, 2] = place[q - n, 0], place[q - n, 1], place[q - n, 2]
     return Cells(row, start, disk, number, place)
 
 

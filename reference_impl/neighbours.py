@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_impl import exercise
-from reference_impl.compiled import compiled, kernel, pasted
+from reference_impl.compiled import compiled, kernel, merged, pasted
 from reference_impl.exercise import (
     collide,
     collide_wall,
@@ -51,7 +51,7 @@ class Kicks(NamedTuple):
     strongest: float  # m: no disk moves by more in a step than it did in the one before
 
 
-@pasted
+@merged
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """As `exercise.advance`, to the bit."""
     if len(disks.radius) * count < WORTH:
@@ -61,7 +61,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return collisions
 
 
-@compiled
+@merged
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> None:
     """Advance by near pairs, however few the disks and steps are."""
     kicks, k = kicks_of(disks, world, dt), 0

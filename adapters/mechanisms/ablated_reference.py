@@ -26,7 +26,7 @@ from adapters.mechanisms.contacts import (
     rub,
     turn,
 )
-from reference_impl.compiled import compiled
+from reference_impl.compiled import compiled, merged
 from reference_impl.coulomb import collide, collide_wall
 from reference_impl.exercise import touching, touching_wall, wrap
 from reference_impl.state import Disks, World
@@ -105,7 +105,9 @@ def advance(
     does."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
     for k in range(count):
-        kept.start[:], kept.moved[:], kept.turned[:] = disks.position, 0.0, 0.0
+        for i in range(len(disks.mass)):
+            kept.start[i, 0], kept.start[i, 1] = disks.position[i, 0], disks.position[i, 1]
+        kept.moved[:], kept.turned[:] = 0.0, 0.0
         for stage in on.order:
             act(stage, disks, world, on, kept, h, k, collisions)
         for c in range(kept.found[0]):
@@ -115,7 +117,7 @@ def advance(
     return collisions
 
 
-@compiled
+@merged
 def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of functions
     stage: int,
     disks: Disks,

@@ -70,7 +70,7 @@ def copy_of(disks):
     return type(disks)(*(array.copy() for array in disks))
 
 
-@njit
+@njit(cache=True)
 def by_list(disks, world, dt, count):
     """As `neighbours.advance`, however few the disks and steps are."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
@@ -86,7 +86,7 @@ def listed(disks, world, left=LASTS, dt=DT):
     return near
 
 
-@njit
+@njit(cache=True)
 def collide_once(disks, world, near, k, count):
     """The collisions of one step of which the list is given."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]
