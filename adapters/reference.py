@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -72,15 +73,18 @@ class Reference:
             **self.options,
         )
         kept: Array = disks_block(disks).astype(self.precision)
-        blocks: tuple[Array, Array] = kept, world_block(world)
-        self.disks, self.world = disks_of(blocks[0]), world_of(blocks[1])
-        self.advance: Callable[..., Any] = self.variant.advance
-        self.entered: tuple[Any, Any] = self.disks, self.world
-        # what somebody else has written may have no quicker way in
-        if self.variant.__name__ in ADVANCE:
-            self.advance, self.entered = ADVANCE[self.variant.__name__], blocks
+        laws = world_block(world, dt)
+        self.disks, self.world = disks_of(kept), world_of(laws)
+        self.advance = self._entered(kept, laws)
         self.forced = False
-        self._advance(0)  # compiles, if nobody has yet
+        self.advance(0)  # compiles, if nobody has yet
+
+    def _entered(self, disks: Array, world: Array) -> Callable[[int], Iterable[Any]]:
+        """What takes so many steps and returns the collisions, by the two blocks; what somebody
+        else has written may have no such quick way in."""
+        if self.variant.__name__ in ADVANCE:
+            return partial(ADVANCE[self.variant.__name__], disks, world)
+        return partial(self.variant.advance, self.disks, self.world, self.dt)
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to the disk's force and torque; `step` clears both."""
@@ -91,19 +95,20 @@ class Reference:
     def step(self, count: int = 1) -> None:
         """One call into the compiled solver; a force lasts for the first step only."""
         if self.forced:
-            self._advance(1)
+            self._keep(self.advance(1))
             self.disks.force.fill(0.0)
             self.disks.torque.fill(0.0)
             self.forced = False
-            count -= 1
-        self._advance(count)
-
-    def _advance(self, count: int) -> None:
-        done = self.steps
-        collisions = self.advance(*self.entered, self.dt, count)
-        if collisions and self.listening:
-            self.log += [ContactImpulse(done + k, i, j, impulse) for k, i, j, impulse in collisions]
+            self.steps, count = self.steps + 1, count - 1
+        if collisions := self.advance(count):
+            self._keep(collisions)
         self.steps += count
+
+    def _keep(self, collisions: Iterable[Any]) -> None:
+        if self.listening:
+            self.log += [
+                ContactImpulse(self.steps + k, i, j, impulse) for k, i, j, impulse in collisions
+            ]
 
     def read(self) -> State:
         """Copies of the solver's arrays."""

@@ -1,8 +1,8 @@
 """Disks and world packed into one array each, so that a call of compiled code takes less time.
 
-A call takes about 0.1 us for each array, because numba checks each argument in Python. With the 17
-fields of `Disks` and `World` that was four times the time of a step of 21 disks. Who calls
-often keeps one block of each, and the functions of `ADVANCE` unpack them in compiled code. A
+A call takes about 0.1 us for each array or number, because numba checks each argument in Python.
+With the 17 fields of `Disks` and `World` that was four times the time of a step of 21 disks. Who
+calls often keeps one block of each, and the functions of `ADVANCE` unpack them in compiled code. A
 pointer (numba's cfunc through ctypes) was slower than two arrays.
 """
 
@@ -20,9 +20,10 @@ def disks_block(disks: Disks) -> np.ndarray:
     return np.concatenate([array.reshape(-1) for array in disks])
 
 
-def world_block(world: World) -> np.ndarray:
-    """(10 + 4w,): a copy of all fields, the walls last; `world_of` gives views of it."""
-    free = [world.restitution, world.friction, world.split, world.approaching_only]
+def world_block(world: World, dt: float) -> np.ndarray:
+    """(11 + 4w,): the size of a step in s, then a copy of all fields, the walls last; `world_of`
+    gives views of it."""
+    free = [dt, world.restitution, world.friction, world.split, world.approaching_only]
     return np.concatenate([free, world.gravity, world.low, world.high, world.walls.reshape(-1)])
 
 
@@ -48,45 +49,45 @@ def disks_of(block) -> Disks:  # type: ignore[no-untyped-def]
 def world_of(block) -> World:  # type: ignore[no-untyped-def]
     """The world that a block holds."""
     return World(
-        restitution=block[0],
-        friction=block[1],
-        gravity=block[4:6],
-        walls=block[10:].reshape(((len(block) - 10) // 4, 2, 2)),
-        low=block[6:8],
-        high=block[8:10],
-        split=int(block[2]),
-        approaching_only=block[3] != 0.0,
+        restitution=block[1],
+        friction=block[2],
+        gravity=block[5:7],
+        walls=block[11:].reshape(((len(block) - 11) // 4, 2, 2)),
+        low=block[7:9],
+        high=block[9:11],
+        split=int(block[3]),
+        approaching_only=block[4] != 0.0,
     )
 
 
 @compiled
-def exercise_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+def exercise_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
     """`exercise.advance` of two blocks."""
-    return exercise.advance(disks_of(disks), world_of(world), dt, count)
+    return exercise.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def neighbours_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+def neighbours_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
     """`neighbours.advance` of two blocks."""
-    return neighbours.advance(disks_of(disks), world_of(world), dt, count)
+    return neighbours.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def coulomb_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+def coulomb_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
     """`coulomb.advance` of two blocks."""
-    return coulomb.advance(disks_of(disks), world_of(world), dt, count)
+    return coulomb.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def lesson_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+def lesson_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
     """`lesson.advance` of two blocks."""
-    return lesson.advance(disks_of(disks), world_of(world), dt, count)
+    return lesson.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 @compiled
-def ordered_advance(disks, world, dt: float, count: int) -> list:  # type: ignore[no-untyped-def]
+def ordered_advance(disks, world, count: int) -> list:  # type: ignore[no-untyped-def]
     """`ordered.advance` of two blocks."""
-    return ordered.advance(disks_of(disks), world_of(world), dt, count)
+    return ordered.advance(disks_of(disks), world_of(world), world[0], count)
 
 
 ADVANCE: dict[str, Callable[..., list]] = {  # by the variant's module

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import ContactImpulse
 from adapters.mechanisms import ablated_reference
 from adapters.mechanisms.ablated_reference import STAGES, Parameters
 from adapters.mechanisms.contacts import no_contacts
 from adapters.reference import Reference
-from scenarios.model import Scene
+from scenarios.model import Array, Scene
 
 EXERCISE = ("accelerate", "move", "pairs", "walls")
 POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
@@ -105,17 +104,16 @@ class AblatedReference(Reference):
             friction=float(scene.friction if self.friction is None else self.friction),
         )
 
-    def _advance(self, count: int) -> None:
+    def _entered(self, *_: Array) -> Callable[[int], list[Any]]:
+        return self._advance
+
+    def _advance(self, count: int) -> list[Any]:
+        """The collisions of `count` steps; the solver counts substeps."""
         h = self.precision(self.dt / self.moves)
         collisions = ablated_reference.advance(
             self.disks, self.world, self.on, self.kept, h, count * self.substeps
         )
-        if self.listening:
-            self.log += [
-                ContactImpulse(self.steps + k // self.substeps, i, j, impulse)
-                for k, i, j, impulse in collisions
-            ]
-        self.steps += count
+        return [(k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """What is enabled."""
