@@ -4,6 +4,7 @@ enabled or disabled."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,7 @@ MIXING: dict[str, Callable[[float, float], float]] = {
     "the smaller": min,
     "the mean": lambda a, b: (a + b) / 2,
     "the product": lambda a, b: a * b,
+    "the root of the product": lambda a, b: sqrt(a * b),
 }
 
 

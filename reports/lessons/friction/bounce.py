@@ -200,7 +200,8 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
         Claim(
             "The contact sticks where |v_t + r ω| is at most (1 + m r²/I) µ (1 + e) v_n ="
             f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in"
-            " proportion to the slip. Where the slip is larger the impulse stays on the edge of the cone.",
+            " proportion to the slip. Where the slip is larger the impulse stays on the edge of"
+            " the cone.",
             lambda shown: np.abs(shown.y(TRUTH, 1) - exact).max() <= DOUBLE,
         ),
         Claim(
@@ -312,8 +313,8 @@ BOUNCE = Lesson(
             "Friction acts against the slip. An impulse of <code>|slip| / (1/m + r²/I)</code> ends"
             " it: the contact <b>sticks</b>. Coulomb's law allows at most <code>µ J_n</code>, the"
             " edge of the <b>friction cone</b>. If that does not end the slip, the contact"
-            " <b>slips</b> until the disk leaves. [cone] and [lever] show why Box2D differs;"
-            " [rolling] has the same law in a contact that lasts."
+            " <b>slips</b> until the disk leaves. See [cone] and [lever] for why Box2D differs, and"
+            " [rolling] for a contact that lasts."
         ),
     ),
     sliders=(

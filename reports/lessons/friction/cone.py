@@ -79,7 +79,7 @@ def cone_claims(mu: float, whole: bool, dt: float) -> list[Claim]:
             ),
         ),
         Claim(
-            f"Exact is a friction impulse of µ = {number(mu)} of the normal impulse at every e;"
+            f"The exact friction impulse is µ = {number(mu)} of the normal impulse at every e."
             f" {ROUGH} gives it.",
             # Velocities of 8 m/s that float64 rounds a few times.
             lambda shown: shown.gap(ROUGH) <= 1e-13 and np.ptp(shown.y(TRUTH)) == 0.0,
@@ -113,7 +113,7 @@ CONE = Lesson(
             " friction acts up to <code>µ</code> times the normal impulse of this part,"
             " <code>m v_n</code>. In the second part, restitution adds <code>e m v_n</code>, and"
             " friction does not act again. The friction cone is that of a collision with"
-            " <code>e = 0</code>; [friction] explains the cone."
+            " <code>e = 0</code>. See [friction] for what the cone is."
         ),
         (
             "The ablated reference plays with the mechanisms of Box2D 3.1. Switch what limits its"

@@ -106,8 +106,8 @@ LEVER = Lesson(
             "A friction impulse at the surface of a disk turns it with the lever arm"
             " <code>r</code>. A wall of Box2D 2.3 has a <b>skin</b> of 10 mm. A contact is found at"
             " the end of a step, when disk and skin overlap, and friction acts in the middle of the"
-            " overlap, within the disk. The skin is a length in the units of the scene: a small disk"
-            " feels it most."
+            " overlap, within the disk. The skin is a length in the units of the scene: it matters"
+            " most for a small disk."
         ),
         (
             "That point has another slip than the surface. When a disk rolls, its surface does not"

@@ -30,7 +30,7 @@ SPEED, RADIUS, SECONDS = 2.0, 0.25, 4.0  # m/s at the start, m, s
 SOLID = 2.0  # m r² / I
 # m/s: 960 steps that each round velocities of up to 8 m/s in float64.
 DOUBLE = 960 * 8 * 2.0**-53
-STILL = 1e-16  # m/s, what 0 is drawn as
+STILL = 1e-16  # m/s, as low as a logarithmic axis goes
 
 
 def show_rolling(settings: Settings) -> Shown:
@@ -62,7 +62,7 @@ def show_rolling(settings: Settings) -> Shown:
             LessonChart(
                 "Slip at rest",
                 "time in s",
-                f"|v + r ω| in m/s, 0 drawn as {number(STILL)}",
+                "|v + r ω| in m/s, 0 at the foot",
                 played.curves(lambda each: np.maximum(np.abs(slip(each)), STILL)),
                 "y",
                 guides=guides,
@@ -133,7 +133,7 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
     if not rolls:
         return [
             Claim(
-                f"The disk rolls from the start, v = -r ω = {number(SPEED)} m/s: the point that"
+                f"The disk rolls from the start, v = −r ω = {number(SPEED)} m/s: the point that"
                 " touches is at rest, nothing rubs, and the exact velocity stays.",
                 lambda shown: (
                     np.abs(shown.y(TRUTH) - SPEED).max() <= DOUBLE
@@ -157,7 +157,7 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
         "stops": "stands still: the spin was just enough to stop it",
         "returns": "has turned back",
     }["stops" if abs(end) <= DOUBLE else "rolls" if end > 0 else "returns"]
-    rule = "2/3 v₀" if not spin else "(2 v₀ - r ω₀)/3"
+    rule = "2/3 v₀" if not spin else "(2 v₀ − r ω₀)/3"
     when = "v₀/(3 µ g)" if not spin else "(v₀ + r ω₀)/(3 µ g)"
     return [
         Claim(
@@ -187,7 +187,11 @@ def mixed_claim(spin: float, mu: float, dt: float) -> Claim:
             f"{SHIPPED} rolls, too: where nothing slides, no coefficient matters.",
             lambda shown: shown.gap(SHIPPED) <= DOUBLE,
         )
-    when = f"at {number(rolls)} s" if rolls < SECONDS else f"at {number(rolls)} s, after the end"
+    when = (
+        f"at {number(rolls)} s"
+        if rolls < SECONDS
+        else f"at {number(rolls)} s, after the end of the replay"
+    )
     return Claim(
         f"{SHIPPED} multiplies the coefficients of floor and disk: its friction is µ² ="
         f" {number(mixed)}. It begins to roll 1/µ = {number(1 / mu)} times as late, {when}.",
@@ -263,8 +267,8 @@ ROLLING = Lesson(
             " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] tries the rules."
         ),
         (
-            "The last chart shows the <b>slip at rest</b>, what is left when the disk should roll;"
-            " [lever] explains that of Box2D 2.3."
+            "The last chart shows the <b>slip at rest</b>, what is left when the disk should roll."
+            " See [lever] for that of Box2D 2.3."
         ),
     ),
     sliders=(
