@@ -49,8 +49,8 @@ MIXING: dict[str, Callable[[float, float], float]] = {
     "the larger": max,
     "the smaller": min,
     "the mean": lambda a, b: (a + b) / 2,
-    "the product": lambda a, b: a * b,
     "the root of the product": lambda a, b: sqrt(a * b),
+    "the product": lambda a, b: a * b,
 }
 
 

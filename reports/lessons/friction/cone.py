@@ -124,7 +124,7 @@ CONE = Lesson(
     sliders=(
         Slider("limit", "Friction limit", tuple(LIMITS), 0),
         Slider("mu", "Friction µ", (0.05, 0.1, 0.2), 1),
-        time_step(1 / 60, (16, 4, 1), 2),
+        time_step(1 / 60, (4, 1), 1),
     ),
     names=(BOX2D_V3, ROUGH, ABLATED, TRUTH),
     show=show_cone,
