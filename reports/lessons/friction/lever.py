@@ -110,8 +110,8 @@ LEVER = Lesson(
             " most for a small disk."
         ),
         (
-            "That point has another slip than the surface. When a disk rolls, its surface does not"
-            " slip, but this point does, and friction acts on it: see [rolling]."
+            "The middle of the overlap has another slip than the surface. When a disk rolls, its"
+            " surface does not slip, but this point does, and friction acts on it: see [rolling]."
         ),
     ),
     sliders=(
