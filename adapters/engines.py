@@ -191,7 +191,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d:matched": _Box2D(
         partial(_box2d, "matched"),
-        "box2d-py, matched: units that lift its thresholds; CCD; no friction, sleep",
+        "box2d-py, matched: units that lift its thresholds; CCD; no sleep; friction as stated",
         1.0,
         FLOAT32,
         options={
@@ -218,7 +218,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d_v3:matched": _Box2DV3(
         partial(_box2d_v3, "matched"),
-        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, no friction",
+        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, friction as stated",
         0.625,
         FLOAT32,
         options={

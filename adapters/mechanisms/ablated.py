@@ -4,6 +4,7 @@ enabled or disabled."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,7 @@ MIXING: dict[str, Callable[[float, float], float]] = {
     "the larger": max,
     "the smaller": min,
     "the mean": lambda a, b: (a + b) / 2,
+    "the root of the product": lambda a, b: sqrt(a * b),
     "the product": lambda a, b: a * b,
 }
 

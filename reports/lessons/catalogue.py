@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from reports.lessons.box import BOX
 from reports.lessons.crowd import COST, HORIZON
+from reports.lessons.friction.bounce import BOUNCE
+from reports.lessons.friction.cone import CONE
+from reports.lessons.friction.lever import LEVER
+from reports.lessons.friction.rolling import ROLLING
 from reports.lessons.lesson import Lesson
 from reports.lessons.limits import LIMITS
 from reports.lessons.mechanisms.cap import CAP
@@ -36,5 +40,9 @@ ALL = (
     ROW,
     HORIZON,
     LIMITS,
+    BOUNCE,
+    CONE,
+    LEVER,
+    ROLLING,
 )
 LESSONS: dict[str, Lesson] = {lesson.name: lesson for lesson in ALL}

@@ -71,8 +71,8 @@ function drawChart(chart) {
   picture.lastChild.append(svg("rect", { x: left - 4, y: top - 4, width: width - left - right + 8, height: height - top - bottom + 8 }));
   const guides = chart.guides.map(([axis, value, text]) => [axis, axis === "x" ? x.place(value) : y.place(value), text]);
   for (const [axis, place] of guides) drawGuide(picture, axis, place);
-  guides.forEach(([axis, place, text], k) => nameGuide(picture, axis, place, text, k));
   chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, [k, chart.curves.length], clip));
+  guides.forEach(([axis, place, text], k) => nameGuide(picture, axis, place, text, k));
   figure.append(caption, picture);
   return figure;
 }
@@ -151,6 +151,7 @@ function raise(name) {
       const hovered = groups.find((each) => each.matches(":hover"));
       hovered ? hovered.before(group) : picture.append(group);
     }
+    picture.append(...picture.querySelectorAll(".over"));
   }
   for (const item of document.querySelectorAll(".names li")) item.classList.toggle("top", item.dataset.name === name);
 }

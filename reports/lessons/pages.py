@@ -18,6 +18,7 @@ from starlette.routing import BaseRoute, Route
 from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
+from reports.lessons.friction.bounce import CONE as EDGES
 from reports.lessons.lesson import Lesson
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.page.documents import ENGINE, deflated, fragment, render
@@ -31,10 +32,12 @@ GROUPS = {
     "A solver, piece by piece": "12345",
     "How engines differ": "6",
     "What can be compared, and how far": "78",
+    "Spin and friction": "9",
 }
 MEASURING = Lock()  # two pages that ask at once get one measurement
 OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
+    EDGES: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
 }
 
 

@@ -28,33 +28,56 @@ MU_TAG = {0.1: "mu01", 0.5: "mu05"}
 def friction_bounce(restitution: float, friction: float) -> Scenario:
     """Six disks fall onto the floor obliquely: some slip all along, some stop to slip, one is on
     the edge between."""
-    e, mu, radius, fall, height = restitution, friction, 0.25, 4.0, 0.83
+    e, mu, radius, fall = restitution, friction, 0.25, 4.0
     # At the edge friction just ends the slip of the rim: it takes 3 mu (1 + e) v_n of a solid disk.
     edge = 3 * mu * (1 + e) * fall
-    along = np.array([0.0, 1.0, edge / 2, 5.0, 5.0, 6.0])
-    spin = np.array([24.0, 0.0, edge / 2 / radius, 0.0, -20.0, -(6 + 1.5 * edge) / radius])
-    n = len(along)
+    return bounce_on_floor(
+        f"friction_bounce_{TAG[e]}_{MU_TAG[mu]}",
+        f"Does a bounce at e = {e:g} and friction {mu:g} turn and brake disks, slipping and"
+        " sticking, as Coulomb's law says?",
+        along=np.array([0.0, 1.0, edge / 2, 5.0, 5.0, 6.0]),
+        spin=np.array([24.0, 0.0, edge / 2 / radius, 0.0, -20.0, -(6 + 1.5 * edge) / radius]),
+        fall=fall,
+        restitution=e,
+        friction=mu,
+    )
+
+
+def bounce_on_floor(
+    name: str,
+    asks: str,
+    along: Array,
+    spin: Array,
+    fall: float,
+    restitution: float,
+    friction: float,
+    radius: float = 0.25,
+    apart: float = 1.5,
+) -> Scenario:
+    """Solid disks of 1 kg, `apart` m from centre to centre, each thrown from 0.83 m above the floor
+    with a speed along it, one downwards, m/s, and a spin, rad/s; half a second without gravity."""
+    height, n = 0.83, len(along)
     scene = lay_out(
-        position=np.stack([1.5 * np.arange(n) - 5, np.full(n, radius + height)], axis=-1),
+        position=np.stack([apart * np.arange(n) - 5, np.full(n, radius + height)], axis=-1),
         velocity=np.stack([along, np.full(n, -fall)], axis=-1),
         angular_velocity=spin,
         radius=np.full(n, radius),
         mass=np.ones(n),
         walls=[[[-10, 0], [12, 0]]],
-        restitution=e,
-        friction=mu,
+        restitution=restitution,
+        friction=friction,
     )
 
     def truth(t: Array) -> Trajectory:
         start, v = start_of(scene)
-        legs = bounce(start, v, scene.radius, np.full(n, 2.0), e, mu, height)
-        hits = [(float(legs.start[1]), i, -1, (1 + e) * fall) for i in range(n)]
-        return turning_answer(scene, t, legs.at(t), hits)
+        two = np.full(n, 2.0)
+        legs = bounce(start, v, scene.radius, two, restitution, friction, height)
+        collisions = [(float(legs.start[1]), i, -1, (1 + restitution) * fall) for i in range(n)]
+        return turning_answer(scene, t, legs.at(t), collisions)
 
     return Scenario(
-        name=f"friction_bounce_{TAG[e]}_{MU_TAG[mu]}",
-        asks=f"Does a bounce at e = {e:g} and friction {mu:g} turn and brake disks, slipping and"
-        " sticking, as Coulomb's law says?",
+        name=name,
+        asks=asks,
         source=IMPACT,
         scene=scene,
         duration=0.5,
@@ -77,13 +100,13 @@ def spinning_disks_meet() -> Scenario:
     )
 
     def truth(t: Array) -> Trajectory:
-        motions, hits = [], list[Collision]()
+        motions, collisions = [], list[Collision]()
         for i in range(0, scene.n, 2):
             legs, impulse = spinning_pair(scene, i)
             motions.append(legs.at(t))
-            hits.append((float(legs.start[1]), i, i + 1, float(impulse[0])))
+            collisions.append((float(legs.start[1]), i, i + 1, float(impulse[0])))
         place, rate = (np.concatenate(part, axis=1) for part in zip(*motions))
-        return turning_answer(scene, t, (place, rate), hits)
+        return turning_answer(scene, t, (place, rate), collisions)
 
     return Scenario(
         name="spinning_disks_meet",
@@ -116,8 +139,8 @@ def spin_to_flight_and_back() -> Scenario:
         legs = between_plates(start, v, radius, 2.0, gap, scene.friction, t[-1])
         place, rate = legs.at(t)
         kick = 2 * abs(v[1])
-        hits = [(float(at), 0, -1 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
-        return turning_answer(scene, t, (place[:, None], rate[:, None]), hits)
+        collisions = [(float(at), 0, -1 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
+        return turning_answer(scene, t, (place[:, None], rate[:, None]), collisions)
 
     return Scenario(
         name="spin_to_flight_and_back",
@@ -130,9 +153,12 @@ def spin_to_flight_and_back() -> Scenario:
     )
 
 
-def _on_floor(name: str, asks: str, speed: float, spin: float, duration: float) -> Scenario:
-    """A disk that touches the floor, with a speed along it and a spin; friction 0.2."""
-    radius, friction = 0.25, 0.2
+def slide_on_floor(
+    name: str, asks: str, speed: float, spin: float, duration: float, friction: float = 0.2
+) -> Scenario:
+    """A solid disk of 1 kg that touches the floor, with a speed along it, m/s, and a spin,
+    rad/s."""
+    radius = 0.25
     scene = lay_out(
         position=[[-2.0, radius]],
         velocity=[[speed, 0.0]],
@@ -157,7 +183,7 @@ def _on_floor(name: str, asks: str, speed: float, spin: float, duration: float) 
 
 def slip_to_roll() -> Scenario:
     """A disk that slides without spin begins to roll, at 2/3 of its speed."""
-    return _on_floor(
+    return slide_on_floor(
         "slip_to_roll",
         "Does a disk that slides begin to roll at 2/3 of its speed, after v / (3 mu g)?",
         speed=3.0,
@@ -168,7 +194,7 @@ def slip_to_roll() -> Scenario:
 
 def backspin_returns() -> Scenario:
     """A disk with so much back spin that it comes back as fast as it went."""
-    return _on_floor(
+    return slide_on_floor(
         "backspin_returns",
         "Does a disk with back spin stop, come back and roll at the right time?",
         speed=1.5,
@@ -221,8 +247,8 @@ def roll_or_slide() -> Scenario:
                 np.column_stack([np.outer(part[:, 0], down[i]), part[:, 1]]) for part in (way, rate)
             )
         place[..., :2] += scene.position
-        hits = [(0.0, i, -1 - i, 0.0) for i in range(scene.n)]
-        return turning_answer(scene, t, (place, moves), hits)
+        collisions = [(0.0, i, -1 - i, 0.0) for i in range(scene.n)]
+        return turning_answer(scene, t, (place, moves), collisions)
 
     return Scenario(
         name="roll_or_slide",

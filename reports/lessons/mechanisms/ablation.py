@@ -39,10 +39,14 @@ def asked(scene: Scene, duration: float) -> Scenario:
 
 
 def runs_of(
-    names: Sequence[str], on: AblatedReference, scenario: Scenario, substeps: int
+    names: Sequence[str],
+    on: AblatedReference,
+    scenario: Scenario,
+    substeps: int,
+    plain: str = PLAIN,
 ) -> list[Run]:
     """The engines, the reference as it is, and the reference with what is enabled."""
-    runs = [run_of(name, scenario, substeps) for name in (*names, PLAIN)]
+    runs = [run_of(name, scenario, substeps) for name in (*names, plain)]
     return [*runs, play(on, ABLATED, scenario, scenario.dt(substeps))]
 
 

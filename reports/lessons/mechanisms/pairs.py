@@ -6,12 +6,12 @@ import numpy as np
 
 from reports.lessons.mechanisms.ablation import Read
 from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scene
+from scenarios.model import Array, Scene, Trajectory
 
 
-def pairs(closing: Array, restitution: float) -> Scene:
+def pairs(closing: Array, restitution: float, friction: float = 0.0, spin: float = 0.0) -> Scene:
     """One head-on pair of equal disks for each closing speed (k,) m/s, above each other, to meet
-    after 0.2 s."""
+    after 0.2 s; both turn by `spin` rad/s, so that their surfaces slide on each other."""
     k, r = len(closing), 0.1
     gap = r + closing * 0.1
     x = np.stack(
@@ -30,10 +30,18 @@ def pairs(closing: Array, restitution: float) -> Scene:
         velocity=v.reshape(-1, 2),
         radius=np.full(2 * k, r),
         mass=np.ones(2 * k),
+        angular_velocity=np.full(2 * k, spin),
         restitution=restitution,
+        friction=friction,
     )
 
 
 def separation(closing: Array) -> Read:
     """(k,) separation over approach speed of `pairs`, at the end."""
     return lambda each: (each.velocity[-1, 1::2, 0] - each.velocity[-1, 0::2, 0]) / closing
+
+
+def sideways(each: Trajectory) -> Array:
+    """(k,) the impulse along the surfaces over that along the normal of `pairs`."""
+    taken: Array = each.velocity[-1, 1::2] - each.velocity[0, 1::2]
+    return np.abs(taken[:, 1] / taken[:, 0])

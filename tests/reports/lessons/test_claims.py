@@ -168,7 +168,7 @@ NO_CLAIM = {
         "An engine may take": "defines a threshold",
         "Raise it": "an instruction; the last claim says whether it is done",
     },
-    "mixing": {"A restitution belongs": "defines a rule"},
+    "mixing": {"But an engine keeps": "defines a rule"},
     "order": {"With the same gravity": "says what the scene is"},
     "gravity": {"Box2D plays twice": "says who plays; a claim says at which dt it is needed"},
     "correction": {
@@ -191,6 +191,30 @@ NO_CLAIM = {
         "Then it halves": "test_a_limit_is_bracketed_as_closely_as_the_text_says",
         "A reason counts": "defines what tested means",
         "The command": "names a command",
+    },
+    "friction": {
+        "J_n = (1 + e) m v_n": "defines both; the first claim has its number",
+        "An impulse of |slip|": "defines to stick; the list below has its numbers",
+        "Coulomb's law allows": "defines the cone; a claim says where the impulse lies",
+        "See": "names other lessons",
+    },
+    "cone": {
+        "Box2D 3.1 solves": "says what the mechanism is; the last claims show it on and off",
+        "In the first": "the same; the third claim has its numbers",
+        "The friction cone is": "the third claim",
+        "The ablated reference plays": "says who plays",
+        "The disk is so fast": "follows from the second claim: the impulse is on the edge",
+    },
+    "lever": {
+        "A wall of Box2D": "defines the skin; the second claim has what becomes of it",
+        "It matters most": "the second claim has its numbers",
+    },
+    "rolling": {
+        "From then on": "defines to roll; the second claim says when",
+        "A disk with back spin": "the second claim says whether it does",
+        "An engine keeps": "says what mixing is",
+        "Pymunk multiplies": "test_two_different_coefficients_are_mixed_as_the_text_says",
+        "See": "names another lesson",
     },
 }
 """Sentences of the text with such a word that are no statement about a curve -> why not."""

@@ -1,0 +1,328 @@
+"""Lesson 9.1: spin and friction in a bounce."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from reports.lessons.friction.thrown import FALL, ROUGH, Taken, taken, thrown
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Simulation,
+    Slider,
+)
+from reports.page.style import TRUTH, number
+from scenarios.model import Array, Scene
+from scenarios.truth.sliding import rubbed
+
+CONE = "friction cone"
+BOX2D, BOX2D_V3 = "box2d:shipped", "box2d_v3:shipped"
+EXACT = (ROUGH, "pymunk:matched", "event_driven:float64")
+NAMES = (ROUGH, "pymunk:matched", BOX2D, BOX2D_V3, "event_driven:float64")
+STEEPEST = 75.0  # degrees, of the angles of incidence
+RADIUS = 0.25  # m
+# Velocities up to 19 m/s, and spins up to 100 rad/s, that float64 rounds a few times.
+DOUBLE = 5e-13
+# N s of 10: float32 rounds the ends of a floor of 22 m and so its normal, along which a disk then
+# has a small share of its 19 m/s.
+SINGLE = 1e-4
+# m: half of the 13.3 mm by which disk and skin overlap at the end of the step that finds them.
+SHORT = 0.02 / 3
+
+
+class Law(NamedTuple):
+    """Coulomb's law in this bounce: N s that end 1 m/s of slip, the normal impulse, N s, and the
+    edge of the cone, N s."""
+
+    weight: float
+    normal: float
+    edge: float
+
+
+def show_bounce(settings: Settings) -> Shown:
+    """The impulse in its cone; the friction impulse and the spin at every angle."""
+    e, mu, spin = settings["e"], settings["mu"], settings["spin"]
+    along = speed_along(settings["angle"])
+    here = Simulation.by(thrown(along, spin, e, mu), NAMES, 1)
+    scene, impulses = here.scenario.scene, taken_by(here)
+    normal = float(impulses[TRUTH].normal[0])
+    weight = 1 / float(1 / scene.mass[0] + scene.radius[0] ** 2 / scene.inertia[0])
+    law = Law(weight, normal, mu * normal)
+    angles = angles_of(law, spin)
+    swept = taken_by(Simulation.by(thrown(speed_along(angles), spin, e, mu), NAMES, 1))
+    return Shown(
+        [
+            cone_chart(impulses, law),
+            friction_chart(angles, swept, law, settings["angle"]),
+            spin_chart(angles, swept, spin, float(scene.inertia[0]), settings["angle"]),
+        ],
+        here.film,
+        [
+            ("exact answer" if name == TRUTH else name, left_with(each, scene))
+            for name, each in impulses.items()
+        ],
+        bounce_claims(settings, law, angles),
+        in_numbers(settings, law, float(impulses[TRUTH].along[0])),
+    )
+
+
+def speed_along(angle: Array | float) -> Array:
+    """m/s along the floor at angles of incidence in degrees, from the normal."""
+    return FALL * np.tan(np.radians(angle))
+
+
+def slip_at(angle: Array | float, spin: float) -> Array:
+    """m/s of the point that touches, before the bounce."""
+    return speed_along(angle) + RADIUS * spin
+
+
+def angles_of(law: Law, spin: float) -> Array:
+    """(k,) degrees from 0 to `STEEPEST`, among them those where sticking ends."""
+    limits = (np.array([-1.0, 1.0]) * law.edge / law.weight - RADIUS * spin) / FALL
+    edges = np.degrees(np.arctan(limits))
+    inside = edges[(edges > 0) & (edges < STEEPEST)]
+    return np.unique(np.append(np.linspace(0.0, STEEPEST, 11), inside))
+
+
+def taken_by(played: Simulation) -> dict[str, Taken]:
+    """What each engine gave the disks, and last what is exact."""
+    assert played.truth is not None
+    scene = played.scenario.scene
+    found = {run.name: taken(run.trajectory, scene) for run in played.runs if run.trajectory}
+    return found | {TRUTH: taken(played.truth, scene)}
+
+
+def cone_chart(impulses: Mapping[str, Taken], law: Law) -> LessonChart:
+    """The impulse of each as a line from the origin, between the edges of the cone."""
+    edges = Curve(CONE, [-law.edge, 0.0, law.edge], [law.normal, 0.0, law.normal])
+    lines = [
+        Curve(name, [0.0, each.along[0]], [0.0, each.normal[0]], dots=True)
+        for name, each in impulses.items()
+    ]
+    return LessonChart(
+        "The impulse in its friction cone",
+        "friction impulse J_t in N s",
+        "normal impulse J_n in N s",
+        [edges, *lines],
+    )
+
+
+def friction_chart(angles: Array, swept: Mapping[str, Taken], law: Law, here: float) -> LessonChart:
+    """The friction impulse at every angle, between the edges of the cone."""
+    edges = [Curve(CONE, angles, np.full(len(angles), side * law.edge)) for side in (-1.0, 1.0)]
+    return LessonChart(
+        "Friction impulse",
+        "angle of incidence in degrees",
+        "J_t in N s",
+        [*edges, *(Curve(name, angles, each.along) for name, each in swept.items())],
+        guides=[("x", here, "here")],
+    )
+
+
+def spin_chart(
+    angles: Array, swept: Mapping[str, Taken], spin: float, inertia: float, here: float
+) -> LessonChart:
+    """The spin after the bounce at every angle."""
+    return LessonChart(
+        "Spin after the bounce",
+        "angle of incidence in degrees",
+        "ω in rad/s",
+        [Curve(name, angles, spin + each.turning / inertia) for name, each in swept.items()],
+        guides=[("x", here, "here")],
+    )
+
+
+def left_with(each: Taken, scene: Scene) -> str:
+    """Velocity along the floor and spin after the bounce."""
+    along = scene.velocity[0, 0] + each.along[0] / scene.mass[0]
+    spin = scene.angular_velocity[0] + each.turning[0] / scene.inertia[0]
+    return f"leaves at {tidy(along)} m/s along the floor with {tidy(spin)} rad/s"
+
+
+def tidy(value: float) -> str:
+    """To four digits; what is 0 but for rounding is 0."""
+    return number(value, 4) if abs(value) > SINGLE else "0"
+
+
+def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str, str]]:
+    """Slip, normal impulse, cone and friction impulse, with the numbers of this bounce."""
+    along, spin = float(speed_along(settings["angle"])), settings["spin"]
+    slip = float(slip_at(settings["angle"], spin))
+    return [
+        (
+            "Slip",
+            f"v_t + r ω = {tidy(along)} + {number(RADIUS)} · {number(spin)} = {tidy(slip)} m/s",
+        ),
+        (
+            "Normal impulse",
+            f"J_n = (1 + e) m v_n = {number(1 + settings['e'])} · 1 · {number(FALL)} ="
+            f" {number(law.normal)} N s",
+        ),
+        (
+            "To stick",
+            f"|slip| / (1/m + r²/I) = {tidy(abs(slip))} / {number(1 / law.weight)} ="
+            f" {tidy(abs(slip) * law.weight)} N s would end the slip",
+        ),
+        (
+            "Cone",
+            f"µ J_n = {number(settings['mu'])} · {number(law.normal)} = {number(law.edge)} N s",
+        ),
+        (
+            "Friction impulse",
+            f"the smaller of these two, against the slip: J_t = {tidy(friction)} N s; it changes"
+            " v_t by J_t/m and ω by r J_t/I",
+        ),
+    ]
+
+
+def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
+    """When the contact sticks, who has the exact answer, and what the others do."""
+    slips = slip_at(angles, settings["spin"])
+    exact = rubbed(slips, 1 / law.weight, np.asarray(law.edge))
+    return [
+        Claim(
+            f"The normal impulse is (1 + e) m v_n = {number(law.normal)} N s in every engine. At"
+            f" every angle the cone is equally wide, µ J_n = {number(law.edge)} N s to each side.",
+            lambda shown: (
+                all(abs(shown.y(name)[-1] - law.normal) <= SINGLE for name in (*NAMES, TRUTH))
+                and np.ptp(shown.y(CONE, 1)) == 0.0
+                and abs(abs(shown.y(CONE, 1)[0]) - law.edge) <= DOUBLE
+            ),
+        ),
+        *claims_here(float(slip_at(settings["angle"], settings["spin"])), settings["spin"], law),
+        Claim(
+            "The contact sticks where |v_t + r ω| is at most (1 + m r²/I) µ (1 + e) v_n ="
+            f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in"
+            " proportion to the slip. Where the slip is larger the impulse stays on the edge of"
+            " the cone.",
+            lambda shown: np.abs(shown.y(TRUTH, 1) - exact).max() <= DOUBLE,
+        ),
+        Claim(
+            f"{', '.join(EXACT[:-1])} and {EXACT[-1]} have the exact friction impulse and the exact"
+            " spin at every angle, to rounding.",
+            lambda shown: all(
+                shown.gap(name, chart=1) <= DOUBLE and shown.gap(name, chart=2) <= 32 * DOUBLE
+                for name in EXACT
+            ),
+        ),
+        Claim(
+            f"{BOX2D} turns the disk as if the friction acted {number(1e3 * SHORT, 2)} mm above the"
+            f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
+            " friction impulse should change it.",
+            lambda shown: turned_short(shown, settings["spin"]),
+        ),
+        cone_of_v3(settings["e"], settings["mu"]),
+    ]
+
+
+def claims_here(slip: float, spin: float, law: Law) -> list[Claim]:
+    """Whether the contact of the replay sticks or slips."""
+    need = abs(slip) * law.weight
+    if need <= DOUBLE and not spin:
+        return [
+            Claim(
+                "Here the disk falls straight and does not spin: nothing slides, and no engine"
+                " gives a friction impulse.",
+                lambda shown: all(abs(shown.x(name)[-1]) <= SINGLE for name in (*NAMES, TRUTH)),
+            )
+        ]
+    if need <= DOUBLE:
+        return [
+            Claim(
+                "Here the point that touches is at rest, as that of a wheel that rolls: the exact"
+                f" friction impulse is 0. {BOX2D} gives one, because it takes the slip of a point"
+                " above the one that touches, and that point moves.",
+                lambda shown: (
+                    abs(shown.x(TRUTH)[-1]) <= DOUBLE and abs(shown.x(BOX2D)[-1]) > 100 * SINGLE
+                ),
+            )
+        ]
+    if need <= law.edge:
+        return [
+            Claim(
+                f"Here the contact sticks: {number(need, 4)} N s end the slip, and the cone allows"
+                f" {number(law.edge, 4)} N s. The exact impulse lies within the cone.",
+                lambda shown: (
+                    abs(abs(shown.x(TRUTH)[-1]) - need) <= DOUBLE
+                    and abs(shown.x(TRUTH)[-1]) <= shown.x(CONE)[-1] + DOUBLE
+                ),
+            )
+        ]
+    return [
+        Claim(
+            f"Here the contact slips: {number(need, 4)} N s would end the slip, and the cone allows"
+            f" only {number(law.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
+            lambda shown: abs(abs(shown.x(TRUTH)[-1]) - shown.x(CONE)[-1]) <= DOUBLE,
+        )
+    ]
+
+
+def turned_short(shown: Shown, spin: float) -> bool:
+    """Whether every friction impulse of Box2D 2.3 that is not tiny has turned the disk with a lever
+    arm that is `SHORT`."""
+    impulse, turn = shown.y(BOX2D, 1), shown.y(BOX2D, 2) - spin
+    rubs = np.abs(impulse) > 0.05  # N s, of which float32 has four digits
+    arm = turn[rubs] * (RADIUS**2 / 2) / impulse[rubs]  # I = m r² / 2 of 1 kg
+    return bool(rubs.any() and np.abs(arm - (RADIUS - SHORT)).max() <= 1e-5)
+
+
+def cone_of_v3(e: float, mu: float) -> Claim:
+    """Box2D 3.1 gives the friction of a bounce with e = 0."""
+    narrow = mu * FALL
+    if not e:
+        return Claim(
+            f"At e = 0 the friction impulse of {BOX2D_V3} is within a tenth of µ J_n of the exact"
+            " one.",
+            lambda shown: shown.gap(BOX2D_V3, chart=1) <= narrow / 10,
+        )
+    return Claim(
+        f"{BOX2D_V3} never gives more than µ m v_n = {number(narrow)} N s, 1/(1 + e) ="
+        f" {number(100 / (1 + e))} % of what the cone allows: its cone is that of a bounce with e ="
+        " 0.",
+        lambda shown: (
+            0.9 * min(narrow, np.abs(shown.y(TRUTH, 1)).max())
+            <= np.abs(shown.y(BOX2D_V3, 1)).max()
+            <= narrow + SINGLE
+            and np.abs(shown.y(CONE, 1)).max() <= (1 + e) * narrow + DOUBLE
+        ),
+    )
+
+
+BOUNCE = Lesson(
+    name="friction",
+    number="9.1",
+    title="Spin and friction in a bounce",
+    asks="What does friction do to speed and spin in a bounce?",
+    text=(
+        (
+            "A disk meets a floor. The normal passes through its centre, so the normal impulse"
+            " <code>J_n</code> does not turn the disk. The friction impulse <code>J_t</code> acts"
+            " along the floor and does not change how fast the disk leaves it. The two decouple:"
+            " <code>J_n = (1 + e) m v_n</code> is that of a bounce without friction, and friction"
+            " acts on the <b>slip</b> <code>v_t + r ω</code>, the velocity of the point that"
+            " touches."
+        ),
+        (
+            "Friction acts against the slip. An impulse of <code>|slip| / (1/m + r²/I)</code> ends"
+            " it: the contact <b>sticks</b>. Coulomb's law allows at most <code>µ J_n</code>, the"
+            " edge of the <b>friction cone</b>. If that does not end the slip, the contact"
+            " <b>slips</b> until the disk leaves. See [cone] and [lever] for why Box2D differs, and"
+            " [rolling] for a contact that lasts."
+        ),
+    ),
+    sliders=(
+        Slider("e", "Restitution e", (0.0, 0.5, 1.0), 2),
+        Slider("mu", "Friction µ", (0.1, 0.2, 0.5), 0),
+        Slider("angle", "Angle of incidence", (0, 15, 30, 45, 60, 75), 3, "°"),
+        Slider("spin", "Spin ω before the bounce", (-40.0, -20.0, 0.0, 20.0, 40.0), 2, "rad/s"),
+    ),
+    names=(*NAMES, CONE, TRUTH),
+    show=show_bounce,
+)

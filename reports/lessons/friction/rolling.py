@@ -1,0 +1,281 @@
+"""Lesson 9.4: from sliding to rolling."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.mechanisms.ablated import MIXING
+from reports.lessons.friction.thrown import ROUGH
+from reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Simulation,
+    Slider,
+    time_step,
+)
+from reports.page.style import TRUTH, number
+from scenarios.families.friction import G, slide_on_floor
+from scenarios.model import Array, Trajectory
+from scenarios.truth.closed_forms import Legs
+from scenarios.truth.sliding import slide
+
+SHIPPED, MATCHED = "pymunk:shipped", "pymunk:matched"
+BOX2D, BOX2D_V3 = "box2d:shipped", "box2d_v3:shipped"
+EVENTS = "event_driven:float64"
+NAMES = (ROUGH, SHIPPED, MATCHED, BOX2D, BOX2D_V3, EVENTS)
+SPEED, RADIUS, SECONDS = 2.0, 0.25, 4.0  # m/s at the start, m, s
+SOLID = 2.0  # m r² / I
+# m/s: 960 steps that each round velocities of up to 8 m/s in float64.
+DOUBLE = 960 * 8 * 2.0**-53
+STILL = 1e-16  # m/s, as low as a logarithmic axis goes
+
+
+def show_rolling(settings: Settings) -> Shown:
+    """Velocity and slip over time, and the slip once more on a logarithmic axis."""
+    mu, spin, k = settings["mu"], settings["spin"], settings["k"]
+    scenario = slide_on_floor(
+        "slide", "When does a disk that slides begin to roll?", SPEED, spin, SECONDS, mu
+    )
+    played = Simulation.by(scenario, NAMES, k)
+    legs = sliding(spin, mu)
+    begins = float(legs.start[-1])
+    guides = [("x", begins, "rolls")] if begins else []
+    return Shown(
+        [
+            LessonChart(
+                "Velocity along the floor",
+                "time in s",
+                "m/s",
+                played.curves(lambda each: each.velocity[:, 0, 0]),
+                guides=guides,
+            ),
+            LessonChart(
+                "Slip of the point that touches",
+                "time in s",
+                "v + r ω in m/s",
+                played.curves(slip),
+                guides=guides,
+            ),
+            LessonChart(
+                "Slip at rest",
+                "time in s",
+                "|v + r ω| in m/s, 0 at the foot",
+                played.curves(lambda each: np.maximum(np.abs(slip(each)), STILL)),
+                "y",
+                guides=guides,
+            ),
+        ],
+        played.film,
+        facts(played),
+        rolling_claims(settings, scenario.dt(k)),
+    )
+
+
+def slip(each: Trajectory) -> Array:
+    """(k,) m/s of the point that touches the floor."""
+    found: Array = each.velocity[:, 0, 0] + RADIUS * each.angular_velocity[:, 0]
+    return found
+
+
+def sliding(spin: float, friction: float) -> Legs:
+    """The exact motion of the disk: one leg while it slides, one while it rolls."""
+    return slide(SPEED, spin, RADIUS, SOLID, friction, 0.0, G)
+
+
+def facts(played: Simulation) -> list[tuple[str, str]]:
+    """How each moves in the end."""
+    motions = {run.name: run.trajectory for run in played.runs} | {"exact answer": played.truth}
+    return [
+        (name, f"in the end {tidy(each.velocity[-1, 0, 0])} m/s, slip {tidy(slip(each)[-1])} m/s")
+        for name, each in motions.items()
+        if each is not None
+    ]
+
+
+def tidy(value: float) -> str:
+    """To three digits; what is 0 but for rounding is 0."""
+    return number(value) if abs(value) > DOUBLE else "0"
+
+
+def rolling_claims(settings: Settings, dt: float) -> list[Claim]:
+    """When it rolls and how fast, who is exact, and what slips in the end."""
+    mu, spin = settings["mu"], settings["spin"]
+    legs = sliding(spin, mu)
+    rolls, end = float(legs.start[-1]), float(legs.velocity[-1, 0])
+    late = f"one step of friction, µ g dt = {number(1e3 * mu * G * dt)} mm/s"
+    return [
+        *exact_claims(spin, mu, rolls, end),
+        Claim(
+            f"{ROUGH} and {EVENTS} have the exact velocity, to rounding. {MATCHED} is off by at"
+            f" most {late}.",
+            lambda shown: (
+                max(shown.gap(ROUGH), shown.gap(EVENTS)) <= DOUBLE
+                and shown.gap(MATCHED) <= mu * G * dt + DOUBLE
+            ),
+        ),
+        Claim(
+            "When they roll, these three have no slip, to rounding.",
+            lambda shown: all(
+                np.abs(shown.y(name, 1)[shown.x(name, 1) > rolls + 2 * dt]).max() <= DOUBLE
+                for name in (ROUGH, EVENTS, MATCHED)
+            ),
+        ),
+        mixed_claim(spin, mu, dt),
+        *slip_claims(spin),
+    ]
+
+
+def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim]:
+    """The closed form, in words."""
+    if not rolls:
+        return [
+            Claim(
+                f"The disk rolls from the start, v = −r ω = {number(SPEED)} m/s: the point that"
+                " touches is at rest, nothing rubs, and the exact velocity stays.",
+                lambda shown: (
+                    np.abs(shown.y(TRUTH) - SPEED).max() <= DOUBLE
+                    and np.abs(shown.y(TRUTH, 1)).max() <= DOUBLE
+                ),
+            )
+        ]
+    brake = mu * G
+
+    def slows(shown: Shown) -> bool:
+        slides = shown.x(TRUTH) < rolls
+        t = shown.x(TRUTH)[slides]
+        speed, slid = shown.y(TRUTH)[slides], shown.y(TRUTH, 1)[slides]
+        return bool(
+            np.abs(speed - (SPEED - brake * t)).max() <= DOUBLE
+            and np.abs(slid - (slid[0] - (1 + SOLID) * brake * t)).max() <= DOUBLE
+        )
+
+    ends = {
+        "rolls": "rolls on",
+        "stops": "stands still: the spin was just enough to stop it",
+        "returns": "has turned back",
+    }["stops" if abs(end) <= DOUBLE else "rolls" if end > 0 else "returns"]
+    rule = "2/3 v₀" if not spin else "(2 v₀ − r ω₀)/3"
+    when = "v₀/(3 µ g)" if not spin else "(v₀ + r ω₀)/(3 µ g)"
+    return [
+        Claim(
+            f"While the disk slides, its velocity falls by µ g = {number(brake)} m/s each second."
+            " Friction turns it, too, so that the slip falls by 3 µ g ="
+            f" {number(3 * brake)} m/s each second.",
+            slows,
+        ),
+        Claim(
+            f"From t = {when} = {number(rolls)} s on the exact slip is 0, and the velocity stays at"
+            f" {rule} = {number(end) if abs(end) > DOUBLE else '0'} m/s: the disk {ends}.",
+            lambda shown: (
+                np.abs(shown.y(TRUTH)[shown.x(TRUTH) >= rolls] - end).max() <= DOUBLE
+                and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) >= rolls]).max() <= DOUBLE
+                and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) < rolls]).min() > DOUBLE
+            ),
+        ),
+    ]
+
+
+def mixed_claim(spin: float, mu: float, dt: float) -> Claim:
+    """pymunk multiplies the coefficients of floor and disk."""
+    mixed = MIXING["the product"](mu, mu)
+    rolls = float(sliding(spin, mixed).start[-1])
+    if not rolls:
+        return Claim(
+            f"{SHIPPED} rolls, too: where nothing slides, no coefficient matters.",
+            lambda shown: shown.gap(SHIPPED) <= DOUBLE,
+        )
+    when = (
+        f"at {number(rolls)} s"
+        if rolls < SECONDS
+        else f"at {number(rolls)} s, after the end of the replay"
+    )
+    return Claim(
+        f"{SHIPPED} multiplies the coefficients of floor and disk: its friction is µ² ="
+        f" {number(mixed)}. It begins to roll 1/µ = {number(1 / mu)} times as late, {when}.",
+        lambda shown: (
+            np.abs(shown.y(SHIPPED) - sliding(spin, mixed).at(shown.x(SHIPPED))[1][:, 0]).max()
+            <= mixed * G * dt + DOUBLE
+        ),
+    )
+
+
+def slip_claims(spin: float) -> list[Claim]:
+    """What slips on in Box2D."""
+
+    def share(shown: Shown, name: str) -> float:
+        return float(np.abs(shown.y(name, 1)[-1] / shown.y(name)[-1]))
+
+    def height(shown: Shown, name: str) -> float:
+        assert shown.film is not None
+        run = next(run for run in shown.film.runs if run.name == name)
+        assert run.trajectory is not None
+        return float(run.trajectory.position[-1, 0, 1])
+
+    claims = [
+        Claim(
+            f"{BOX2D} never stops slipping. The disk rests 5 mm deep in the skin of the floor, so"
+            " the lever arm of friction is 2.5 mm too short, 1 % of the radius. Friction stops a"
+            " point above the one that touches, which slips at 1 % of the velocity.",
+            lambda shown: (
+                abs(share(shown, BOX2D) - 0.01) <= 5e-4
+                and abs(height(shown, BOX2D) - RADIUS - 0.005) <= 1e-4
+            ),
+        )
+    ]
+    if abs(sliding(spin, 1.0).velocity[-1, 0]) <= DOUBLE:
+        return [
+            *claims,
+            Claim(
+                f"{BOX2D_V3} lets a disk that is slow enough sleep: in the end nothing moves.",
+                lambda shown: shown.y(BOX2D_V3)[-1] == shown.y(BOX2D_V3, 1)[-1] == 0.0,
+            ),
+        ]
+    return [
+        *claims,
+        Claim(
+            f"In {BOX2D_V3} the disk sinks into the floor by up to 1.3 mm, which shortens the"
+            " lever arm, too. In the end the point that touches slips at less than 0.3 % of the"
+            " velocity.",
+            lambda shown: (
+                1e-5 < share(shown, BOX2D_V3) < 0.003
+                and RADIUS - 0.0013 < height(shown, BOX2D_V3) < RADIUS
+            ),
+        ),
+    ]
+
+
+ROLLING = Lesson(
+    name="rolling",
+    number="9.4",
+    title="From sliding to rolling",
+    asks="When does a disk that slides begin to roll?",
+    text=(
+        (
+            "A disk touches the floor and slides. Friction <code>µ m g</code> acts against the slip"
+            " <code>v + r ω</code> of the point that touches. It slows the disk and changes its"
+            " spin until the slip is gone. From then on the disk <b>rolls</b>, and on a level floor"
+            " no friction acts any more. A disk with back spin, here <code>ω > 0</code>, may stop"
+            " and return before it rolls."
+        ),
+        (
+            "An engine keeps a coefficient for each shape, and mixes those of floor and disk by a"
+            " rule of its own: pymunk multiplies them, Box2D takes the root of the product. As"
+            " shipped, both have <code>µ</code> here. <code>pymunk:matched</code> gives both the"
+            " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] tries the rules."
+        ),
+        (
+            "The last chart shows the <b>slip at rest</b>, what is left when the disk should roll."
+            " See [lever] for that of Box2D 2.3."
+        ),
+    ),
+    sliders=(
+        Slider("spin", "Spin ω at the start", (-8.0, 0.0, 16.0, 32.0), 1, "rad/s"),
+        Slider("mu", "Friction µ", (0.1, 0.2, 0.4), 1),
+        time_step(1 / 60, (4, 1), 1),
+    ),
+    names=(*NAMES, TRUTH),
+    show=show_rolling,
+)

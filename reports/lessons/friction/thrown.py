@@ -1,0 +1,75 @@
+"""A disk that is thrown against a floor, and the impulses that the floor gave it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from adapters.mechanisms.table import FRICTION, Mechanism, mechanisms_of, with_mechanisms
+from adapters.play import play
+from adapters.run import Run
+from reports.lessons.lesson import run_of
+from reports.lessons.mechanisms.ablation import ABLATED
+from scenarios.families.friction import bounce_on_floor
+from scenarios.model import Array, Scenario, Scene, Trajectory
+
+FALL = 5.0  # m/s towards the floor, of every disk that is thrown
+ROUGH = "reference:coulomb"
+
+
+APART = 0.6  # m, of disks that fly side by side, the faster ones ahead
+
+
+class Taken(NamedTuple):
+    """What disks took up from t = 0 to the end, (n,): N s along the floor and along its normal, and
+    N m s about the centre."""
+
+    along: Array
+    normal: Array
+    turning: Array
+
+    @property
+    def arm(self) -> Array:
+        """(n,) m, the lever arm with which the impulse along the floor has turned each disk."""
+        return self.turning / self.along
+
+
+def thrown(
+    along: ArrayLike, spin: float, restitution: float, friction: float, radius: float = 0.25
+) -> Scenario:
+    """Disks of 1 kg that meet the floor at `FALL` m/s downwards and `along` (n,) m/s along it, the
+    faster ones later in the list: none meets another."""
+    speeds = np.atleast_1d(np.asarray(along, float))
+    return bounce_on_floor(
+        "thrown",
+        "What does a bounce with friction change?",
+        speeds,
+        np.full(len(speeds), spin),
+        FALL,
+        restitution,
+        friction,
+        radius,
+        APART,
+    )
+
+
+def taken(played: Trajectory, scene: Scene) -> Taken:
+    """What the disks of `thrown` took up."""
+    along, normal = (scene.mass[:, None] * (played.velocity[-1] - played.velocity[0])).T
+    turning = scene.inertia * (played.angular_velocity[-1] - played.angular_velocity[0])
+    return Taken(along, normal, turning)
+
+
+def ablated_runs(
+    engine: str, rubs: Mapping[str, Any], scenario: Scenario, substeps: int
+) -> list[Run]:
+    """The engine, the reference with friction, and the reference with all mechanisms of the engine,
+    in which `rubs` are the parameters of its friction that are other than the engine's."""
+    dt = scenario.dt(substeps)
+    runs = [run_of(name, scenario, substeps) for name in (engine, ROUGH)]
+    mechanisms = mechanisms_of(engine, runs[0].settings, scenario.scene, dt)
+    ablated = with_mechanisms([*mechanisms, Mechanism(FRICTION, rubs)])
+    return [*runs, play(ablated, ABLATED, scenario, dt)]
