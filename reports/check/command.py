@@ -19,7 +19,7 @@ from reports.check.functions import keeps_state
 from reports.check.machine import as_json, as_junit
 from reports.check.rows import CheckRow
 from reports.check.terminal import print_class, print_file, print_scene
-from reports.check.verdict import NONE, FileCheck, check_file
+from reports.check.verdict import FileCheck, check_file, nothing_in
 from reports.run.made import may_overwrite, sealed
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
@@ -93,7 +93,7 @@ def files_of(path: Path) -> list[Path]:
         and not is_handed_out(file)
     )
     if not found:
-        refuse([f"{path}: {NONE}"])
+        refuse([f"{path}: {nothing_in(path)}"])
     owners = {file.relative_to(path).parts[0] for file in found}
     empty = [
         one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners
@@ -148,7 +148,7 @@ def checked(files: Sequence[Path]) -> list[FileCheck]:
         progress.start(len(files), len(files), f"checking {printable(files[0].name)}")
         for file, one in results:
             done[file] = not_checked(file, one) if isinstance(one, Failure) else one
-            progress.done(f"checked {printable(file.name)}")
+            progress.done(f"checked {printable(str(file.relative_to(file.parent.parent)))}")
     return [done[file] for file in files]
 
 

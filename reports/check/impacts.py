@@ -117,7 +117,7 @@ IMPULSES: dict[str, Impulse] = {
     "the velocities are added, not subtracted": lambda h, e: (
         -(1 + e) * ((h.va + h.vb) @ h.n) * h.mu * h.n
     ),
-    "the whole relative velocity is used, with its tangential part": lambda h, e: (
+    "the whole relative velocity is used, not its part along the normal": lambda h, e: (
         -(1 + e) * h.u * h.mu
     ),
     "the relative speed is used instead of its normal part": lambda h, e: (
@@ -202,7 +202,14 @@ UPDATES: dict[str, Update] = {
 }
 
 
-SLIPS = IMPULSES | scalar_products()
+# only asked of a file that states another e than 1, as it may be written for this one
+ELASTIC: dict[str, Impulse] = {
+    "e is not used: the collision is elastic": scaled(lambda h, e: 2 / (1 + e)),
+    "x and y are treated as two collisions on a line, and without e": (
+        lambda h, e: -2 * h.u * h.mu
+    ),
+}
+SLIPS = IMPULSES | scalar_products() | ELASTIC
 
 
 @dataclass(frozen=True)
@@ -239,8 +246,9 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     ]
     if not finite(answers, "v"):
         return None
+    slipped = [name for name in SLIPS if restitution.read.stated or name not in ELASTIC]
     for e in restitution.candidates:
-        one = chain(((impulse, "") for impulse in SLIPS), (("", update) for update in UPDATES))
+        one = chain(((impulse, "") for impulse in slipped), (("", update) for update in UPDATES))
         if (found := fitting(one, seen, e)) is None and (
             slips := components(seen, IMPULSES[""], e)
         ) is not None:

@@ -101,9 +101,9 @@ class Restitution:
         return judged(
             "restitution at other speeds",
             "2c",
-            "What is the restitution of the same two spheres at 2 mm/s and at 200 m/s?",
+            "Have the same two spheres that restitution at 2 mm/s and at 200 m/s, too?",
             f"{shown(self.slow)} and {shown(self.fast)}",
-            f"as at 2 m/s, {shown(self.came)}",
+            f"{shown(self.came)}, as at 2 m/s",
             near([self.slow, self.fast], self.came),
             mistake or "the restitution depends on the speed",
         )

@@ -32,8 +32,8 @@ STYLE = {
 }
 SHORT = {"right": "ok", "free choice": "ok", "fault": "FAULT", "follows": "<-", "not asked": "-"}
 LEGEND = (
-    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked,"
-    " as the file cannot be read or called that far."
+    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked:"
+    " the file has no such part, or cannot be judged that far."
 )
 
 
@@ -105,8 +105,8 @@ def print_scene(scenes: Sequence[Smallest], page: Path) -> None:
     console.print(Padding(grid, (0, 0, 0, 3)), highlight=False)
     if len(one.of) > 1:
         console.print(f"   {together(one)}", highlight=False)
-    for other in scenes[1:]:
-        console.print(f"{page.name} also has that of {faults_of(other)}.", highlight=False)
+    if others := " and ".join(map(faults_of, scenes[1:])):
+        console.print(f"{page.name} also has the smallest scene of {others}.", highlight=False)
 
 
 def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:

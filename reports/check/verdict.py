@@ -114,7 +114,12 @@ def sentence(row: CheckRow) -> str:
 
 def headline(row: CheckRow) -> str:
     """Where, and what is likely wrong."""
-    return f"{task_title(row.task)}: {row.cause}."
+    what = f", {row.name}" if row.name in PARTS_OF_A_TASK else ""
+    return f"{task_title(row.task)}{what}: {row.cause}."
+
+
+# what a cause of theirs calls "it"
+PARTS_OF_A_TASK = ("velocity", "position", "spin", "angle", "turns", "edges", "ufo")
 
 
 def numbers_of(row: CheckRow) -> list[str]:
