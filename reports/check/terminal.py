@@ -166,6 +166,8 @@ def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]
     console.print(total(checks), highlight=False)
     if others:
         console.print(f"No .js and no .py file, so not read: {named(others)}.", highlight=False)
+    if any(one.faults for one in checks):
+        console.print("crosscheck check FILE shows the lines and the numbers of one.")
 
 
 def total(checks: Sequence[FileCheck]) -> str:

@@ -42,6 +42,7 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
 
     assert "5 solvers: 1 without a fault, 2 with a fault, 2 not checked, as said above." in reported
     assert "<-: wrong because of a FAULT to the left of it." in reported
+    assert "crosscheck check FILE shows the lines and the numbers of one." in reported
     (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
     assert not {"ok", "FAULT"} & set(eve.split())
     assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"

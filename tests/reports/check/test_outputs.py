@@ -4,6 +4,7 @@ file as an engine."""
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -23,7 +24,7 @@ from reports.check.rows import CheckRow
 from reports.check.smallest import Smallest, smallest_scene, smallest_scenes
 from reports.check.verdict import check_file
 from tests.reports.page.browsing import opened, overhang
-from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, process
+from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, on_terminal, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
@@ -91,6 +92,19 @@ def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_lin
     assert max(map(len, wrong.splitlines())) <= 80
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", [80, 40])
+def test_a_check_of_one_file_says_what_it_does_meanwhile(folder: Path, columns: int):
+    """It takes seconds: the file, then the search for a scene; gone at the end, and in a pipe."""
+    words = ("check", "ben/Exercise.js", "--page", "p.html")
+    done = on_terminal(columns, *words, cwd=folder)
+    piped = crosscheck(*words, cwd=folder)
+
+    assert "checking Exercise.js" in done.stdout
+    assert "looking for the smallest scene" in done.stdout
+    assert not re.search("checking|looking for", piped.stdout + piped.stderr)
+
+
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
     """JSON of a folder: four files in order, as the schema says; what is no text is refused with
     its reason."""
@@ -124,6 +138,7 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
         (["anna/Exercise.js", "--page", ""], '"": is not there; name a file or a folder'),
         (["class.txt"], "a solver is a .js or a .py file"),
         (["empty"], "holds no .js and no .py file"),
+        (["zipped"], "zipped: holds no .js and no .py file, only exercise.zip"),
         (
             ["anna/Exercise.js", "--junit", "no/such/x.xml"],
             "--junit no/such/x.xml: No such file or directory",
@@ -159,6 +174,8 @@ def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], me
     """No traceback, whatever is asked for."""
     (folder / "class.txt").write_text("mine")
     (folder / "empty").mkdir(exist_ok=True)
+    (folder / "zipped").mkdir(exist_ok=True)
+    (folder / "zipped" / "exercise.zip").write_bytes(b"PK")
     with mock.patch.object(command, "checked", side_effect=command.checked) as asked:
         done = crosscheck("check", *words, cwd=folder)
 
