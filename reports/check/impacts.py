@@ -48,12 +48,16 @@ NEVER = "the velocities never change: not implemented, or the function returns b
 BACKWARDS = (
     "the normal has the wrong direction: with the signs of this file it must point from B to A"
 )
+HALF_TURNED = (
+    "the normal points the wrong way where xA < xB: atan gives half of the directions, atan2 all"
+)
 APPROACH = "the test for approach has the wrong sign: only pairs that part get an impulse"
 # What a solver may take for J n, N s
 IMPULSES: dict[str, Impulse] = {
     "": scaled(lambda h, e: 1.0),
     NEVER: scaled(lambda h, e: 0.0),
     APPROACH: scaled(lambda h, e: 0.0),
+    HALF_TURNED: scaled(lambda h, e: float(h.n[0] > 0)),  # and a test for approach
     "the factor (1 + e) is missing": scaled(lambda h, e: 1 / (1 + e)),
     "the factor is e, not (1 + e)": scaled(lambda h, e: e / (1 + e)),
     "the factor is (1 - e), not (1 + e)": scaled(lambda h, e: (1 - e) / (1 + e)),
@@ -117,7 +121,7 @@ IMPULSES: dict[str, Impulse] = {
     "the velocities are added, not subtracted": lambda h, e: (
         -(1 + e) * ((h.va + h.vb) @ h.n) * h.mu * h.n
     ),
-    "the whole relative velocity is used, not its part along the normal": lambda h, e: (
+    "the whole relative velocity is used, with its tangential part": lambda h, e: (
         -(1 + e) * h.u * h.mu
     ),
     "the relative speed is used instead of its normal part": lambda h, e: (
@@ -247,13 +251,14 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     if not finite(answers, "v"):
         return None
     slipped = [name for name in SLIPS if restitution.read.stated or name not in ELASTIC]
+    impulses = [name for name in slipped if name in IMPULSES | ELASTIC]
     for e in restitution.candidates:
         one = chain(((impulse, "") for impulse in slipped), (("", update) for update in UPDATES))
         if (found := fitting(one, seen, e)) is None and (
             slips := components(seen, IMPULSES[""], e)
         ) is not None:
             found = Finding("", slips[0], "2d", e, IMPULSES[""], slips[1])
-        if found := found or fitting(product(IMPULSES, UPDATES), seen, e):
+        if found := found or fitting(product(impulses, UPDATES), seen, e):
             wrong_way = found.impulse == NEVER and follows_print(answers, e)
             return replace(found, impulse=APPROACH) if wrong_way else found
     return None

@@ -65,6 +65,11 @@ class Seen:
         return np.asarray(self.pair.ma * self.change[0])
 
     @property
+    def shown_impulse(self) -> Array:
+        """J n as far as it is known, N s: a mistake in (d) changes what A gets."""
+        return self.computed_impulse if self.found else self.received
+
+    @property
     def right_c(self) -> bool:
         """Whether the impulse is known to be right."""
         return self.found is not None and not self.found.impulse
@@ -137,7 +142,7 @@ def normal_impulse(seen: Seen) -> CheckRow:
         "impulse",
         "2c",
         f"What impulse does A get from B, for masses of {masses}?",
-        f"{shown(seen.received @ seen.pair.n)} N s along the normal",
+        f"{shown(seen.shown_impulse @ seen.pair.n)} N s along the normal",
         f"{shown(seen.right_impulse @ seen.pair.n)} N s",
         # what is wrong across the normal is the next row's
         seen.right_c or near(seen.received @ seen.pair.n, seen.right_impulse @ seen.pair.n),
@@ -147,7 +152,7 @@ def normal_impulse(seen: Seen) -> CheckRow:
 
 def tangential_impulse(seen: Seen) -> CheckRow:
     """None, as there is no friction."""
-    across = float(seen.received @ tangent(seen.pair))
+    across = float(seen.shown_impulse @ tangent(seen.pair))
     return judged(
         "tangential part",
         "2c",
