@@ -11,7 +11,6 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.own_solver.file import printable
-from adapters.own_solver.restitution import code_of
 from reports.check.rows import TASKS, CheckRow
 from reports.check.scene_words import faults_of, scene_lines, together
 from reports.check.verdict import FileCheck, headline, named, numbers_of
@@ -161,7 +160,7 @@ def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]
         console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
     console.print()
     for names in same_code(folder, checks):
-        said = f"The same code, but for comments and spaces: {', '.join(names)}."
+        said = f"The same code, but for spaces and lines of comments: {', '.join(names)}."
         console.print(legible(said), highlight=False)
     console.print(total(checks), highlight=False)
     if others:
@@ -183,6 +182,13 @@ def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
     names: dict[str, list[str]] = {}
     for one in checks:
         if one.solver is not None:
-            code = "".join(code_of(one.solver.text).split())
-            names.setdefault(code, []).append(name_in(folder, one))
+            comment = "#" if one.path.suffix.lower() == ".py" else "//"
+            names.setdefault(bare(one.solver.text, comment), []).append(name_in(folder, one))
     return [alike for alike in names.values() if len(alike) > 1]
+
+
+def bare(text: str, comment: str) -> str:
+    """A text without spaces and without its lines that are comments; one behind code stays, as
+    what begins it may also stand in a string."""
+    lines = ("".join(line.split()) for line in text.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith(comment))

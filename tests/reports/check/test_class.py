@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from reports.check import command
-from reports.check.terminal import same_code
+from reports.check.terminal import bare, same_code
 from reports.check.verdict import check_file, named
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
@@ -78,12 +78,14 @@ def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_
 
 
 def test_copies_in_a_class_are_named_and_others_are_not(folder: Path):
-    """A copy with other comments and spaces is the same code; the wrong file is not."""
+    """A copy with other spaces and lines of comments is the same code; the wrong file is not, and
+    neither is a right one that differs only behind a division of whole numbers."""
     (folder / "eve.js").write_text("// mine\n\n" + RIGHT.read_text().replace("  ", "    "))
     checks = [check_file(folder / name) for name in ("anna/Exercise.js", "eve.js")]
     wrong = check_file(folder / "ben" / "Exercise.js")
 
     assert same_code(folder, [*checks, wrong]) == [["anna/Exercise.js", "eve.js"]]
+    assert bare("x = a // b\n", "#") != bare("x = a // c\n", "#")
 
 
 def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
