@@ -12,18 +12,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling
+from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling, printable
 from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess
 from reports.check.functions import keeps_state
 from reports.check.machine import as_json, as_junit
+from reports.check.rows import CheckRow
 from reports.check.terminal import print_class, print_file, print_scene
-from reports.check.verdict import NONE, FileCheck, check_file
+from reports.check.verdict import FileCheck, check_file, nothing_in
 from reports.run.made import may_overwrite, sealed
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import put_text
+from reports.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from reports.check.smallest import Smallest
@@ -47,7 +49,7 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
     if page is None and not path.is_dir() and not json_wanted:
         page = Path("check.html")
     places_for(page, junit)
-    checks = checked(files, path.is_dir() and not json_wanted)
+    checks = checked(files)
     if not path.is_dir() and checks[0].refused:
         refuse([checks[0].refused])
     if json_wanted:
@@ -59,7 +61,7 @@ def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) 
     if page is not None:
         scenes = scenes_of(checks[0])
         if scenes and not json_wanted:
-            print_scene(scenes[0], page)
+            print_scene(scenes, page)
         make_page(page, checks[0], scenes)
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
 
@@ -68,7 +70,7 @@ def files_of(path: Path) -> list[Path]:
     """The file, or all solvers below a folder, links to nothing too, in order of their names; exits
     2 without any.
 
-    Where every solver has a folder of its own, a folder without one stands among them.
+    Where most solvers have a folder of their own, a folder without one stands among them.
     """
     try:
         there = path.exists()
@@ -91,12 +93,13 @@ def files_of(path: Path) -> list[Path]:
         and not is_handed_out(file)
     )
     if not found:
-        refuse([f"{path}: {NONE}"])
+        refuse([f"{path}: {nothing_in(path)}"])
     owners = {file.relative_to(path).parts[0] for file in found}
     empty = [
         one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners
     ]
-    return found if any(file.parent == path for file in found) else sorted(found + empty)
+    loose = sum(file.parent == path for file in found)
+    return found if 2 * loose >= len(found) else sorted(found + empty)
 
 
 def others_in(folder: Path) -> list[str]:
@@ -135,17 +138,17 @@ def is_handed_out(file: Path) -> bool:
     return file.match(HANDED_OUT) or file.name == "mainScript.js"
 
 
-def checked(files: Sequence[Path], progress: bool) -> list[FileCheck]:
+def checked(files: Sequence[Path]) -> list[FileCheck]:
     """The checks in order, as many at once as there are cores, in workers: those can be stopped
     whatever they do."""
     tasks: dict[Hashable, Any] = {file: partial(check_file, file) for file in files}
     done: dict[Path, FileCheck] = {}
-    with closing(run_all(tasks, min(os.cpu_count() or 1, len(files)), CHECKING)) as results:
+    results = run_all(tasks, min(os.cpu_count() or 1, len(files)), CHECKING)
+    with closing(results), Progress() as progress:
+        progress.start(len(files), len(files), f"checking {printable(files[0].name)}")
         for file, one in results:
             done[file] = not_checked(file, one) if isinstance(one, Failure) else one
-            if progress and sys.stderr.isatty():
-                end = "\n" if len(done) == len(files) else ""
-                print(f"\r{len(done)} of {len(files)}", end=end, file=sys.stderr)
+            progress.done(f"checked {printable(str(file.relative_to(file.parent.parent)))}")
     return [done[file] for file in files]
 
 
@@ -158,9 +161,9 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
     """Of each fault that has a sentence the smallest scene that shows it, if one is found."""
     if not one.faults or one.restitution is None or one.solver is None:
         return []
-    tasks = [row.task for row in one.findings]
-    search = partial(scenes_here, one.solver, one.restitution, tasks, keeps_state(one.rows))
-    with closing(run_all({one.path: search}, 1, CHECKING)) as results:
+    search = partial(scenes_here, one.solver, one.restitution, one.findings, keeps_state(one.rows))
+    with closing(run_all({one.path: search}, 1, CHECKING)) as results, Progress() as progress:
+        progress.say("looking for the smallest scene that shows each fault")
         [(_, found)] = results
     return [] if isinstance(found, Failure) else found  # the rows say how it failed
 
@@ -178,15 +181,14 @@ def make_page(path: Path, one: FileCheck, scenes: Sequence[Smallest]) -> None:
 
 
 def scenes_here(
-    solver: SolverText, restitution: float, tasks: Sequence[str], afresh: bool
+    solver: SolverText, restitution: float, findings: Sequence[CheckRow], afresh: bool
 ) -> list[Smallest]:
-    """In a worker: the smallest scenes that show faults of a solver in these tasks; none if the
-    solver fails."""
+    """In a worker: the smallest scenes that show these faults of a solver; none if it fails."""
     from reports.check.smallest import smallest_scenes
 
     try:
         with SolverProcess(solver) as process:
-            return smallest_scenes(process, restitution, tasks, afresh)
+            return smallest_scenes(process, restitution, findings, afresh)
     except SolverFailed:
         return []
 

@@ -48,12 +48,16 @@ NEVER = "the velocities never change: not implemented, or the function returns b
 BACKWARDS = (
     "the normal has the wrong direction: with the signs of this file it must point from B to A"
 )
+HALF_TURNED = (
+    "the normal points the wrong way where xA < xB: atan gives half of the directions, atan2 all"
+)
 APPROACH = "the test for approach has the wrong sign: only pairs that part get an impulse"
 # What a solver may take for J n, N s
 IMPULSES: dict[str, Impulse] = {
     "": scaled(lambda h, e: 1.0),
     NEVER: scaled(lambda h, e: 0.0),
     APPROACH: scaled(lambda h, e: 0.0),
+    HALF_TURNED: scaled(lambda h, e: float(h.n[0] > 0)),  # and a test for approach
     "the factor (1 + e) is missing": scaled(lambda h, e: 1 / (1 + e)),
     "the factor is e, not (1 + e)": scaled(lambda h, e: e / (1 + e)),
     "the factor is (1 - e), not (1 + e)": scaled(lambda h, e: (1 - e) / (1 + e)),
@@ -202,7 +206,14 @@ UPDATES: dict[str, Update] = {
 }
 
 
-SLIPS = IMPULSES | scalar_products()
+# only asked of a file that states another e than 1, as it may be written for this one
+ELASTIC: dict[str, Impulse] = {
+    "e is not used: the collision is elastic": scaled(lambda h, e: 2 / (1 + e)),
+    "x and y are treated as two collisions on a line, and without e": (
+        lambda h, e: -2 * h.u * h.mu
+    ),
+}
+SLIPS = IMPULSES | scalar_products() | ELASTIC
 
 
 @dataclass(frozen=True)
@@ -239,13 +250,15 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     ]
     if not finite(answers, "v"):
         return None
+    slipped = [name for name in SLIPS if restitution.read.stated or name not in ELASTIC]
+    impulses = [name for name in slipped if name in IMPULSES | ELASTIC]
     for e in restitution.candidates:
-        one = chain(((impulse, "") for impulse in SLIPS), (("", update) for update in UPDATES))
+        one = chain(((impulse, "") for impulse in slipped), (("", update) for update in UPDATES))
         if (found := fitting(one, seen, e)) is None and (
             slips := components(seen, IMPULSES[""], e)
         ) is not None:
             found = Finding("", slips[0], "2d", e, IMPULSES[""], slips[1])
-        if found := found or fitting(product(IMPULSES, UPDATES), seen, e):
+        if found := found or fitting(product(impulses, UPDATES), seen, e):
             wrong_way = found.impulse == NEVER and follows_print(answers, e)
             return replace(found, impulse=APPROACH) if wrong_way else found
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,8 @@ class Seen:
         found: the impulse and the update that give all collisions, None if none do.
         e: the restitution that it is judged by.
         impulse, update: the mistake in (c) and the one in (d), "" where none is known.
+        opposite: whether in every collision A and B get opposite impulses: whatever J is, it is
+            applied as (d) has it.
     """
 
     pair: PairCollision
@@ -32,6 +35,7 @@ class Seen:
     e: float
     impulse: str
     update: str
+    opposite: bool
 
     @property
     def mistake(self) -> str:
@@ -46,7 +50,9 @@ class Seen:
     @property
     def computed_impulse(self) -> Array:
         """J n as the file computes it, right or wrong, so that (d) is judged by itself, N s."""
-        return self.found.law(self.pair, self.found.e) if self.found else self.right_impulse
+        if self.found:
+            return self.found.law(self.pair, self.found.e)
+        return self.received if self.opposite else self.right_impulse
 
     @property
     def change(self) -> Array:
@@ -57,6 +63,11 @@ class Seen:
     def received(self) -> Array:
         """What A got from B, N s."""
         return np.asarray(self.pair.ma * self.change[0])
+
+    @property
+    def shown_impulse(self) -> Array:
+        """J n as far as it is known, N s: a mistake in (d) changes what A gets."""
+        return self.computed_impulse if self.found else self.received
 
     @property
     def right_c(self) -> bool:
@@ -88,7 +99,7 @@ def impulse_rows(
         momentum(seen),
         # The velocities say more of a mistake in (d) than the energy that it spoils.
         *(spoilt_rows(seen, restitution, spoilt) if spoilt == "2d" else []),
-        symmetry(answers, seen.mistake),
+        symmetry(answers, seen),
         bystanders(answers),
     ]
 
@@ -106,7 +117,22 @@ def seen_in(answers: dict[str, Answer], restitution: Restitution, found: Finding
         e,
         restitution.mistake or (found.impulse if found else partly(answers, e)),
         found.update if found and found.task == "2d" else "",
+        opposite_impulses(answers),
     )
+
+
+def opposite_impulses(answers: dict[str, Answer]) -> bool:
+    """Whether every pair keeps its momentum, whichever sphere is called A."""
+    for name in (*COLLISIONS, *map(swapped, COLLISIONS)):
+        balls, (a, b) = QUESTIONS[name].balls, changes(QUESTIONS[name].balls, answers[name].last)
+        if not near(balls[0].m * a, -balls[1].m * b):
+            return False
+    return True
+
+
+def swapped(name: str) -> str:
+    """The question on the same pair with A and B exchanged in the call."""
+    return name.replace("collision/", "swapped/")
 
 
 def normal_impulse(seen: Seen) -> CheckRow:
@@ -116,7 +142,7 @@ def normal_impulse(seen: Seen) -> CheckRow:
         "impulse",
         "2c",
         f"What impulse does A get from B, for masses of {masses}?",
-        f"{shown(seen.received @ seen.pair.n)} N s along the normal",
+        f"{shown(seen.shown_impulse @ seen.pair.n)} N s along the normal",
         f"{shown(seen.right_impulse @ seen.pair.n)} N s",
         # what is wrong across the normal is the next row's
         seen.right_c or near(seen.received @ seen.pair.n, seen.right_impulse @ seen.pair.n),
@@ -126,7 +152,7 @@ def normal_impulse(seen: Seen) -> CheckRow:
 
 def tangential_impulse(seen: Seen) -> CheckRow:
     """None, as there is no friction."""
-    across = float(seen.received @ tangent(seen.pair))
+    across = float(seen.shown_impulse @ tangent(seen.pair))
     return judged(
         "tangential part",
         "2c",
@@ -239,7 +265,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
 def partly(answers: dict[str, Answer], e: float) -> str:
     """Where no single mistake gives all collisions: whether some of them are right, or the order of
     A and B matters."""
-    if symmetry(answers, "").verdict == "fault":
+    if not alike_if_swapped(answers):
         return UNALIKE
     if only_across(answers, e):
         return FRICTION
@@ -313,22 +339,30 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> C
 UNALIKE = "the result depends on which sphere is A: the two are not treated alike"
 
 
-def symmetry(answers: dict[str, Answer], mistake: str) -> CheckRow:
-    """Who is called A must not matter to the velocities."""
-    names = list(COLLISIONS)
-    came = [np.array([b.v for b in answers[n].last]) for n in names]
-    swapped = [
-        np.array([b.v for b in answers[n.replace("collision/", "swapped/")].last]) for n in names
-    ]
-    same = all(near(x, y) for x, y in zip(came, swapped))
+FIRST = next(iter(COLLISIONS))
+
+
+def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(COLLISIONS)) -> bool:
+    """Whether the velocities after each of these collisions do not depend on who is called A."""
+    return all(
+        near([b.v for b in answers[name].last], [b.v for b in answers[swapped(name)].last])
+        for name in asked
+    )
+
+
+def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
+    """Who is called A must not matter to the velocities. Where both get opposite impulses (d) is
+    right, and it is the impulse that depends on it."""
+    first = next((name for name in COLLISIONS if not alike_if_swapped(answers, [name])), FIRST)
+    task, mistake = ("2c", seen.impulse) if seen.opposite else ("2d", seen.update)
     return judged(
-        "order",
-        "2d",
+        "A and B exchanged",
+        task,
         "Are the velocities the same if A and B are exchanged in the call?",
-        shown(swapped[0][0]) + " m/s",
-        shown(came[0][0]) + " m/s",
-        same,
-        mistake or UNALIKE,
+        f"the same sphere has {shown(answers[swapped(first)].last[0].v)} m/s",
+        f"{shown(answers[first].last[0].v)} m/s, as before the exchange",
+        alike_if_swapped(answers),
+        mistake or seen.mistake or UNALIKE,
     )
 
 

@@ -190,7 +190,7 @@ def impelling(seen: Sequence[Access], cause: str) -> list[int]:
     about: tuple[str, ...] = ("velocity", "mass")
     if re.search(r"velocit|scalar product|relative", cause):
         about = ("velocity",)
-    elif re.search(r"mass|bracket|\(1 [+-] e\)|e = ", cause):
+    elif re.search(r"mass|m[AB]|\be is|bracket|\(1 [+-] e\)|e = ", cause):
         about = ("mass",)
     for fields in (about, ("velocity", "mass")):
         for after in (seen[displaced + 1 :], seen):

@@ -50,11 +50,11 @@ def row_as_json(row: CheckRow) -> dict[str, Any]:
 
 
 def as_junit(checks: Sequence[FileCheck]) -> str:
-    """A test suite a file, a test case a row; a fault is a failure, what was not asked is
-    skipped."""
+    """A test suite a file, a test case a row; a fault is a failure, what was not asked or follows
+    from a fault is skipped."""
     suites = ElementTree.Element("testsuites", name="crosscheck check")
     for one in checks:
-        skipped = sum(row.verdict == "not asked" for row in one.rows)
+        skipped = sum(row.verdict in ("not asked", "follows") for row in one.rows)
         suite = ElementTree.SubElement(
             suites,
             "testsuite",
@@ -79,7 +79,7 @@ def as_junit(checks: Sequence[FileCheck]) -> str:
             if row.verdict == "fault":
                 failure = ElementTree.SubElement(case, "failure", message=plain(row.cause))
                 failure.text = plain("\n".join([row.asked, *evidence(row)]))
-            elif row.verdict == "not asked":
+            elif row.verdict in ("not asked", "follows"):
                 ElementTree.SubElement(case, "skipped", message=plain(row.cause))
     ElementTree.indent(suites)
     return ElementTree.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"

@@ -152,7 +152,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     )
     spin = law_row(
         "spin",
-        "What angular velocity has it after one step under a torque?",
+        "What angular velocity has a sphere after one step under a torque?",
         "rad/s",
         UNDER_TORQUE,
         angular,
@@ -161,7 +161,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     )
     angle = law_row(
         "angle",
-        "What is its angle then, its angular velocity being what came?",
+        "What angle has a sphere after that step, by the angular velocity that it has then?",
         "rad",
         MOVED,
         angles,
@@ -172,7 +172,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
         velocity,
         law_row(
             "position",
-            "Where is it after that step, its velocity being what came?",
+            "Where is a sphere after that step, by the velocity that it has then?",
             "m",
             MOVED,
             places,

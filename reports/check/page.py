@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from adapters.run import Run
 from reports.check.rows import TASKS, Verdict, shown
-from reports.check.scene_words import scene_lines
+from reports.check.scene_words import faults_of, scene_lines, together
 from reports.check.smallest import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.page import style
@@ -30,6 +30,10 @@ GROUPS: dict[Verdict, tuple[str, str]] = {
         "A cause is named where its formula gives the same numbers to six digits. The lines are"
         " those of your file that read or write what is wrong.",
     ),
+    "follows": (
+        "Follows from the faults",
+        "These answers are wrong because of the faults above. Mend those first.",
+    ),
     "free choice": (
         "Free choices",
         "The exercise leaves these open. Whatever you chose is right; this only says what it is.",
@@ -44,6 +48,7 @@ class SceneShown(NamedTuple):
     """A smallest scene as the page has it: in words, and as a replay of some layers."""
 
     smallest: Smallest
+    title: str
     lines: list[str]
     layers: list[str]
     replay: str
@@ -67,6 +72,8 @@ def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None
         tasks=TASKS,
         groups=GROUPS,
         shows=shows,
+        together=together,
+        unseen=unseen(check, scenes),
         dt=shown(DT),
         version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
@@ -74,11 +81,18 @@ def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None
     put_text(path, sealed(html))
 
 
+def unseen(check: FileCheck, scenes: Sequence[Smallest]) -> list[int]:
+    """The numbers of the faults that no scene shows."""
+    seen = {k for one in scenes for k in one.of}
+    return [k for k in range(1, len(check.findings) + 1) if k not in seen]
+
+
 def scene_shown(name: str, smallest: Smallest) -> SceneShown:
     """A scene for the page of the file of this name."""
     scenario, layers = smallest.scenario, layers_of(name, smallest)
     return SceneShown(
         smallest,
+        f"The smallest scene that shows {faults_of(smallest)}",
         scene_lines(scenario),
         [style.TRUTH if run is None else run.name for run, _ in layers],
         pack_layers(scenario, layers),

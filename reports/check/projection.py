@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.own_solver.restitution import EXERCISE
-from reports.check.impacts import BACKWARDS, Finding
+from reports.check.impacts import BACKWARDS, HALF_TURNED, Finding
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, Ball, direction, finite
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -33,6 +33,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     WRONG_SIGN: lambda s, a, b: -s.overlap,
     "only half of the overlap is taken out: it is halved twice": lambda s, a, b: s.overlap / 2,
     "the overlap is counted twice: each is moved by all of it": lambda s, a, b: 2 * s.overlap,
+    HALF_TURNED: lambda s, a, b: s.overlap * np.sign(a.x[0] - b.x[0]),
     "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
     "the sign is wrong, and the overlap is halved twice": lambda s, a, b: -s.overlap / 2,
     "the normal is not normalised": lambda s, a, b: s.overlap * s.distance,

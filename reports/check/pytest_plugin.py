@@ -63,8 +63,8 @@ class RowItem(pytest.Item):
         self.row = row
 
     def runtest(self) -> None:
-        """Fail by a fault, skip what could not be asked."""
-        if self.row.verdict == "not asked":
+        """Fail by a fault, skip what could not be asked or follows from a fault."""
+        if self.row.verdict in ("not asked", "follows"):
             pytest.skip(self.row.cause)
         if self.row.verdict == "fault":
             raise Fault(self.row.cause)

@@ -52,8 +52,16 @@ class Restitution:
 
     @property
     def played(self) -> float | None:
-        """The value that whole scenes are judged by; None if no number from 0 to 1 makes sense."""
-        return next((e for e in (self.came, self.own) if 0 <= e <= 1), None)
+        """The value that whole scenes are judged by: what came, if that is right or a free choice,
+        else the one that the file ought to have; None if no number from 0 to 1 makes sense."""
+        came = [self.came] if self.meant else []
+        return next((e for e in (*came, self.own) if 0 <= e <= 1), None)
+
+    @property
+    def meant(self) -> bool:
+        """Whether the file's collisions have the restitution that it is written for."""
+        right = near(self.came, EXERCISE) or near(self.came, self.own)
+        return right or len(self.candidates) > 1
 
     @property
     def mistake(self) -> str:
@@ -70,10 +78,13 @@ class Restitution:
 
         `mistake`: what is known to be wrong with the collisions, if anything.
         """
-        asked = "What is the restitution e, the speed of separation over that of approach?"
+        asked = (
+            "Two spheres of 1 kg meet head-on at 2 m/s: what is the restitution e, their speed of"
+            " separation over that of approach?"
+        )
         if near(self.came, EXERCISE):
             return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
-        if near(self.came, self.own) or len(self.candidates) > 1:
+        if self.meant:
             note = (
                 f"the file has e = {shown(self.came)}, the exercise 0.9; all is judged with the"
                 " file's"
@@ -88,11 +99,11 @@ class Restitution:
     def speeds(self, mistake: str) -> CheckRow:
         """The same at any speed; `mistake` as above."""
         return judged(
-            "any speed",
+            "restitution at other speeds",
             "2c",
-            "What is it for pairs that close at 2 mm/s and at 200 m/s?",
+            "Have the same two spheres that restitution at 2 mm/s and at 200 m/s, too?",
             f"{shown(self.slow)} and {shown(self.fast)}",
-            f"as at 2 m/s, {shown(self.came)}",
+            f"{shown(self.came)}, as at 2 m/s",
             near([self.slow, self.fast], self.came),
             mistake or "the restitution depends on the speed",
         )

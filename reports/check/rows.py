@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-Verdict = Literal["right", "fault", "free choice", "not asked"]
+Verdict = Literal["right", "fault", "follows", "free choice", "not asked"]
 # Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more
 # than that.
 TOLERANCE = 1e-6
@@ -69,7 +69,8 @@ class CheckRow:
         task: the key in `TASKS` of the part of the exercise it belongs to.
         asked: the question, one sentence.
         got, expected: the answer and the right one, with units.
-        verdict: "right"; "fault"; "free choice": the exercise leaves it to the author, so that no
+        verdict: "right"; "fault"; "follows": another answer, because of a fault in another task
+            (consequences.py); "free choice": the exercise leaves it to the author, so that no
             answer is wrong; "not asked": it could not be asked, and `cause` says why.
         cause: of a fault its likely cause; of a free choice what was chosen.
         lines: of a fault the lines of the file that it is about: number from 1, text.
@@ -153,5 +154,5 @@ def shown(value: object) -> str:
 def worst(rows: Iterable[CheckRow]) -> Verdict:
     """The verdict of a group of rows: its worst."""
     found = {row.verdict for row in rows}
-    order: tuple[Verdict, ...] = ("fault", "not asked", "right", "free choice")
+    order: tuple[Verdict, ...] = ("fault", "follows", "not asked", "right", "free choice")
     return next((verdict for verdict in order if verdict in found), "not asked")

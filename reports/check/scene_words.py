@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from reports.check.rows import shown
 from scenarios.model import Scenario
+
+if TYPE_CHECKING:
+    from reports.check.smallest import Smallest
 
 
 def scene_lines(scenario: Scenario) -> list[str]:
@@ -18,3 +23,14 @@ def scene_lines(scenario: Scenario) -> list[str]:
             lines[-1] += f", force {shown(thrust.force)} N, torque {shown(thrust.torque)} N m"
             lines[-1] += f", MoI {shown(scene.inertia[k])} kg m²"
     return lines
+
+
+def faults_of(one: Smallest) -> str:
+    """Which faults a scene shows: "fault 1", "faults 1 and 2"."""
+    return f"fault{'s' * (len(one.of) > 1)} {' and '.join(map(str, one.of))}"
+
+
+def together(one: Smallest) -> str:
+    """That several faults act on the same numbers of a scene."""
+    numbers = " and ".join(map(str, one.of))
+    return f"Faults {numbers} change the same numbers here: the scene shows them together."

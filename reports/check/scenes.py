@@ -150,7 +150,10 @@ def scene_row(
         return judged(scenario.name, "scenes", scenario.asks, got, expected, False, cause)
     where = f"{shown(away[at, disk])} m from its exact position"
     got = f"sphere {disk} is {where} at {shown(truth.t[at])} s"
-    expected = f"at most {shown(allowed[at, 0])} m, by dt = {shown(dt)} s"
+    by = f"by dt = {shown(dt)} s"
+    if scenario.scene.n > 1:
+        by += f"; the exact position is that of e = {shown(scenario.scene.restitution)}"
+    expected = f"at most {shown(allowed[at, 0])} m, {by}"
     return judged(
         scenario.name, "scenes", scenario.asks, got, expected, bool(ratio.max() <= 1), cause
     )
@@ -227,8 +230,9 @@ def first_wrong(scenario: Scenario, contacts: Array, dt: float, part: str = "") 
 
 
 def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str]:
-    """What is wrong with one call, by the part of task 2 that it shows: "2a", "2b", or "2c", which
-    stands for the velocities; {} if nothing is.
+    """What is wrong with one call, by the part of task 2 that it shows: "2a", "2b", "2c", which
+    stands for the velocities, and "2c and 2d", where neither sphere gets the right impulse and
+    both together get one; {} if nothing is.
 
     states: (2, 2, 4) before and after, of i and j, x, y, vx, vy.
     """
@@ -263,6 +267,11 @@ def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str
             f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not"
             f" {shown(states[0, k, 2:] + change[k])} m/s"
         )
+        impulse = came * scene.mass[[i, j], None]
+        wrong_both = not near(impulse[0], J * n) and not near(impulse[1], -J * n)
+        if wrong_both and not near(impulse.sum(axis=0), 0.0):
+            added = f"together they get {shown(impulse.sum(axis=0))} kg m/s"
+            faults["2c and 2d"] = f"{faults['2c']}; {added}"
     return faults
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from tempfile import TemporaryDirectory
 from time import monotonic
 
@@ -18,7 +19,7 @@ from hypothesis.errors import Flaky, NoSuchExample
 
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
-from reports.check.rows import TOLERANCE, near, shown
+from reports.check.rows import SAME_AGAIN, TOLERANCE, CheckRow, near, shown
 from reports.check.scenes import SceneAnswer, first_wrong, play_scene, scene_of, truth_of
 from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
@@ -63,21 +64,45 @@ class Smallest:
     of: tuple[int, ...] = (1,)
 
 
-# task -> what a scene shows of it: a flight, an overlap that is seen or not, a distance, velocities
-PARTS = {"1": "1", "2a": "2a", "2b": "2b", "2c": "2c", "2d": "2c", "file": "", "scenes": ""}
+# Task, or row of a task -> what a scene shows of it: where a flight leads, how it turns, an overlap
+# that is seen or not, a distance, velocities, momentum.
+PARTS = {"1": "1", "2a": "2a", "2b": "2b", "2c": "2c", "2d": "2d", "file": "", "scenes": ""}
+ROWS = {
+    "velocity": "place",
+    "position": "place",
+    "spin": "turn",
+    "angle": "turn",
+    "turns": "turn",
+    "velocities": "2c",
+}
+UNSEEN = ("rest kept", "force kept", "sphere kept", "input only", SAME_AGAIN)  # in no scene
+BOTH = "2c and 2d"
 
 
 def smallest_scenes(
-    process: SolverProcess, e: float, tasks: Sequence[str], afresh: bool = False
+    process: SolverProcess, e: float, findings: Sequence[CheckRow], afresh: bool = False
 ) -> list[Smallest]:
-    """Of each fault, by its task, the smallest scene that shows it; one scene for those that show
-    in the same. Of the loop there is none: a scene is played by the loop of the exercise."""
+    """Of each fault the smallest scene that shows it, as far as one is found; one scene for a fault
+    in 2c and one in 2d, if both can be told from it. Of the loop there is none: a scene is played
+    by the loop of the exercise."""
+    search = partial(smallest_scene, process, e, afresh)
+    of = {part: k for k, part in reversed([*enumerate(map(part_of, findings), 1)])}
+    if list(of) == [None]:  # a single fault may show in anything
+        of = {"": 1}
     found = []
-    for part in dict.fromkeys(PARTS[task] for task in tasks if task in PARTS):
-        of = tuple(k for k, task in enumerate(tasks, 1) if PARTS.get(task) == part)
-        if scene := smallest_scene(process, e, afresh, part):
-            found.append(replace(scene, of=of))
-    return found
+    if "2c" in of and "2d" in of:
+        # from a collision that shows either nobody could tell which
+        pair = tuple(sorted((of.pop("2c"), of.pop("2d"))))
+        found.append((pair, search(BOTH)))
+    found += [((k,), search(part)) for part, k in of.items() if part is not None]
+    return [
+        replace(scene, of=faults) for faults, scene in sorted(found, key=itemgetter(0)) if scene
+    ]
+
+
+def part_of(row: CheckRow) -> str | None:
+    """What a scene shows of a fault; None if nothing."""
+    return None if row.name in UNSEEN else ROWS.get(row.name, PARTS.get(row.task))
 
 
 def smallest_scene(
@@ -86,7 +111,7 @@ def smallest_scene(
     """The smallest that is found within `SECONDS`; None if none shows a fault.
 
     afresh: each scene is played by the file loaded anew, as one that keeps state needs.
-    part: one of `PARTS`, the only one that counts; "" for any.
+    part: what must be wrong: a value of `PARTS` or `ROWS`, or `BOTH`; "" for anything.
     """
     play = partial(play_scene, process, dt=DT, afresh=afresh)
     best = next((example for example in FIRST if fault_of(play, *example, e, part)), None)
@@ -187,8 +212,8 @@ def scenario_of(
 def fault_of(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> str:
-    """What is wrong with the file's motion in a scene, in one of `PARTS`; "" if nothing is, or it
-    is no scene."""
+    """What is wrong with the file's motion in a scene, of this part as in `smallest_scene`; "" if
+    nothing is, or it is no scene."""
     scenario = scenario_of(spheres, thrust, e, DURATION)
     if scenario is None:
         return ""
@@ -196,13 +221,19 @@ def fault_of(
         played = play(scenario)
     except SolverFailed as failure:
         return str(failure) if failure.kind == "error" else ""
-    met = "" if part == "1" else first_wrong(scenario, played.contacts, DT, part)
-    return met or (flight_fault(scenario, played) if part in ("", "1") else "")
+    if part in FLIGHTS:
+        return flight_fault(scenario, played, part)
+    met = first_wrong(scenario, played.contacts, DT, MEETING.get(part, part))
+    return met or ("" if part else flight_fault(scenario, played, "1"))
 
 
-def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
+FLIGHTS = ("1", "place", "turn")
+MEETING = {"2d": "2c"}  # whatever velocity is wrong, where 2d alone is
+
+
+def flight_fault(scenario: Scenario, played: SceneAnswer, part: str) -> str:
     """Whether a sphere that meets nobody flies as symplectic Euler does: x0 + v0 t + a t (t + dt) /
-    2 after t."""
+    2 after t; `part`: its "place", its "turn", or "1", either."""
     scene, t = scenario.scene, scenario.duration
     met = {int(i) for row in played.contacts for i in row[1:3]}
     for k in set(range(scene.n)) - met:
@@ -210,12 +241,12 @@ def flight_fault(scenario: Scenario, played: SceneAnswer) -> str:
         torque = sum(thrust.torque for thrust in scenario.thrusts if thrust.disk == k)
         x = scene.position[k] + scene.velocity[k] * t + force / scene.mass[k] * t * (t + DT) / 2
         angle = torque / scene.inertia[k] * t * (t + DT) / 2
-        if not near(played.position[-1, k], x, SINGLE):
+        if part != "turn" and not near(played.position[-1, k], x, SINGLE):
             return (
                 f"sphere {k} is at {shown(played.position[-1, k])} m after {shown(t)} s, not at"
                 f" {shown(x)} m"
             )
-        if not near(played.angle[-1, k], angle, SINGLE):
+        if part != "place" and not near(played.angle[-1, k], angle, SINGLE):
             turned = shown(played.angle[-1, k])
             return (
                 f"sphere {k} is turned by {turned} rad after {shown(t)} s, not by"

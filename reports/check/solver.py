@@ -11,6 +11,7 @@ import numpy as np
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of, own_text
+from reports.check.consequences import with_consequences
 from reports.check.detection import detection_rows
 from reports.check.functions import implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
@@ -80,7 +81,7 @@ def rows_of(
     else:
         rows += loop_rows(process, faulty)
     e = restitution.played if restitution is not None else None
-    rows += scene_rows(process, rows, e)
+    rows = with_consequences([*rows, *scene_rows(process, rows, e)])
     rows = hinted(rows, text) if process.kind == "javascript" else rows
     return with_lines(rows, source), e
 

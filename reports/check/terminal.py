@@ -11,9 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.own_solver.file import printable
-from reports.check.rows import FOLLOWS, TASKS, CheckRow
-from reports.check.scene_words import scene_lines
-from reports.check.verdict import FileCheck, named
+from reports.check.rows import TASKS, CheckRow
+from reports.check.scene_words import faults_of, scene_lines, together
+from reports.check.verdict import FileCheck, headline, named, numbers_of
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
@@ -22,61 +22,90 @@ from reports.terminal.tables import print_table
 if TYPE_CHECKING:
     from reports.check.smallest import Smallest
 
-STYLE = {"right": "green", "fault": "bold red", "free choice": "yellow", "not asked": "dim"}
-SHORT = {"right": "ok", "free choice": "ok", "fault": "FAULT", "not asked": "-"}
+STYLE = {
+    "right": "green",
+    "fault": "bold red",
+    "follows": "magenta",
+    "free choice": "yellow",
+    "not asked": "dim",
+}
+SHORT = {"right": "ok", "free choice": "ok", "fault": "FAULT", "follows": "<-", "not asked": "-"}
+LEGEND = (
+    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked:"
+    " the file has no such part, or cannot be judged that far."
+)
 
 
 def print_file(one: FileCheck) -> None:
-    """The sentences with the lines they are about, the verdict of every task, all faults, and the
-    free choices under a title that says what they are."""
+    """The sentences with the lines and the numbers they are about, the verdict of every task, what
+    follows from the faults, and the free choices under a title that says what they are."""
     console = Console()
     if one.passed:
         console.print(one.sentences[0], highlight=False)
-    for k, (sentence, row) in enumerate(zip(one.sentences, one.findings), 1):
-        console.print(f"{k}. {sentence}", highlight=False)
-        print_source(console, row)
+    for k, row in enumerate(one.findings, 1):
+        print_fault(console, k, row, one.also(row))
     console.print()
-    table = Table("task", "verdict", "asked", "faults", box=None, padding=(0, 2, 0, 0))
-    for task, title in TASKS.items():
-        rows, word = one.of(task), one.tasks[task]
-        if rows:
-            asked = sum(row.verdict != "not asked" for row in rows)
-            faults = sum(row.verdict == "fault" for row in rows)
-            table.add_row(title, Text(word, STYLE[word]), str(asked), str(faults or ""))
-    console.print(table)
-    if one.faults:
-        print_rows(console, "All faults:", [row for row in one.faults if row.cause != FOLLOWS])
-        follow = [row.name for row in one.faults if row.cause == FOLLOWS]
-        if follow:
-            console.print(f"  These follow from the faults above: {', '.join(follow)}.")
+    print_tasks(console, one)
+    if more := one.causes[len(one.findings) :]:
+        print_rows(console, "More faults:", more)
+    if one.consequences:
+        names: dict[str, list[str]] = {}
+        for row in one.consequences:
+            names.setdefault(TASKS[row.task], []).append(row.name)
+        follow = "; ".join(f"{title} ({', '.join(rows)})" for title, rows in names.items())
+        console.print(f"\nThese follow from the faults above: {follow}.", highlight=False)
     if one.choices:
         print_rows(
             console, "Free choices. The exercise leaves them open; none is a fault:", one.choices
         )
 
 
-def print_source(console: Console, row: CheckRow) -> None:
-    """The lines of the file that a fault is about, and the formula of the exercise."""
-    given = [(f"line {line}", text) for line, text in row.lines]
-    given += [("exercise", row.formula)] * bool(row.formula)
+def print_fault(console: Console, number: int, row: CheckRow, also: Sequence[CheckRow]) -> None:
+    """A numbered fault; below it the lines of the file, the formula of the exercise, and the
+    numbers of each question that shows it."""
+    numbered = Table.grid(padding=(0, 1, 0, 0))
+    numbered.add_row(f"{number}.", legible(headline(row)))
+    console.print(numbered)
     grid = Table.grid(padding=(0, 2, 0, 0))
-    for name, text in given:
-        grid.add_row(Text(name, "dim"), text)
-    if given:
-        console.print(Padding(grid, (0, 0, 0, 3)))
+    for line, text in row.lines:
+        grid.add_row(Text(f"line {line}", "dim"), legible(text))
+    if row.formula:
+        grid.add_row(Text("exercise", "dim"), row.formula)
+    for name, one in (("seen in", row), *(("also in", other) for other in also)):
+        if numbers := numbers_of(one):
+            grid.add_row(Text(name, "dim"), legible(" ".join(numbers)))
+    if grid.rows:
+        console.print(Padding(grid, (0, 0, 0, 3)), highlight=False)
 
 
-def print_scene(one: Smallest, page: Path) -> None:
-    """The smallest scene of the first fault in words, and where the replay is."""
-    console = Console()
-    which = " and ".join(map(str, one.of))
-    title = f"\nThe smallest scene that shows fault {which}, played in {page.name}:"
+def print_tasks(console: Console, one: FileCheck) -> None:
+    """The verdict of every task, how many questions were asked and how many answers are wrong."""
+    table = Table("task", "verdict", "asked", "wrong", box=None, padding=(0, 2, 0, 0))
+    for task, title in TASKS.items():
+        rows, word = one.of(task), one.tasks[task]
+        if rows:
+            asked = sum(row.verdict != "not asked" for row in rows)
+            wrong = sum(row.verdict in ("fault", "follows") for row in rows)
+            table.add_row(title, Text(word, STYLE[word]), str(asked), str(wrong or ""))
+    console.print(table)
+
+
+def print_scene(scenes: Sequence[Smallest], page: Path) -> None:
+    """The smallest scene of the first fault in words, and where its replay and the others are."""
+    console, one = Console(), scenes[0]
+    title = f"\nThe smallest scene that shows {faults_of(one)}, played in {page.name}:"
     console.print(title, highlight=False)
     grid = Table.grid(padding=(0, 2, 0, 0))
     for k, line in enumerate(scene_lines(one.scenario)):
         grid.add_row(Text(f"sphere {k}", "dim"), line)
+    if one.scenario.scene.n > 1:
+        grid.add_row(Text("e", "dim"), f"{one.scenario.scene.restitution:g}")
     grid.add_row(Text("wrong", STYLE["fault"]), legible(one.fault))
     console.print(Padding(grid, (0, 0, 0, 3)), highlight=False)
+    if len(one.of) > 1:
+        console.print(f"   {together(one)}", highlight=False)
+    if others := " and ".join(map(faults_of, scenes[1:])):
+        console.print(f"{page.name} also has the smallest scene of {others}.", highlight=False)
 
 
 def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
@@ -84,8 +113,7 @@ def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
     console.print(f"\n{title}", highlight=False)
     grid = Table.grid(padding=(0, 2, 0, 0))
     for row in rows:
-        numbers = f" (came: {row.got}; expected: {row.expected})" if row.verdict == "fault" else ""
-        said = Text.assemble((row.name, "bold"), f": {legible(row.cause + numbers)}")
+        said = Text.assemble((row.name, "bold"), f": {legible(row.cause)}")
         grid.add_row(Text(row.verdict, STYLE[row.verdict]), row.task, said)
     console.print(Padding(grid, (0, 0, 0, 2)))
 
@@ -105,8 +133,9 @@ def elided(name: str, room: int) -> str:
 
 
 def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]) -> None:
-    """A row a file, a verdict for every task or "-" if it is no solver; below, of each the sentence
-    to begin with. `others`: the files that lie beside them and are no solvers."""
+    """A row a file, a verdict for every task; below, what the signs mean, of each the sentence to
+    begin with, and which are copies. `others`: the files that lie beside them and are no
+    solvers."""
     console = Console()
     widest = {
         task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS
@@ -118,8 +147,9 @@ def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]
         words = [Text(SHORT[word], STYLE[word]) for word in one.tasks.values()]
         rows.append([elided(name_in(folder, one), room), *words])
     print_table(console, ["solver", *TASKS], rows, left=list(TASKS))
+    console.print(f"\n{LEGEND}", highlight=False)
     first = {
-        name_in(folder, one): one.sentences[0].removeprefix(f"{one.path}: ")
+        name_in(folder, one): one.brief.removeprefix(f"{one.path}: ")
         for one in checks
         if not one.passed
     }
@@ -128,9 +158,37 @@ def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]
     for name, sentence in first.items():
         begin = Text.assemble((name, "bold"), ": ", legible(sentence))
         console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
-    right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
-    rest = f"; {refused} not checked" if refused else ""
-    files = counted(len(checks) - refused, "file")
-    console.print(f"\n{right} of {files} without a fault{rest}.", highlight=False)
+    console.print()
+    for names in same_code(folder, checks):
+        said = f"The same code, but for spaces and lines of comments: {', '.join(names)}."
+        console.print(legible(said), highlight=False)
+    console.print(total(checks), highlight=False)
     if others:
         console.print(f"No .js and no .py file, so not read: {named(others)}.", highlight=False)
+    if any(one.faults for one in checks):
+        console.print("crosscheck check FILE shows the lines and the numbers of one.")
+
+
+def total(checks: Sequence[FileCheck]) -> str:
+    """How many there are, and how they fared."""
+    right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
+    parts = [f"{right} without a fault", f"{len(checks) - right - refused} with a fault"]
+    parts += [f"{refused} not checked, as said above"] * bool(refused)
+    return f"{counted(len(checks), 'solver')}: {', '.join(parts)}."
+
+
+def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
+    """The names of files that hold the same code, a list for each such code."""
+    names: dict[str, list[str]] = {}
+    for one in checks:
+        if one.solver is not None:
+            comment = "#" if one.path.suffix.lower() == ".py" else "//"
+            names.setdefault(bare(one.solver.text, comment), []).append(name_in(folder, one))
+    return [alike for alike in names.values() if len(alike) > 1]
+
+
+def bare(text: str, comment: str) -> str:
+    """A text without spaces and without its lines that are comments; one behind code stays, as
+    what begins it may also stand in a string."""
+    lines = ("".join(line.split()) for line in text.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith(comment))

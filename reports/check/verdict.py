@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
-from reports.check.rows import FOLLOWS, SAME_AGAIN, TASKS, CheckRow, Verdict, worst
+from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
 MOST = 3  # sentences
@@ -72,17 +72,62 @@ class FileCheck:
         return [sentence(row) for row in self.findings]
 
     @property
+    def brief(self) -> str:
+        """The first sentence; without its numbers where the cause is known."""
+        if self.passed or self.refused:
+            return self.sentences[0]
+        row = self.findings[0]
+        return sentence(row) if row.cause == UNKNOWN else headline(row)
+
+    @property
     def findings(self) -> list[CheckRow]:
         """The faults that the sentences are about, in their order."""
-        first = {row.cause: row for row in reversed(self.faults) if row.cause != FOLLOWS}
-        return (sorted(first.values(), key=self.faults.index) or self.faults[:1])[:MOST]
+        return self.causes[:MOST]
+
+    @property
+    def causes(self) -> list[CheckRow]:
+        """The first row of each cause, in order of the tasks."""
+        first = {(row.task, row.cause): row for row in reversed(self.faults)}
+        return sorted(first.values(), key=self.faults.index)
+
+    def also(self, finding: CheckRow) -> list[CheckRow]:
+        """The other rows that the same fault has."""
+        cause = (finding.task, finding.cause)
+        return [row for row in self.faults if (row.task, row.cause) == cause and row != finding]
+
+    def number_of(self, row: CheckRow) -> int:
+        """The number, from 1, of the sentence that a row belongs to; 0 if it has none."""
+        causes = [(one.task, one.cause) for one in self.findings]
+        cause = (row.task, row.cause)
+        return causes.index(cause) + 1 if row.verdict == "fault" and cause in causes else 0
+
+    @property
+    def consequences(self) -> list[CheckRow]:
+        """The rows that follow from the faults."""
+        return [row for row in self.rows if row.verdict == "follows"]
 
 
 def sentence(row: CheckRow) -> str:
-    """Where, what is likely wrong, and the numbers that say so."""
-    numbers = "" if row.name in WITHOUT_NUMBERS else f" Came: {row.got}. Expected: {row.expected}."
-    name = "" if row.name in WITHOUT_NUMBERS else f", {row.name}"
-    return f"{task_title(row.task)}{name}: {row.cause}.{numbers}"
+    """Where, what is likely wrong, and the question and the numbers that say so."""
+    return " ".join([headline(row), *numbers_of(row)])
+
+
+def headline(row: CheckRow) -> str:
+    """Where, and what is likely wrong."""
+    what = f", {row.name}" if row.name in PARTS_OF_A_TASK else ""
+    return f"{task_title(row.task)}{what}: {row.cause}."
+
+
+# what a cause of theirs calls "it"
+PARTS_OF_A_TASK = ("velocity", "position", "spin", "angle", "turns", "edges", "ufo")
+
+
+def numbers_of(row: CheckRow) -> list[str]:
+    """The question, what came and what was expected, a sentence each; nothing if the cause says
+    it."""
+    if row.name in WITHOUT_NUMBERS:
+        return []
+    return [row.asked, f"Came: {row.got}.", f"Expected: {row.expected}."]
 
 
 WITHOUT_NUMBERS = ("implemented", "loads", "answers", SAME_AGAIN)

@@ -4,7 +4,7 @@ the exit status."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -76,11 +76,17 @@ def print_summary(report: Report, page: str) -> None:
         print_table(console, headings, rows, title_of(len(comparisons), rough))
         console.print()
     print_list(
-        console, [*report.findings, *lines(report.said), *off_grid(report), statuses(report)]
+        console,
+        [*report.findings, *own_solvers(report.said), *off_grid(report), statuses(report)],
     )
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def own_solvers(said: Mapping[str, list[str]]) -> list[str]:
+    """What `check` says of each solver's file, a paragraph a file."""
+    return ["\n".join(lines({name: says})) for name, says in said.items()]
 
 
 def title_of(scenes: int, rough: bool = False) -> str:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from adapters.engines import OWN
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
@@ -142,7 +143,9 @@ def summary(
     """`engine:profile` -> a cell for each of `SUMMARY`: the median over the scenarios and the worst
     of them; of the last, in how many it was not played.
 
-    The best is the lowest of its group (`situations.grouped`), and whoever shows the same number.
+    A scene that a solver's own file refuses, as it is written for another restitution, was not
+    asked of it. The best is the lowest of its group (`situations.grouped`), and whoever shows the
+    same number.
     Who is `untrusted` broke the protocol of the harness and is not scored.
     """
     found = [values(comparison) for comparison in comparisons]
@@ -154,7 +157,7 @@ def summary(
         lost = [
             comparison.scenario.name
             for comparison, each in zip(comparisons, failed)
-            if name in each and comparison.scenario.name in scored
+            if name in each and comparison.scenario.name in scored and not unasked(name, each)
         ]
         cells = [
             pool(metric, name, comparisons, found, lost if metric == MAPPED else ())
@@ -164,12 +167,19 @@ def summary(
         if name in untrusted:
             broken = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
             cells = [broken] * len(cells)
-        count = sum(name in each for each in failed)
-        cells.append(OverviewCell(f"{count} of {len(comparisons)}", failed=count > 0, value=count))
+        asked = [each for each in failed if not unasked(name, each)]
+        count = sum(name in each for each in asked)
+        cells.append(OverviewCell(f"{count} of {len(asked)}", failed=count > 0, value=count))
         rows[name] = cells
     groups = situations.grouped(names, scores)
     marked = [mark_best({name: rows[name] for name in each}, untrusted) for each in groups.values()]
     return {name: each[name] for name in names for each in marked if name in each}
+
+
+def unasked(name: str, outcomes: Mapping[str, tuple[str, str]]) -> bool:
+    """Whether somebody's own file refused a scene; `outcomes`: of the engines that did not play
+    it."""
+    return name.endswith(OWN) and outcomes.get(name, ("", ""))[0] == OUTCOMES["unsupported"]
 
 
 def mark_best(

@@ -52,6 +52,13 @@ def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
     assert [
         mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])
     ] == []
+    assert spread([checks[tmp_path / mutant.name] for mutant in FAST if not mutant.second]) == {}
+
+
+def spread(checks: list[FileCheck]) -> dict[str, list[str]]:
+    """Of files with one fault each, those that are said to have faults in several tasks."""
+    tasks = {one.path.name: sorted({row.task for row in one.faults}) for one in checks}
+    return {name: found for name, found in tasks.items() if len(found) > 1}
 
 
 @pytest.mark.long
@@ -63,6 +70,7 @@ def test_the_committed_table_is_what_comes_out(tmp_path: Path):
     rows = {row["solver"]: row for row in csv.DictReader(TABLE.read_text().splitlines())}
 
     assert sum(right.values()) >= 0.95 * len(right)
+    assert spread([checks[tmp_path / mutant.name] for mutant in MUTANTS if not mutant.second]) == {}
     assert {name: rows[name]["first cause is right"] for name in right} == {
         name: "yes" if is_right else "no" for name, is_right in right.items()
     }

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from reports.check import command
+from reports.check.terminal import bare, same_code
 from reports.check.verdict import check_file, named
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
@@ -39,12 +40,14 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     (folder / "eve.js").unlink()
     reported = done.stdout.replace("\n", " ")
 
-    assert "1 of 3 files without a fault; 2 not checked." in done.stdout
+    assert "5 solvers: 1 without a fault, 2 with a fault, 2 not checked, as said above." in reported
+    assert "<-: wrong because of a FAULT to the left of it." in reported
+    assert "crosscheck check FILE shows the lines and the numbers of one." in reported
     (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
     assert not {"ok", "FAULT"} & set(eve.split())
     assert refused == f"{folder}/eve.js: is a link to gone.js, which is not there"
     assert "eve.js: is a link to gone.js, which is not there" in reported
-    assert "ben/Exercise.js: Task 2c impulse, impulse: it divides by (mA + mB)" in re.sub(
+    assert "ben/Exercise.js: Task 2c impulse: it divides by (mA + mB)" in re.sub(
         " +", " ", reported
     )
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
@@ -70,8 +73,19 @@ def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_
         ["with", "nothing", "-"]
     ]
     assert "  with nothing: holds no .js and no .py file" in done.stdout
-    assert "1 of 1 file without a fault; 2 not checked." in done.stdout
+    assert "3 solvers: 1 without a fault, 0 with a fault, 2 not checked, as said" in done.stdout
     assert (done.returncode, ".git" in done.stdout) == (1, False)
+
+
+def test_copies_in_a_class_are_named_and_others_are_not(folder: Path):
+    """A copy with other spaces and lines of comments is the same code; the wrong file is not, and
+    neither is a right one that differs only behind a division of whole numbers."""
+    (folder / "eve.js").write_text("// mine\n\n" + RIGHT.read_text().replace("  ", "    "))
+    checks = [check_file(folder / name) for name in ("anna/Exercise.js", "eve.js")]
+    wrong = check_file(folder / "ben" / "Exercise.js")
+
+    assert same_code(folder, [*checks, wrong]) == [["anna/Exercise.js", "eve.js"]]
+    assert bare("x = a // b\n", "#") != bare("x = a // c\n", "#")
 
 
 def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
@@ -80,6 +94,22 @@ def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
     (tmp_path / "pictures").mkdir()
 
     assert command.files_of(tmp_path) == [tmp_path / "anna.js"]
+
+
+def test_one_loose_file_hides_no_folder_without_a_solver(tmp_path: Path):
+    """Most students have a folder: one that holds none stands among them, whatever else lies
+    beside them."""
+    for name in ("anna", "ben", "cem"):
+        (tmp_path / name).mkdir()
+    for path in ("anna/Exercise.js", "ben/Exercise.js", "dora.js"):
+        shutil.copy(RIGHT, tmp_path / path)
+
+    assert [path.name for path in command.files_of(tmp_path)] == [
+        "Exercise.js",
+        "Exercise.js",
+        "cem",
+        "dora.js",
+    ]
 
 
 def test_what_is_no_solver_is_named(tmp_path: Path):

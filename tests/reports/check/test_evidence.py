@@ -4,6 +4,7 @@ and that no answer depends on the question before it."""
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -11,10 +12,11 @@ import pytest
 
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
+from reports.check.consequences import with_consequences
 from reports.check.lines import Access, Source, accesses_of, part_of
 from reports.check.machine import SCHEMA, as_json
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
-from reports.check.rows import CheckRow
+from reports.check.rows import UNKNOWN, CheckRow
 from reports.check.verdict import FileCheck
 from tests.reports.check.confusion import judged
 from tests.solvers.mutants import CORRECT, HERE, MUTANTS
@@ -248,3 +250,61 @@ def test_who_remembers_what_changes_nothing_is_right():
         _, others = ask_in_two_orders(process, asked)
 
     assert others == {}
+
+
+@pytest.fixture(scope="module")
+def consequences(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FileCheck]:
+    """The checks of files whose fault shows in several tasks, and of one with two faults."""
+    folder = tmp_path_factory.mktemp("consequences")
+    names = ("mass_of_a_twice.js", "two_masses_and_b_mass.py", "typo_in_c.js", "root_missing.js")
+    paths = [mutant.write(folder) for mutant in MUTANTS if mutant.name in names]
+    return {path.name: one for path, one in judged(paths).items()}
+
+
+def test_what_depends_on_who_is_a_is_a_fault_of_the_part_that_makes_it_so(
+    consequences: dict[str, FileCheck],
+):
+    """With a wrong mass in J both get opposite impulses: 2d is right. Where B also takes the mass
+    of A they do not: 2d is wrong by itself."""
+    found = {
+        name: [(row.task, row.cause) for row in one.faults if row.name == "A and B exchanged"]
+        for name, one in consequences.items()
+    }
+
+    assert found["mass_of_a_twice.js"] == [("2c", "the mass of A is used for both")]
+    assert consequences["mass_of_a_twice.js"].tasks["2d"] == "right"
+    assert found["two_masses_and_b_mass.py"] == [("2d", "B is divided by the mass of A")]
+
+
+def test_what_follows_from_a_fault_in_another_task_is_no_fault_of_its_own(
+    consequences: dict[str, FileCheck],
+):
+    """A typo in 2c stops the step, too; a root that is missing in 2a spoils 2b and 2c. In JSON the
+    verdict is one of the schema; two faults remain two."""
+    typo, root = consequences["typo_in_c.js"], consequences["root_missing.js"]
+
+    jsonschema.validate(as_json([typo, root]), json.loads(SCHEMA.read_text()))
+    assert [task for task, word in typo.tasks.items() if word == "fault"] == ["2c"]
+    assert typo.tasks["loop"] == "follows"
+    assert [root.tasks[task] for task in ("2a", "2b", "2c", "scenes")] == ["fault"] + 3 * [
+        "follows"
+    ]
+    assert "it follows from the fault in 2a" in {row.cause for row in root.rows}
+    assert len(consequences["two_masses_and_b_mass.py"].findings) == 2
+
+
+def test_an_unknown_fault_follows_from_nothing_that_is_right():
+    """Only what was found wrong before can cause it: the same cause once, or a displacement that
+    changes velocities."""
+    rows = [
+        CheckRow(name, task, "", "", "", verdict, cause)
+        for name, task, verdict, cause in (
+            ("velocities", "2b", "right", ""),
+            ("impulse", "2c", "fault", UNKNOWN),
+            ("momentum", "2d", "fault", UNKNOWN),
+        )
+    ]
+    pushed = [replace(rows[0], verdict="fault", cause="the displacement changes it"), *rows[1:]]
+
+    assert with_consequences(rows) == rows
+    assert [row.verdict for row in with_consequences(pushed)] == ["fault", "follows", "follows"]

@@ -4,6 +4,7 @@ file as an engine."""
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -19,10 +20,11 @@ from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check import command
 from reports.check.machine import SCHEMA
+from reports.check.rows import CheckRow
 from reports.check.smallest import Smallest, smallest_scene, smallest_scenes
 from reports.check.verdict import check_file
 from tests.reports.page.browsing import opened, overhang
-from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, process
+from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, on_terminal, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
@@ -67,9 +69,7 @@ def test_a_right_solver_exits_0_and_a_wrong_one_1_with_the_cause_first(
 
     assert (right.returncode, wrong.returncode) == (0, 1)
     assert right.stdout.startswith("No fault found")
-    assert wrong.stdout.replace("\n", " ").startswith(
-        "1. Task 2c impulse, impulse: it divides by (mA + mB)"
-    )
+    assert wrong.stdout.replace("\n", " ").startswith("1. Task 2c impulse: it divides by (mA + mB)")
     assert [path.name for path in where.iterdir()] == ["check.html"]
 
 
@@ -83,12 +83,26 @@ def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_lin
 
     assert "line 63 var J = -(1 + restitution) * vn / (sphereA.mass + sphereB.mass);" in said
     assert "exercise J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB)), e = 0.9" in said
-    assert wrong.index("All faults:") < wrong.index("Free choices. The exercise leaves them open")
-    assert "  fault  2c  impulse: it divides by (mA + mB)" in wrong
-    assert "These follow from the faults above: head_on" in said
+    assert wrong.index("1. Task 2c") < wrong.index("Free choices. The exercise leaves them open")
+    assert said.count("it divides by (mA + mB)") == 1, "a fault is named once"
+    assert "seen in What impulse does A get from B, for masses of 1.3 and 5.1 kg? Came:" in said
+    assert "These follow from the faults above: whole scenes (head_on" in said
     assert "  free choice  2a  touch: the comparison is the one with <" in right
     assert "expected" not in right
     assert max(map(len, wrong.splitlines())) <= 80
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", [80, 40])
+def test_a_check_of_one_file_says_what_it_does_meanwhile(folder: Path, columns: int):
+    """It takes seconds: the file, then the search for a scene; gone at the end, and in a pipe."""
+    words = ("check", "ben/Exercise.js", "--page", "p.html")
+    done = on_terminal(columns, *words, cwd=folder)
+    piped = crosscheck(*words, cwd=folder)
+
+    assert "checking Exercise.js" in done.stdout
+    assert "looking for the smallest scene" in done.stdout
+    assert not re.search("checking|looking for", piped.stdout + piped.stderr)
 
 
 def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
@@ -124,6 +138,7 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
         (["anna/Exercise.js", "--page", ""], '"": is not there; name a file or a folder'),
         (["class.txt"], "a solver is a .js or a .py file"),
         (["empty"], "holds no .js and no .py file"),
+        (["zipped"], "zipped: holds no .js and no .py file, only exercise.zip"),
         (
             ["anna/Exercise.js", "--junit", "no/such/x.xml"],
             "--junit no/such/x.xml: No such file or directory",
@@ -159,6 +174,8 @@ def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], me
     """No traceback, whatever is asked for."""
     (folder / "class.txt").write_text("mine")
     (folder / "empty").mkdir(exist_ok=True)
+    (folder / "zipped").mkdir(exist_ok=True)
+    (folder / "zipped" / "exercise.zip").write_bytes(b"PK")
     with mock.patch.object(command, "checked", side_effect=command.checked) as asked:
         done = crosscheck("check", *words, cwd=folder)
 
@@ -239,11 +256,38 @@ def test_each_fault_has_a_scene_that_shows_it(tmp_path: Path, monkeypatch: pytes
     text = RIGHT.read_text().replace("sphere.alpha += ", "sphere.alpha -= ")
     (tmp_path / "two.js").write_text(text.replace("nx * overlap / 2", "nx * overlap"))
     with SolverProcess(read_solver(tmp_path / "two.js")) as process:
-        found = smallest_scenes(process, 0.9, ["1", "2b", "2c", "2d", "loop"])
+        found = smallest_scenes(process, 0.9, faults_in("1", "2b", "2c", "2d", "loop"))
 
     assert [(one.of, one.scenario.scene.n) for one in found] == [((1,), 1), ((2,), 2)]
     assert "is turned by" in found[0].fault
     assert "their centres are" in found[1].fault
+
+
+def faults_in(*tasks: str) -> list[CheckRow]:
+    """A fault in each of these tasks."""
+    return [CheckRow("a row", task, "", "", "", "fault", "a cause") for task in tasks]
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("two_e_and_b_sign.js", [(1, 2)]),
+        pytest.param("mass_sum.js", [], marks=pytest.mark.slow),
+        pytest.param("b_mass.js", [], marks=pytest.mark.slow),
+    ],
+)
+def test_a_scene_is_credited_to_two_faults_only_if_it_shows_both(
+    name: str, shown: list[tuple[int, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Two faults in the velocities after a collision: neither sphere gets the right impulse, and
+    both together get one. A file that has only one of them has no such scene."""
+    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)  # those that are tried first suffice
+    (mutant,) = (mutant for mutant in MUTANTS if mutant.name == name)
+    with SolverProcess(read_solver(mutant.write(tmp_path))) as process:
+        found = smallest_scenes(process, 0.9, faults_in("2c", "2d"))
+
+    assert [one.of for one in found] == shown
+    assert all("together they get" in one.fault for one in found)
 
 
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
@@ -290,7 +334,13 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
 
     assert heard == []
     assert (wide <= 0, narrow <= 0) == (True, True)
-    assert groups[1:] == ["Faults", "Free choices", "Right", "Not asked"]
+    assert groups[1:] == [
+        "Faults",
+        "Follows from the faults",
+        "Free choices",
+        "Right",
+        "Not asked",
+    ]
     assert verdicts == {"fault": {"fault"}, "free-choice": {"free choice"}}
     assert "var J = -(1 + restitution) * vn / (sphereA.mass + sphereB.mass);" in evidence
     assert "exercise J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB))" in evidence

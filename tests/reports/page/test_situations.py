@@ -458,3 +458,28 @@ def test_an_engine_alone_that_breaks_the_protocol_has_its_row(comparisons: list[
 
     assert {len(cells) for cells in rows.values()} == {len(overview.SUMMARY)}
     assert not any(cell.best for cells in rows.values() for cell in cells)
+
+
+def test_a_scene_that_a_file_refuses_is_not_counted_as_not_played(comparisons: list[Comparison]):
+    """It is written for another restitution: nobody asked. What crashes in it was asked, and so was
+    an engine that refuses."""
+    name = "a.js:own"
+
+    def refusals(status: str) -> list[Comparison]:
+        return [
+            replace(
+                each,
+                runs=[
+                    *each.runs,
+                    replace(each.middle_runs[0], engine="a.js", profile="own", status=status),
+                ],
+            )
+            for each in comparisons[:2]
+        ]
+
+    asked = overview.summary([refusals("unsupported")[0], comparisons[1]], [name], set())
+    crashed = overview.summary(refusals("crashed"), [name], set())
+
+    assert asked[name][-1].text == "0 of 1"
+    assert crashed[name][-1].text == "2 of 2"
+    assert not overview.unasked("pymunk:matched", {"pymunk:matched": ("refused", "")})
