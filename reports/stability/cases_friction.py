@@ -8,7 +8,6 @@ no collision here is followed by another, so that no rounding grows and the hori
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from math import ceil, hypot
 
 import numpy as np
