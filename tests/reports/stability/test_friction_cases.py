@@ -13,6 +13,7 @@ from adapters.engines import ENGINES, UNASKED
 from reports.stability.cases import CASES
 from reports.stability.cases_friction import FALL, FRICTION, in_corner
 from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
+from reports.stability.overview import findings
 from reports.stability.predicates import judge, truth_of
 from reports.stability.search import Search
 from reports.stability.variants import play_as
@@ -122,3 +123,25 @@ def test_a_little_less_friction_would_be_noticed():
 
     weaker = Search(replace(case, scene=less), "reference:coulomb", QUICK).limit()
     assert weaker.verdict == "never works"
+
+
+def test_who_fails_in_the_fewest_cases_is_said_of_those_with_friction_apart():
+    """Else what refuses them, and what plays in no others, would be called worst and best."""
+    rough, smooth = ("critical_slope", "strong_friction"), ("spin", "scale_down")
+    engines = ("reference:exercise", "reference:coulomb", "pymunk:shipped", "box2d:shipped")
+    limits = [
+        limit(case, engine)
+        for case in (*smooth, *rough)
+        for engine in engines
+        if engine in engines_of(CASES[case])
+    ]
+    said = [one for one in findings(limits) if "in the fewest" in one]
+
+    assert said == [
+        "Of the 2 cases without friction reference:exercise fails in the fewest, 0, and"
+        " box2d:shipped in the most, 2.",
+        "Of the 2 cases with friction reference:coulomb fails in the fewest, 0, and"
+        " pymunk:shipped in the most, 2.",
+    ]
+    alone = [one for one in limits if one.case in smooth]
+    assert any(one.startswith("Of these 2 cases reference:exercise") for one in findings(alone))
