@@ -72,10 +72,15 @@ def disk_faults(scene: Any) -> list[str]:
 def surrounding_faults(scene: Any) -> list[str]:
     """A line for what is wrong with restitution, friction, walls and the wrap box."""
     faults = []
-    if not 0 <= scene.restitution <= 1:
-        faults.append(f"restitution is {scene.restitution:g}, must be from 0 to 1")
-    if not 0 <= scene.friction < np.inf:
-        faults.append(f"friction is {scene.friction:g}, must be at least 0 and finite")
+    for name, most, must in (
+        ("restitution", 1.0, "from 0 to 1"),
+        ("friction", np.finfo(float).max, "at least 0 and finite"),
+    ):
+        value = getattr(scene, name)
+        if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
+            faults.append(f"{name} is {value!r}, must be a number {must}")
+        elif not 0 <= value <= most:
+            faults.append(f"{name} is {value:g}, must be {must}")
     for w in np.flatnonzero((scene.walls[:, 0] == scene.walls[:, 1]).all(axis=1)):
         faults.append(f"walls[{w}] has no length, must go from one point to another")
     return faults if scene.wrap is None else faults + wrap_faults(scene)

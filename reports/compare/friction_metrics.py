@@ -1,4 +1,5 @@
-"""What friction does to a velocity: along the surfaces after a collision, and where a disk rolls.
+"""What friction does: to velocities along the surfaces, to spins, to the energy, and until a disk
+rolls.
 
 None of it applies to a scene without friction.
 """
@@ -6,22 +7,27 @@ None of it applies to a scene without friction.
 from __future__ import annotations
 
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
-from reports.compare import laws
+from reports.compare import laws, scales, violations
 from reports.compare.delays import WINDOW, collision_free
+from reports.compare.faces import SAME, interval
 from reports.compare.view import Value, View, not_judged
 from scenarios.model import Array, Scene, Trajectory
 
 ROLLS = 1e-9  # radii, and m/s over the largest speed: the bound of the exact answers
+# of the slip at first: less is rolling, also of an engine whose lever arm is off by 2 %
+GONE = 0.05
+BETWEEN = "no two samples enclose a single collision of a disk, each more than three steps away"
 
 
 def tangential_velocity_error(view: View) -> Value | None:
     """Largest error of a disk's velocity along the surfaces, in the first sample after a collision
     that is more than three steps from all collisions."""
     scenario, truth = view.scenario, view.other
-    if not scenario.scene.friction or truth is None or view.jumps is None:
+    if truth is None or not rubs(view):
         return None
     assert scenario.truth is not None
     free = collision_free(truth, view.dt)
@@ -64,6 +70,180 @@ def slip_at_rest(view: View) -> Value | None:
     return worst if found else None
 
 
+def rubs(view: View) -> bool:
+    """Whether in the exact answer, which the run is beside, disks collide with friction."""
+    if not view.scenario.scene.friction or view.other is None or view.jumps is None:
+        return False
+    return bool(view.other.collisions.impulse.any())
+
+
+class Apart(NamedTuple):
+    """A collision of the truth that two samples enclose, with no other of its disks between them.
+
+    Attributes:
+        disks: (d,) those of the two that move.
+        tangent: (2,) of length 1, along the surfaces.
+        before, after: the samples, each more than three steps from all collisions of these disks.
+    """
+
+    disks: list[int]
+    tangent: Array
+    before: int
+    after: int
+
+
+def apart(view: View) -> list[Apart]:
+    """The collisions whose effect two samples show, in order of time; none of a disk that lies on
+    something, on which friction acts between collisions as well."""
+    scenario, truth = view.scenario, view.other
+    assert truth is not None
+    assert scenario.truth is not None
+    met, free = truth.collisions, collision_free(truth, view.dt)
+    found: list[Apart] = []
+    for row, (t, i, j) in enumerate(zip(met.t, met.i, met.j)):
+        disks = [int(disk) for disk in (i, j) if disk >= 0 and not scenario.scene.static[disk]]
+        alone = free[:, disks].all(axis=1)
+        early = np.flatnonzero(alone & (truth.t < t))
+        late = np.flatnonzero(alone & (truth.t > t))
+        if not len(early) or not len(late):
+            continue
+        before, after = int(early[-1]), int(late[0])
+        theirs = np.isin(met.i, disks) | np.isin(met.j, disks)
+        between = theirs & (met.t > truth.t[before]) & (met.t < truth.t[after])
+        lies = theirs & (met.impulse == 0) & (met.t < truth.t[after])
+        if lies.any() or np.flatnonzero(between)[0] < row:
+            continue
+        contact = scenario.truth(np.array([t]))
+        tangents = [
+            tangent_at(contact, scenario.scene, int(met.i[k]), int(met.j[k]))
+            for k in np.flatnonzero(between)
+        ]
+        # a wall that is there twice, or in two pieces, is one
+        together = (np.abs(met.t[between] - t) <= SAME * interval(truth)).all()
+        if together and all(abs(laws.cross(tangents[0], other)) < ROLLS for other in tangents):
+            found.append(Apart(disks, tangents[0], before, after))
+    return found
+
+
+def friction_impulse_error(view: View) -> Value | None:
+    """Largest error of friction's impulse in a collision, I dw / r of a disk: nothing else turns
+    one."""
+    scene, truth = view.scenario.scene, view.other
+    if truth is None or not rubs(view):
+        return None
+    worst, judged = Value(0.0), 0
+    weight = laws.moving_inertia(scene) / scene.radius
+    for disks, _, before, after in apart(view):
+        for disk in disks:
+            turned, ought = (
+                one.angular_velocity[after, disk] - one.angular_velocity[before, disk]
+                for one in (view.played, truth)
+            )
+            judged += 1
+            error = float(weight[disk] * abs(turned - ought))
+            if error > worst.value:
+                worst = Value(error, disk, float(truth.t[after]))
+    if not judged:
+        return not_judged(BETWEEN)
+    return worst._replace(note=f"{judged} times a disk has collided")
+
+
+def friction_loss_error(view: View) -> Value | None:
+    """Energy that friction takes in collisions, less what it takes in the exact answer, over the
+    energy at hand.
+
+    It is what the motion along the surfaces and the spins lose; restitution takes only from the
+    motion along the normal (`restitution_loss_error`).
+    """
+    return loss_error(view, of_friction=True)
+
+
+def restitution_loss_error(view: View) -> Value | None:
+    """Energy that restitution takes in collisions with friction, less what it takes in the exact
+    answer, over the energy at hand."""
+    return loss_error(view, of_friction=False)
+
+
+def loss_error(view: View, of_friction: bool) -> Value | None:
+    """One of the two losses in all collisions that two samples show, of the engine less of the
+    truth."""
+    scenario, truth = view.scenario, view.other
+    if truth is None or not rubs(view) or scenario.thrusts or violations.lifts(scenario):
+        return None
+    losses = np.array(
+        [
+            [lost(one, scenario.scene, each, of_friction) for one in (view.played, truth)]
+            for each in apart(view)
+        ]
+    ).reshape(-1, 2)
+    if not len(losses):
+        return not_judged(BETWEEN)
+    scale = scales.energy(scenario, truth) or 1.0
+    off = (losses[:, 0] - losses[:, 1]).sum() / scale
+    note = f"{losses[:, 1].sum() / scale:.2g} in {len(losses)} collisions of the exact answer"
+    return Value(float(off), note=note)
+
+
+def lost(one: Trajectory, scene: Scene, each: Apart, along: bool) -> float:
+    """J that a collision takes from the motion along the surfaces and the spins, or from that
+    along the normal.
+
+    Both are constant in flight if they count the height along their own axis.
+    """
+    axis = each.tangent if along else np.array([-each.tangent[1], each.tangent[0]])
+    ends = np.array([each.before, each.after])[:, None]
+    mass = laws.moving_mass(scene)[each.disks]
+    speed, place = one.velocity[ends, each.disks] @ axis, one.position[ends, each.disks] @ axis
+    energy = (speed**2 / 2 - scene.gravity @ axis * place) @ mass
+    if along:
+        spin = one.angular_velocity[ends, each.disks]
+        energy = energy + spin**2 / 2 @ laws.moving_inertia(scene)[each.disks]
+    return float(energy[0] - energy[1])
+
+
+def time_to_roll_error_s(view: View) -> Value | None:
+    """Time at which a sliding disk begins to roll, less that of the exact answer; the largest of
+    all disks."""
+    scenario, truth = view.scenario, view.other
+    if not scenario.scene.friction or truth is None or view.jumps is None:
+        return None
+    worst: Value | None = None
+    for disk in np.flatnonzero(~scenario.scene.static):
+        for wall in range(len(scenario.scene.walls)):
+            rolls = rolling(truth, scenario.scene, int(disk), wall)
+            slips = touching(truth, scenario.scene, int(disk), wall) & ~rolls
+            for begins in np.flatnonzero(rolls[1:] & slips[:-1]) + 1:
+                first = begins - int(np.argmin(np.append(slips[:begins][::-1], False)))
+                if begins - first < 2:  # samples, from which the slip's end is extrapolated
+                    continue
+                ours, ought = (
+                    end_of_slip(
+                        one.t[first:], slip_of(one, scenario.scene, int(disk), wall)[first:]
+                    )
+                    for one in (view.played, truth)
+                )
+                note = "" if np.isfinite(ours) else "it slips to the end"
+                off = Value(min(ours, truth.t[-1]) - ought, int(disk), float(ought), note)
+                worst = max(worst or off, off, key=lambda one: abs(one.value))
+    return worst
+
+
+def end_of_slip(t: Array, slip: Array) -> float:
+    """s, when a slip (k,) m/s that changes evenly is gone: on the line from the first sample to the
+    last before it is below `GONE` of the first; `inf` if it never is.
+
+    On a straight line it is gone soon after it is below that, and a slip that falls otherwise is
+    taken for gone there.
+    """
+    left = slip / slip[0]
+    k = int(np.argmax(left < GONE))
+    if left[k] >= GONE:
+        return np.inf
+    taken, latest = 1 - left[k - 1], (t[k] - t[0]) / (1 - GONE)
+    straight = (t[k - 1] - t[0]) / taken if taken > 0 else latest
+    return float(t[0] + min(straight, latest))
+
+
 def tangent_at(contact: Trajectory, scene: Scene, i: int, j: int) -> Array:
     """(2,) of length 1: along the surfaces of disk i and of disk j, or of wall -1 - j, when they
     meet."""
@@ -75,13 +255,18 @@ def tangent_at(contact: Trajectory, scene: Scene, i: int, j: int) -> Array:
 
 def rolling(truth: Trajectory, scene: Scene, disk: int, wall: int) -> np.ndarray:
     """(k,) whether a disk touches a wall and does not slide on it."""
+    fastest = laws.lengths(truth.velocity).max() or 1.0
+    rests = np.abs(slip_of(truth, scene, disk, wall)) < ROLLS * fastest
+    return touching(truth, scene, disk, wall) & rests
+
+
+def touching(truth: Trajectory, scene: Scene, disk: int, wall: int) -> np.ndarray:
+    """(k,) whether a disk touches a wall."""
     away = truth.position[:, disk] - laws.nearest_on_segment(
         truth.position[:, disk], *scene.walls[wall]
     )
-    touches = np.abs(laws.lengths(away) / scene.radius[disk] - 1) < ROLLS
-    fastest = laws.lengths(truth.velocity).max() or 1.0
-    rests: np.ndarray = touches & (np.abs(slip_of(truth, scene, disk, wall)) < ROLLS * fastest)
-    return rests
+    touches: np.ndarray = np.abs(laws.lengths(away) / scene.radius[disk] - 1) < ROLLS
+    return touches
 
 
 def slip_of(trajectory: Trajectory, scene: Scene, disk: int, wall: int) -> Array:

@@ -320,6 +320,33 @@ METRICS: dict[str, Metric] = {
         (TRUTH,),
         title="Tangential velocity after a collision, largest error",
     ),
+    "friction_impulse_error": Metric(
+        friction.friction_impulse_error,
+        "N s",
+        (TRUTH,),
+        title="Impulse of friction in a collision, largest error",
+    ),
+    "friction_loss_error": Metric(
+        friction.friction_loss_error,
+        "1",
+        (TRUTH,),
+        "zero",
+        title="Energy lost to friction in collisions, less what should be",
+    ),
+    "restitution_loss_error": Metric(
+        friction.restitution_loss_error,
+        "1",
+        (TRUTH,),
+        "zero",
+        title="Energy lost to restitution beside friction, less what should be",
+    ),
+    "time_to_roll_error_s": Metric(
+        friction.time_to_roll_error_s,
+        "s",
+        (TRUTH,),
+        "zero",
+        title="Time at which a disk begins to roll, less what it should be",
+    ),
     "slip_at_rest": Metric(
         friction.slip_at_rest, "m/s", (TRUTH,), title="Slip where a disk should roll, largest"
     ),

@@ -32,9 +32,10 @@ from reports.stability.results import (
     done_before,
     read,
     table,
+    tasks_of,
 )
 from reports.stability.touching import TOUCHING, AtGap
-from reports.stability.variants import VARIANTS
+from reports.stability.variants import WITH_FRICTION_ONLY
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
@@ -86,11 +87,11 @@ def find_limits(
             " plays it"
         )
         refuse([f"--engine {file}: {how}" for file in files])
-    if not (apart := [name for name in chosen if name in VARIANTS]):
-        refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in chosen])
     plan = StabilityPlan(
-        cases, maps, touching, apart, form, affordable(workers or os.cpu_count() or 1), command
+        cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
     )
+    if not tasks_of(plan) and {*chosen} <= {*WITH_FRICTION_ONLY}:
+        refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in chosen])
     with opening(out):
         out = place_of(out)
         journal = open_part(out, STABILITY)

@@ -11,7 +11,7 @@ from math import nan, sqrt
 from adapters.engines import DISTINCT
 from adapters.run import Run
 from reports.stability.predicates import Predicate
-from reports.stability.variants import VARIANTS, Variant, played
+from reports.stability.variants import VARIANTS, WITH_FRICTION_ONLY, Variant, played
 from scenarios.model import Scenario
 
 EXACT, NOT_KNOWN = "the exact answer", "not known"
@@ -249,5 +249,6 @@ class Limit:
 
 def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
     """Who plays a case: these rows of `ENGINES`, and the case's own variants, in the order of
-    `VARIANTS`."""
-    return [name for name in VARIANTS if name in rows or name in case.also]
+    `VARIANTS`; an engine that only adds friction to another where the case names it."""
+    rows_alone = [name for name in VARIANTS if name in rows and name not in WITH_FRICTION_ONLY]
+    return [name for name in VARIANTS if name in rows_alone or name in case.also]

@@ -9,11 +9,13 @@ from typing import NamedTuple
 
 from adapters.engines import ENGINES
 from reports.page.style import number
+from reports.stability.cases_friction import FRICTION
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.terminal.counts import counted
 
+WITH_FRICTION = {case.name for case in FRICTION}
 EVERYWHERE = {"never": "everywhere"}  # a cell says where it fails, not when it works
 
 
@@ -107,18 +109,10 @@ def findings(limits: Sequence[Limit]) -> list[str]:
         f" {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} found a limit, and"
         f" {sum(limit.verdict == NEVER_WORKS for limit in mine)} failed at every value."
     ]
-    fails: dict[str, list[str]] = {}
-    for limit in failing:
-        fails.setdefault(limit.engine, []).append(limit.case)
-    if fails and len(cases) > 1:
-        # in reading order, which decides between equals
-        engines = dict.fromkeys(limit.engine for limit in mine)
-        order = sorted(engines, key=lambda engine: len(fails.get(engine, [])))
-        found.append(
-            f"Of these {len(cases)} cases {order[0]} fails in the fewest,"
-            f" {len(fails.get(order[0], []))}, and {order[-1]} in the most,"
-            f" {len(fails[order[-1]])}."
-        )
+    rough = [limit for limit in mine if limit.case in WITH_FRICTION]
+    smooth = [limit for limit in mine if limit.case not in WITH_FRICTION]
+    found += fewest_and_most(smooth, " without friction" if rough else "")
+    found += fewest_and_most(rough, " with friction")
     if failing:
         tested = sum(bool(limit.tested) for limit in failing)
         found.append(
@@ -137,6 +131,27 @@ def findings(limits: Sequence[Limit]) -> list[str]:
             " failure."
         )
     return found
+
+
+def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
+    """A sentence on who fails in the fewest and who in the most of these cases, of the engines that
+    take any of them; none on one case, or where nobody fails."""
+    taken = [limit for limit in limits if limit.word != "refused"]
+    # in reading order, which decides between equals
+    fails = dict.fromkeys((limit.engine for limit in taken), 0)
+    for limit in limits:
+        if limit.engine in fails:
+            fails[limit.engine] += limit.verdict != NEVER_FAILS
+    cases = len({limit.case for limit in limits})
+    if cases < 2 or not any(fails.values()):
+        return []
+    *_, most = sorted(fails, key=lambda engine: fails[engine])
+    fewest = min(fails, key=lambda engine: fails[engine])
+    these = f"the {cases} cases{which}" if which else f"these {cases} cases"
+    return [
+        f"Of {these} {fewest} fails in the fewest, {fails[fewest]}, and {most} in the most,"
+        f" {fails[most]}."
+    ]
 
 
 def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:

@@ -7,7 +7,14 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.mechanisms.table import DIGITS, FLIGHT, IMPULSE, POSITION_CORRECTION, RESTITUTION
+from adapters.mechanisms.table import (
+    DIGITS,
+    FLIGHT,
+    FRICTION,
+    IMPULSE,
+    POSITION_CORRECTION,
+    RESTITUTION,
+)
 from reports.stability.ablations import (
     B2_SETTINGS,
     B2_TYPES,
@@ -57,6 +64,24 @@ MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES
 SWEEP = (
     "restitution is one sweep after the substeps, so a disk that touches two others in a step loses"
     " energy"
+)
+NO_CONE = (
+    "restitution is one sweep after the substeps and allows no more friction: that is mu times what"
+    " the substeps have pressed, not mu (1 + e) m v"
+)
+ROUGH_PRODUCT = "the frictions of the two shapes are multiplied: mu on every shape gives mu²"
+IN_TURN = (
+    "the contacts of a step are solved once, one after the other: the second wall brings back slip"
+    " at the first"
+)
+OF_FRICTION = (
+    "friction_in_bounce",
+    "strong_friction",
+    "spin_in_bounce",
+    "friction_mass_ratio",
+    "slide_to_roll",
+    "critical_slope",
+    "creep_at_rest",
 )
 FOUND_LATE = "a collision is detected up to a step late, and lasts about a step too long"
 
@@ -268,6 +293,63 @@ REASONS = (
         "it refuses what has no single continuation: overlaps, and collisions that accumulate",
         "adapters/event_driven/events.py",
     ),
+    # Friction.
+    *(
+        Reason(
+            case,
+            f"reference:{solver}",
+            "it models no friction, and refuses the scene",
+            "adapters/friction.py",
+        )
+        for case in OF_FRICTION
+        for solver in ("exercise", "lesson")
+    ),
+    Reason(
+        "friction_in_bounce",
+        "box2d_v3:*",
+        NO_CONE,
+        "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask",
+        # 1 / (1 + e) of the friction is nine tenths of it
+        1 / 9,
+        mechanism=FRICTION,
+    ),
+    *(
+        Reason(
+            case,
+            "pymunk:shipped",
+            ROUGH_PRODUCT,
+            "Munk2D src/cpArbiter.c, cpArbiterUpdate",
+            limit,
+            "pymunk:matched",
+            FRICTION,
+        )
+        for case, limit in (
+            ("friction_in_bounce", None),
+            # e² for e, too: mu² 1.25 v = 0.9 of the impulse that sticks, a third of 3 m/s
+            ("strong_friction", sqrt(0.9 / 1.25 / 4.0)),
+            # mu² v = 0.9 r w / 3
+            ("spin_in_bounce", 0.25 * 4.0 * 3 / 0.9 / 0.25 * (0.05 * 0.25 / 4.0)),
+            ("slide_to_roll", None),
+            # tan(angle) = 3 mu²
+            ("critical_slope", 0.75),
+        )
+    ),
+    *(
+        Reason(case, engine, text, source, limit)
+        for box, most, text, source in (
+            ("box2d", pi / 2, QUARTER, B2_SETTINGS + "b2_maxRotation"),
+            (
+                "box2d_v3",
+                pi / 4,
+                "nothing turns by more than pi/4 a step",
+                "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
+            ),
+        )
+        # the disk comes to roll at 2/3 of its speed
+        for case, limit in (("spin_in_bounce", most), ("slide_to_roll", 1.5 * most))
+        for engine in (f"{box}:shipped", f"{box}:matched")
+    ),
+    Reason("creep_at_rest", "reference:*", IN_TURN, "reference_impl/coulomb.py"),
     # Stacks.
     *(
         Reason(

@@ -31,6 +31,7 @@ from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import Search
 from reports.stability.touching import TOUCHING, LawOf, law_of
+from reports.stability.variants import WITH_FRICTION_ONLY
 from reports.stability.vary import case_of_file
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
@@ -147,14 +148,13 @@ def carry_out(
 
 def tasks_of(plan: StabilityPlan) -> list[Task]:
     """All tasks, the slowest first, so that none is left over at the end."""
+    smooth = [name for name in plan.engines if name not in WITH_FRICTION_ONLY]
     tasks = [
         Task("map", name, engine, plan.form)
         for name in plan.maps
-        for engine in MAPS[name].engines(plan.engines)
+        for engine in MAPS[name].engines(smooth)
     ]
-    tasks += [
-        Task("law", name, engine, plan.form) for name in plan.touching for engine in plan.engines
-    ]
+    tasks += [Task("law", name, engine, plan.form) for name in plan.touching for engine in smooth]
     for name in plan.cases:
         tasks += [
             Task("limit", name, engine, plan.form)

@@ -50,6 +50,8 @@ def with_variant(variant: str) -> tuple[str, ...]:
     return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
 
 
+WITH_FRICTION_ONLY = tuple(name for name, row in ENGINES.items() if row.adds_friction)
+
 CHANGED = tuple(
     Variant(f"{name}+{variant}", partial(varied, name, variant), what)
     for name, row in ENGINES.items()
@@ -58,7 +60,7 @@ CHANGED = tuple(
 VARIANTS: dict[str, Variant] = {
     variant.name: variant
     for variant in (
-        *(Variant(name, row.make) for name, row in ENGINES.items() if not row.adds_friction),
+        *(Variant(name, row.make) for name, row in ENGINES.items()),
         *CHANGED,
     )
 }

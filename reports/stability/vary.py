@@ -13,6 +13,7 @@ import numpy as np
 from reports.stability.cases_suite import dense_ladder, in_steps, ladder
 from reports.stability.limits import Case
 from reports.stability.predicates_usable import USABLE
+from reports.stability.variants import WITH_FRICTION_ONLY
 from scenarios.files.scene_file import read_scene_file
 from scenarios.model import Array, Collisions, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.exact import with_oracle
@@ -216,4 +217,5 @@ def case_of_file(path: str, what: str) -> Case:
         meant.values or dense_ladder(one),
         partial(varied, path, what),
         USABLE,
+        also=WITH_FRICTION_ONLY if one.scene.friction else (),
     )

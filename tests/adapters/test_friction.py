@@ -159,7 +159,8 @@ def test_an_engine_that_is_another_without_friction_is_played_beside_it_only_wit
 
 
 def test_what_has_limits_of_its_own_is_driven_to_them(tmp_path):
-    """The cases have no friction, so `reference:coulomb` is refused with the engine it is there."""
-    refused = crosscheck("stability", "--engine", "reference:coulomb", cwd=tmp_path)
+    """In a case without friction `reference:coulomb` is refused with the engine it is there."""
+    asked = ("slow_collision", "touching_break", "--engine", "reference:coulomb")
+    refused = crosscheck("stability", *asked, cwd=tmp_path)
     assert refused.returncode == 2
     assert "--engine reference:coulomb: plays as reference:exercise here" in refused.stderr

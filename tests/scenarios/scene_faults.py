@@ -129,6 +129,16 @@ FAULTS = [
     ),
     (
         "restitution = 0.9",
+        "restitution = 0.9\nfriction = nan",
+        "friction = nan: must be finite and at least 0",
+    ),
+    (
+        "restitution = 0.9",
+        'restitution = 0.9\nfriction = "rough"',
+        'friction = "rough": of type string; must be finite and at least 0',
+    ),
+    (
+        "restitution = 0.9",
         "restitution = 0.9\nfriction = 1e-12",
         "friction = 1e-12: out of scale; must be from 1e-09 to 1e+09 (SI)",
     ),

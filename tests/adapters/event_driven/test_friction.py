@@ -234,7 +234,10 @@ def test_bounces_that_die_out_without_slip_come_to_rest_and_others_are_refused()
 
 
 def test_a_bad_friction_is_one_sentence():
-    """Negative, infinite or no number."""
-    for bad in (-0.5, np.inf, np.nan):
-        with pytest.raises(ValueError, match=r"^friction is .*, must be at least 0 and finite$"):
+    """Negative, infinite or no number; the control is a number of each kind that is one."""
+    for bad in (-0.5, np.inf, -np.inf, np.nan, "rough", [0.1], True, 1j):
+        said = r"^friction is .*, must be (a number )?at least 0 and finite$"
+        with pytest.raises(ValueError, match=said):
             replace(ROLL, friction=bad)
+    for good in (0, 2, 0.5, np.float32(0.5), np.int64(1)):
+        assert replace(ROLL, friction=good).friction == good

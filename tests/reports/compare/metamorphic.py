@@ -178,6 +178,7 @@ class Change:
             "m/s": self.length / self.time,
             "s": self.time,
             "rad/s": 1 / self.time,
+            "N s": self.mass * self.length / self.time,
         }
         return rates.get(unit, 1.0)
 

@@ -152,6 +152,23 @@ def test_bad_input_is_one_clear_message_and_exit_2(words: list[str], said: str, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("bad", ["-0.5", "nan", "inf", '"rough"'])
+def test_a_bad_friction_in_a_file_is_one_line_and_exit_2(bad: str, tmp_path: Path):
+    """File, key, value and what it must be."""
+    text = (
+        (SCENES / "two.toml")
+        .read_text()
+        .replace("restitution", f"friction = {bad}\nrestitution", 1)
+    )
+    (tmp_path / "rough.toml").write_text(text)
+    for command in ("truth", "run"):
+        done = crosscheck(command, "rough.toml", cwd=tmp_path)
+        assert done.returncode == 2
+        (line,) = done.stderr.splitlines()
+        assert f"rough.toml: friction = {bad}: " in line
+        assert "must be finite and at least 0" in line
+
+
 def test_truth_prints_the_exact_answer(tmp_path: Path):
     """For people with the ends of its list of collisions, for programs as JSON with all of them."""
     reported, listed = (

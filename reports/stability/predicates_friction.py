@@ -1,0 +1,104 @@
+"""What failing means where there is friction: it brakes or turns a disk otherwise than Coulomb's
+law, or moves one at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports.stability.predicates import Predicate, Reading, first_above, truth_of
+from scenarios.model import Array, Scenario, Scene, Trajectory
+
+SETTLED = 0.1  # of a run: by then a disk has been moved out of what the engine takes for an overlap
+
+
+def _friction_off(scenario: Scenario, played: Trajectory) -> Reading:
+    true, scene = truth_of(scenario), scenario.scene
+    tangent = tangent_of(scene)
+    found, ought = impulses(played, scene, tangent), impulses(true, scene, tangent)
+    off = np.abs(found - ought) / np.abs(ought)
+    way, disk = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(off), off, -1))), off.shape)
+    share, what = found[way, disk] / ought[way, disk], ("speed along the surfaces", "spin")[way]
+    return Reading(
+        float(off[way, disk]),
+        float(true.collisions.t[0]),
+        f"friction changes the {what} of disk {disk} by {share + 0.0:.3g} of what it should",
+        disk=int(disk),
+    )
+
+
+def tangent_of(scene: Scene) -> Array:
+    """(2,) along the surfaces of these scenes: of a floor, else of two disks one beside the
+    other."""
+    return np.array([1.0, 0.0] if len(scene.walls) else [0.0, 1.0])
+
+
+def impulses(trajectory: Trajectory, scene: Scene, tangent: Array) -> Array:
+    """(2, n) N s of friction from start to end, as the disks' velocities show it and as their spins
+    do: m dv and I dw / r. Both are equal in size if it acts on the rim."""
+    dv = (trajectory.velocity[-1] - trajectory.velocity[0]) @ tangent
+    dw = trajectory.angular_velocity[-1] - trajectory.angular_velocity[0]
+    return np.array([scene.mass * dv, scene.inertia * dw / scene.radius])
+
+
+def _rolling_off(scenario: Scenario, played: Trajectory) -> Reading:
+    true, scene = truth_of(scenario), scenario.scene
+    speed, rim = (
+        np.stack([one.velocity[:, 0, 0], -scene.radius[0] * one.angular_velocity[:, 0]])
+        for one in (played, true)
+    )
+    off = np.abs(speed - rim).max(axis=0) / np.abs(scene.velocity[0, 0])
+    return Reading(
+        float(off[-1]),
+        first_above(played.t, off, ROLLING_OFF.bound),
+        f"it moves at {speed[0, -1] / rim[0, -1]:.4g}, and its rim at"
+        f" {speed[1, -1] / rim[1, -1]:.4g}, of the speed of rolling",
+    )
+
+
+def _slips(scenario: Scenario, played: Trajectory) -> Reading:
+    along = played.velocity[1:, 0, 0]
+    slip = along + scenario.scene.radius[0] * played.angular_velocity[1:, 0]
+    share = np.abs(slip) / np.where(along, np.abs(along), np.nan)
+    return Reading(
+        float(share[-1]),
+        first_above(played.t[1:], share, SLIPS.bound),
+        f"the rim slips at {share[-1]:.3g} of the speed of the disk",
+    )
+
+
+def _creeps(scenario: Scenario, played: Trajectory) -> Reading:
+    first = int(np.ceil(SETTLED * (len(played) - 1)))
+    x, turned = played.position[:, 0], played.angle[:, 0]
+    radius = scenario.scene.radius[0]
+    moved = np.hypot(*(x - x[first]).T) / radius + np.abs(turned - turned[first])
+    moved[:first] = 0.0
+    worst = float(moved.max())
+    return Reading(
+        worst, first_above(played.t, moved, CREEPS.bound), f"it has moved by {worst:.3g} radii"
+    )
+
+
+FRICTION_OFF = Predicate(
+    "friction off",
+    "of the impulse",
+    0.1,
+    "friction changes a speed or a spin by other than Coulomb's law",
+    _friction_off,
+)
+ROLLING_OFF = Predicate(
+    "rolling off",
+    "of the start speed",
+    0.01,
+    "a disk that has slid does not roll at its speed of rolling",
+    _rolling_off,
+)
+SLIPS = Predicate(
+    "slips", "of the speed", 0.05, "a disk slips on a slope on which it should roll", _slips
+)
+CREEPS = Predicate(
+    "creeps",
+    "radii",
+    0.01,
+    "a disk at rest moves or turns after the first tenth of the run",
+    _creeps,
+)

@@ -1,0 +1,147 @@
+"""The cases of friction: where engines fail that are known to, and where that follows from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from adapters.engines import ENGINES, UNASKED
+from reports.stability.cases import CASES
+from reports.stability.cases_friction import FALL, FRICTION, in_corner
+from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
+from reports.stability.overview import findings
+from reports.stability.predicates import judge, truth_of
+from reports.stability.search import Search
+from reports.stability.variants import play_as
+
+MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
+REFUSE = ("reference:exercise", "reference:lesson")
+
+
+@cache
+def limit(case: str, engine: str) -> Limit:
+    """The limit in the quick form."""
+    return Search(CASES[case], engine, QUICK).limit()
+
+
+def bracket(case: str, engine: str) -> tuple[float, float]:
+    """From the lower to the higher end."""
+    low, high = sorted((limit(case, engine).works_at, limit(case, engine).fails_at))
+    return low, high
+
+
+def test_only_a_case_that_names_it_is_played_by_what_only_adds_friction():
+    """`reference:coulomb` plays all of these cases, and no other; asked for by a plan, too."""
+    mine = {case.name for case in FRICTION}
+
+    assert len(mine) >= 6
+    for rows in (UNASKED, ENGINES):
+        plays = {
+            name for name, case in CASES.items() if "reference:coulomb" in engines_of(case, rows)
+        }
+        assert plays == mine
+
+
+def test_the_exact_answer_of_every_case_holds_to_the_end_of_the_run():
+    """Its horizon is later; and what it says is what the event engine plays, which shares no code
+    with it. In a corner that refuses."""
+    for case in FRICTION:
+        scenario = case.scene(case.values[1], 1)
+        assert truth_of(scenario).horizon >= scenario.duration
+        reading = judge(case.predicate, scenario, play_as("event_driven:float64", scenario))
+        # float64 in an answer of some ten roundings
+        assert reading.value < 1e-12 or (
+            reading.broken == "refused" and scenario.name == "in-corner"
+        )
+
+
+def test_friction_without_the_restitution_is_seen_in_box2d_3_1_alone():
+    """It gives 1 / (1 + e) of the friction, nine tenths at e = 1/9, or sooner by what its lever arm
+    is off, half of 0.05 radii of overlap; as shipped the contact is soft: it never gives enough."""
+    low, high = bracket("friction_in_bounce", "box2d_v3:matched")
+    assert (1 - 0.025) / 0.9 - 1 < low < high < 1 / 9
+    assert limit("friction_in_bounce", "box2d_v3:shipped").verdict == "never works"
+    for engine in ("pymunk:matched", "box2d:shipped", "box2d:matched", "reference:coulomb"):
+        assert limit("friction_in_bounce", engine).verdict == NEVER_FAILS
+
+
+def test_a_product_of_frictions_is_seen_in_pymunk_as_shipped_alone():
+    """mu2 for mu: it rolls up to tan(angle) = 3 mu2, a quarter of 3 mu; it stops a slip of 3 m/s,
+    to a tenth, from mu2 (1 + e2) v = 0.9 m/s on."""
+    low, high = bracket("critical_slope", "pymunk:shipped")
+    assert low < 0.75 < high * 1.01  # and may slip by 5 %
+    low, high = bracket("strong_friction", "pymunk:shipped")
+    assert low < sqrt(0.9 / 1.25 / FALL) < high
+    for case in ("critical_slope", "strong_friction"):
+        assert all(limit(case, engine).verdict == NEVER_FAILS for engine in MATCHED)
+
+
+@pytest.mark.parametrize(("box", "cap"), [("box2d", pi / 2), ("box2d_v3", pi / 4)])
+def test_the_caps_on_spin_end_rolling_and_spin_in_a_bounce(box: str, cap: float):
+    """A disk comes to roll at 2/3 of its speed: at v dt / R = 3/2 of the cap."""
+    low, high = bracket("spin_in_bounce", f"{box}:matched")
+    assert low <= cap <= high
+    low, high = bracket("slide_to_roll", f"{box}:matched")
+    assert low <= 1.5 * cap <= high
+    assert limit("slide_to_roll", "pymunk:matched").verdict == NEVER_FAILS
+
+
+def test_a_disk_in_a_corner_creeps_where_each_contact_is_solved_once_a_step():
+    """0.07 radii in 100 steps of the exercise with friction; the control: if it leans on one wall
+    only, nothing creeps, and with sequential impulses nothing does in the corner."""
+    case, corner = CASES["creep_at_rest"], in_corner(100, 0)
+    upright = replace(corner, scene=replace(corner.scene, gravity=np.array([0.0, -10.0])))
+    for engine in ("reference:coulomb", "reference:ordered"):
+        assert judge(case.predicate, corner, play_as(engine, corner)).broken == "creeps"
+        assert not judge(case.predicate, upright, play_as(engine, upright)).failed
+    for engine in MATCHED:
+        assert not judge(case.predicate, corner, play_as(engine, corner)).failed
+
+
+def test_what_models_no_friction_refuses_every_case():
+    """And says so."""
+    for case in FRICTION:
+        for engine in REFUSE:
+            failing = limit(case.name, engine).failing
+            assert failing is not None
+            assert failing.broken == "refused"
+            assert "does not model friction" in failing.event
+
+
+def test_a_little_less_friction_would_be_noticed():
+    """The negative control: a scene with nine tenths of the friction under the exact answer of the
+    case fails where the whole does not."""
+    case = CASES["friction_in_bounce"]
+
+    def less(x: float, run: int):
+        one = case.scene(x, run)
+        return replace(one, scene=replace(one.scene, friction=0.89 * one.scene.friction))
+
+    weaker = Search(replace(case, scene=less), "reference:coulomb", QUICK).limit()
+    assert weaker.verdict == "never works"
+
+
+def test_who_fails_in_the_fewest_cases_is_said_of_those_with_friction_apart():
+    """Else what refuses them, and what plays in no others, would be called worst and best."""
+    rough, smooth = ("critical_slope", "strong_friction"), ("spin", "scale_down")
+    engines = ("reference:exercise", "reference:coulomb", "pymunk:shipped", "box2d:shipped")
+    limits = [
+        limit(case, engine)
+        for case in (*smooth, *rough)
+        for engine in engines
+        if engine in engines_of(CASES[case])
+    ]
+    said = [one for one in findings(limits) if "in the fewest" in one]
+
+    assert said == [
+        "Of the 2 cases without friction reference:exercise fails in the fewest, 0, and"
+        " box2d:shipped in the most, 2.",
+        "Of the 2 cases with friction reference:coulomb fails in the fewest, 0, and"
+        " pymunk:shipped in the most, 2.",
+    ]
+    alone = [one for one in limits if one.case in smooth]
+    assert any(one.startswith("Of these 2 cases reference:exercise") for one in findings(alone))
