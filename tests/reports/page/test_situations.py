@@ -15,9 +15,10 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
+from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
-from reports.page.page import situated, summaries
+from reports.page.page_tables import summaries
 from reports.page.pooled import scores
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
 from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of
