@@ -28,7 +28,7 @@ from reports.run.playing import CellResult, conform_here, engine, play_here
 from reports.run.runner import TIMEOUT, run_all
 from reports.run.scene_tables import SceneTasks
 from reports.run.scenes import open_scene, with_steps
-from reports.run.timing_pass import Pass, is_timed, laps_of
+from reports.run.timing_pass import Pass, cells_to_time, is_timed
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes, put_text
 from reports.terminal.progress import Progress
@@ -408,11 +408,11 @@ def take_timings(
     progress: Progress,
 ) -> None:
     """Run the timing pass, unless the journal has its result; no other task runs meanwhile."""
-    laps = laps_of(archive, plan.engines, scenarios) if plan.timings else []
-    if not laps or is_timed(archive, laps):
+    cells = cells_to_time(archive, plan.engines, scenarios) if plan.timings else []
+    if not cells or is_timed(archive, cells):
         return
     progress.start(1, 1, f"timing, at most {plan.timings:g} s")
-    task: dict[Any, Callable[[], Any]] = {"timing": Pass(laps, plan.timings, plan.seed)}
+    task: dict[Any, Callable[[], Any]] = {"timing": Pass(cells, plan.timings, plan.seed)}
     with closing(run_all(task, 1, plan.timings + means.timeout, means.memory)) as results:
         for _, result in results:
             if isinstance(result, Failure):

@@ -19,7 +19,7 @@ from reports.run.timing_pass import (
     LONGEST,
     SCENES,
     TABLE,
-    Lap,
+    CellToTime,
     is_busy,
     noise_floor,
     timed_scenes,
@@ -114,7 +114,7 @@ def test_of_a_long_run_only_the_first_part_is_timed():
     """Halved until it takes `LONGEST`; a short one is whole."""
     scene = scenario("near_miss")
     whole, part = (
-        Lap("key", "a:b", ENGINES["pymunk:matched"], scene, 1, seconds).part
+        CellToTime("key", "a:b", ENGINES["pymunk:matched"], scene, 1, seconds).part
         for seconds in (LONGEST, 3 * LONGEST)
     )
 
@@ -152,7 +152,7 @@ def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
 
 def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest.MonkeyPatch):
     """An engine that takes no world in which nothing moves is timed all the same."""
-    refusing = timing_pass.Lap(
+    refusing = timing_pass.CellToTime(
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
     monkeypatch.setattr("reports.run.stepping.empty", partial(int, "no world"))
