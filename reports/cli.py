@@ -69,8 +69,8 @@ Timeout = Annotated[
         max=1e6,
         metavar="S",
         help=(
-            "Time limit of a cell, and of an exact answer. A cell is stopped then, also inside an"
-            " engine's C code; of an exact answer the part up to there is given."
+            "Time limit of each cell, which is stopped then, also inside an engine's C code; and of"
+            " each exact answer, which is cut where it has got to."
         ),
     ),
 ]
@@ -165,15 +165,16 @@ def report(
     ],
     scenes: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENE]...", help="With --print: scenes to have on paper."),
+        typer.Argument(metavar="SCENE", help="With --print: scenes to print with the page."),
     ] = None,
     printed: Annotated[
-        bool, typer.Option("--print", help="Give each SCENE half a page where the page is printed.")
+        bool,
+        typer.Option("--print", help="Where the page is printed, half a page for each SCENE."),
     ] = False,
 ) -> None:
     """Write the tables and the page of a run again.
 
-    Nothing is played again: they are made from the journal of the run and its trajectories.
+    They are made from the journal and the trajectories of the run; no engine plays again.
     """
     from reports.commands.report import report_again
 
@@ -194,8 +195,8 @@ def replay(
 ) -> None:
     """Play one cell of a run again, step by step.
 
-    A cell that failed begins at its last good state, any other at the start. What the engine prints
-    is shown.
+    A cell that failed begins at its last good state, any other cell at the start. The output of
+    the engine is shown.
     """
     from reports.commands import replay as replay_command
 
@@ -209,8 +210,8 @@ def diff(
 ) -> None:
     """Show what changed between two runs.
 
-    How cells ended, their numbers, and how long they took. The exit status is 1 if anything got
-    worse.
+    Compares how the cells ended, their numbers, and how long they took. The exit status is 1 if
+    anything got worse.
     """
     from reports.commands import diff as diff_command
 
@@ -270,7 +271,7 @@ def check(
 ) -> None:
     """Check a hand-written solver of the exercise.
 
-    It says what is right, what is wrong, and what likely causes it.
+    Says what is right, what is wrong, and what likely causes each fault.
 
     A solver.py runs with all your permissions. It may import installed packages, and modules beside
     it that are not named like one of those.
@@ -317,7 +318,7 @@ def lesson(
 ) -> None:
     """Show why engines differ, in lessons with sliders.
 
-    Each is a page in a browser: a scene that runs, the exact answer beside it, and sliders.
+    A lesson is a page in a browser: a scene that runs, the exact answer beside it, and sliders.
     """
     if export is None:
         from reports.commands import serve
@@ -379,7 +380,12 @@ def speed(
 
 @app.command()
 def advise(
-    scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
+        ),
+    ],
     error: Annotated[
         str, typer.Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
     ] = "1%",
@@ -395,7 +401,10 @@ def advise(
     seed: Seed = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Find the cheapest engine and step size for a scene, and what the scene does not need."""
+    """Find the cheapest engine and step size for a scene.
+
+    Also shows which options of an engine the scene does not need, and what they cost in it.
+    """
     from reports.speed.advise import give_advice
 
     give_advice(scene, error, purpose, engine or [], seed, as_json)
@@ -438,8 +447,8 @@ def stability(
 ) -> None:
     """Find where each engine fails.
 
-    Each is driven from gentle to harsh along one parameter until it fails. The failing run is kept
-    and shown.
+    Changes one parameter from gentle to harsh until the engine fails, and shows the failing run
+    with its cause.
     """
     from reports.stability.command import find_limits
 
@@ -461,7 +470,7 @@ def tune(
 ) -> None:
     """Search the public settings of engines.
 
-    Those are found that come nearest to the exact answers at equal cost.
+    Finds those that bring an engine nearest to the exact answers at equal cost.
     """
     from reports.tune.command import tune as search_settings
 
