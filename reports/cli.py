@@ -59,6 +59,20 @@ Out = Annotated[
         help="Folder for the results. An earlier run there is replaced once this one is done.",
     ),
 ]
+Results = Annotated[
+    Path,
+    typer.Option(
+        metavar="DIR",
+        help="Folder for the results. Earlier ones there are replaced once these are done.",
+    ),
+]
+GoOn = Annotated[bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")]
+OneScene = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
+    ),
+]
 Workers = Annotated[
     int, typer.Option(min=0, metavar="N", help="Number of processes; 0: one for each core.")
 ]
@@ -220,12 +234,7 @@ def diff(
 
 @app.command()
 def truth(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
-        ),
-    ],
+    scene: OneScene,
     events: Annotated[
         bool,
         typer.Option("--events", help="Print all collisions, not only the first and last ten."),
@@ -236,7 +245,8 @@ def truth(
 ) -> None:
     """Print the exact answer to a scene.
 
-    Its collisions, its horizon (up to when it holds, and what ends it), and its error bound.
+    Shows its collisions, its horizon (the time up to which it holds, and what ends it), and its
+    error bound.
     """
     from reports.commands.truth import show_truth
 
@@ -349,17 +359,9 @@ def speed(
             "--full", help="All scenarios, finer steps, more rounds, up to 100 000 disks."
         ),
     ] = False,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")
-    ] = False,
+    resume: GoOn = False,
     seed: Seed = 0,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for the results. Earlier ones there are replaced once these are done.",
-        ),
-    ] = Path("reports/out/speed"),
+    out: Results = Path("reports/out/speed"),
 ) -> None:
     """Measure error against time for every engine.
 
@@ -380,12 +382,7 @@ def speed(
 
 @app.command()
 def advise(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
-        ),
-    ],
+    scene: OneScene,
     error: Annotated[
         str, typer.Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
     ] = "1%",
@@ -433,16 +430,8 @@ def stability(
             "--full", help="All runs at every value, more values, brackets of 1 % instead of 5 %."
         ),
     ] = False,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")
-    ] = False,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for the results. Earlier ones there are replaced once these are done.",
-        ),
-    ] = Path("reports/out/stability"),
+    resume: GoOn = False,
+    out: Results = Path("reports/out/stability"),
     workers: Workers = 0,
 ) -> None:
     """Find where each engine fails.
