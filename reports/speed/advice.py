@@ -172,12 +172,12 @@ def advise(
     scenario = held_by(scene, seed)
     step_sizes = ladder_of(scenario)
     tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
-    found = [(rungs, those_that_keep(rungs, bound)) for rungs in by_engine(tried)]
+    found = [(ladder, those_that_keep(ladder, bound)) for ladder in by_engine(tried)]
     keeping = [kept[0] for _, kept in found if kept]
     changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
     priced, noise, busy = timed(scene, seed, [*keeping, *changed], progress)
     plain = {one.name: one for one in priced if one.change == PLAIN}
-    short = [min(rungs, key=smallest) for rungs, kept in found if not kept]
+    short = [min(ladder, key=smallest) for ladder, kept in found if not kept]
     return Advice(
         scenario.name,
         scenario.duration,
@@ -219,13 +219,13 @@ def smallest(one: Attempt) -> float:
     return one.error if isfinite(one.error) else inf
 
 
-def those_that_keep(rungs: Sequence[Attempt], bound: float) -> list[Attempt]:
+def those_that_keep(ladder: Sequence[Attempt], bound: float) -> list[Attempt]:
     """Of attempts from coarse to fine those that keep the error, as do all after them.
 
     An attempt that keeps it by luck, with a larger error at a finer step, does not count.
     """
-    kept = kept_from(np.array([one.error for one in rungs]), bound)
-    return [one for one, keeps in zip(rungs, kept) if keeps]
+    kept = kept_from(np.array([one.error for one in ladder]), bound)
+    return [one for one, keeps in zip(ladder, kept) if keeps]
 
 
 def attempts(

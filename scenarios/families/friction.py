@@ -48,8 +48,8 @@ def friction_bounce(restitution: float, friction: float) -> Scenario:
     def truth(t: Array) -> Trajectory:
         start, v = start_of(scene)
         legs = bounce(start, v, scene.radius, np.full(n, 2.0), e, mu, height)
-        hits = [(float(legs.start[1]), i, -1, (1 + e) * fall) for i in range(n)]
-        return turning_answer(scene, t, legs.at(t), hits)
+        collisions = [(float(legs.start[1]), i, -1, (1 + e) * fall) for i in range(n)]
+        return turning_answer(scene, t, legs.at(t), collisions)
 
     return Scenario(
         name=f"friction_bounce_{TAG[e]}_{MU_TAG[mu]}",
@@ -77,13 +77,13 @@ def spinning_disks_meet() -> Scenario:
     )
 
     def truth(t: Array) -> Trajectory:
-        motions, hits = [], list[Collision]()
+        motions, collisions = [], list[Collision]()
         for i in range(0, scene.n, 2):
             legs, impulse = spinning_pair(scene, i)
             motions.append(legs.at(t))
-            hits.append((float(legs.start[1]), i, i + 1, float(impulse[0])))
+            collisions.append((float(legs.start[1]), i, i + 1, float(impulse[0])))
         place, rate = (np.concatenate(part, axis=1) for part in zip(*motions))
-        return turning_answer(scene, t, (place, rate), hits)
+        return turning_answer(scene, t, (place, rate), collisions)
 
     return Scenario(
         name="spinning_disks_meet",
@@ -116,8 +116,8 @@ def spin_to_flight_and_back() -> Scenario:
         legs = between_plates(start, v, radius, 2.0, gap, scene.friction, t[-1])
         place, rate = legs.at(t)
         kick = 2 * abs(v[1])
-        hits = [(float(at), 0, -1 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
-        return turning_answer(scene, t, (place[:, None], rate[:, None]), hits)
+        collisions = [(float(at), 0, -1 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
+        return turning_answer(scene, t, (place[:, None], rate[:, None]), collisions)
 
     return Scenario(
         name="spin_to_flight_and_back",
@@ -221,8 +221,8 @@ def roll_or_slide() -> Scenario:
                 np.column_stack([np.outer(part[:, 0], down[i]), part[:, 1]]) for part in (way, rate)
             )
         place[..., :2] += scene.position
-        hits = [(0.0, i, -1 - i, 0.0) for i in range(scene.n)]
-        return turning_answer(scene, t, (place, moves), hits)
+        collisions = [(0.0, i, -1 - i, 0.0) for i in range(scene.n)]
+        return turning_answer(scene, t, (place, moves), collisions)
 
     return Scenario(
         name="roll_or_slide",

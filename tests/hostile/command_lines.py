@@ -15,7 +15,7 @@ REFUSED: dict[str, tuple[tuple[str, ...], str]] = {
     "an option that does not exist": (("run", "--fast"), "--fast"),
     "an option of another command": (("diff", "--seed", "1", "a", "b"), "--seed"),
     "an option without its value": (("run", "--out"), "--out"),
-    "a value for a switch": (("run", "--full=yes"), "--full"),
+    "a value for a flag": (("run", "--full=yes"), "--full"),
     "a scenario that is misspelt": (("run", "free_fal"), "free_fall"),
     "an empty scenario": (("run", ""), "is not known"),
     "a scenario with a null byte's name": (("run", "\\0"), "is not known"),

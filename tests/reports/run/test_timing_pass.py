@@ -125,14 +125,14 @@ def test_of_a_long_run_only_the_first_part_is_timed():
 def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
     """An empty step of 1, of 5 by itself: in free flight one call has 4 more, with a force every
     step has."""
-    free, pushed = scenario("near_miss"), scenario("body_frame_thrust")
+    free, thrusted = scenario("near_miss"), scenario("body_frame_thrust")
     steps = free.intervals * 2
-    on = sum(thrust.stop - thrust.start for thrust in pushed.thrusts) / pushed.dt(1)
+    on = sum(thrust.stop - thrust.start for thrust in thrusted.thrusts) / thrusted.dt(1)
 
     assert binding_of(1.0, 5.0, free, 2) * free.duration == pytest.approx(steps + 4)
-    found = binding_of(1.0, 5.0, pushed, 1) * pushed.duration
+    found = binding_of(1.0, 5.0, thrusted, 1) * thrusted.duration
     # besides, a call for each stretch without a force: two at most
-    assert pushed.intervals + 4 * on <= found + 1e-9 <= pushed.intervals + 4 * (on + 2) + 1e-6
+    assert thrusted.intervals + 4 * on <= found + 1e-9 <= thrusted.intervals + 4 * (on + 2) + 1e-6
 
 
 def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
