@@ -189,7 +189,7 @@ def test_the_readme_counts_as_the_tables_do():
 def test_the_readme_counts_the_solvers_of_the_confusion_table():
     """As many faulty and correct ones as the catalogue has, and the table a row for each."""
     said = re.search(
-        r"what it says of (\d+) solvers with one or two faults and of (\d+) without",
+        r"what `check` says of (\d+) solvers with one or two faults and of (\d+) without",
         TEXTS["reports/check/README.md"],
     )
 
