@@ -97,7 +97,7 @@ REFUSED: dict[str, tuple[tuple[str, ...], str]] = {
         "bullet",
     ),
     "help in a wrong place": (("--helpp",), "--helpp"),
-    "a switch of the shell": (("run", ";", "rm", "-rf", "x"), ""),
+    "a separator of the shell": (("run", ";", "rm", "-rf", "x"), ""),
     "a line of 3000 words": (("run", *(f"s{k}" for k in range(9))), "'s8' is not known"),
     "a word of other letters": (("run", "保存", "Ünï"), "保存"),
     "what is left of a variable": (("run", "$SCENE"), "$SCENE"),

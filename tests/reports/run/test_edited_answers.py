@@ -77,7 +77,7 @@ def endless(path: Path) -> None:
 
 EDITS: dict[str, Callable[[Path], None]] = {
     "half as far": lambda path: with_arrays(path, halved),
-    "valid until soon": lambda path: with_arrays(path, numbers(horizon="soon")),
+    "a horizon in words": lambda path: with_arrays(path, numbers(horizon="soon")),
     "nothing remains": lambda path: with_arrays(path, numbers(remains=5)),
     "said otherwise": saying("timeout", "x", "soon"),
     "said in a list": saying("timeout", "x", 5.0),
