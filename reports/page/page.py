@@ -112,6 +112,7 @@ def write_page(
         columns=overview.SUMMARY,
         summaries=summaries(smooth, rough, untrusted),
         error_cost=first,
+        no_times=clock.fault,
         error_cost_key=error_cost.KEY,
         error_cost_charts=packed_charts(first.drawings) if first else "",
         answers=answers,
