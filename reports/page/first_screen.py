@@ -33,6 +33,7 @@ class FirstScreen:
         said: a solver's file -> what `crosscheck check` says of it.
         error_cost: error against cost, its sentences and its times; None without exact answers.
         error_cost_charts: the pictures of `error_cost`.
+        no_times: why no time is shown, or "".
         answers: the engines ranked, a row a situation.
         whole: the row of all situations together.
         far_off: radii beyond which a disk is not where it should be.
@@ -48,6 +49,7 @@ class FirstScreen:
     said: Mapping[str, Sequence[str]]
     error_cost: error_cost.ErrorCost | None
     error_cost_charts: Pictures
+    no_times: str
     answers: Sequence[situations.Answer]
     whole: situations.Answer | None
     far_off: float
@@ -80,6 +82,7 @@ def first_screen(
         said=said,
         error_cost=first,
         error_cost_charts=pictures(error_cost.KEY, first.drawings if first else {}),
+        no_times=clock.fault,
         answers=answers,
         whole=situations.whole(answers),
         far_off=situations.FAR_OFF,

@@ -109,6 +109,8 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
         highlight=False,
     )
     console.print()
+    if advice.keeping and not advice.quiet:  # before the costs that it concerns
+        console.print(f"{sentence_on_times(advice)}\n", highlight=False)
     if advice.keeping:
         print_choices(console, advice)
     else:
@@ -119,7 +121,7 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     if advice.changes:
         console.print()
         print_changes(console, advice, bound)
-    if advice.keeping:
+    if advice.keeping and advice.quiet:
         console.print(f"\n{sentence_on_times(advice)}", highlight=False)
 
 
