@@ -13,7 +13,7 @@ compiled = njit(cache=True, error_model="numpy")
 pasted = njit(cache=True, error_model="numpy", forceinline=True)
 
 # A kernel makes no array and no list, so nothing needs counting: numba would count every use of an
-# array it is handed, which took half of the time of a step of 100 disks, and the only switch is one
+# array it is handed, which took half of the time of a step of 100 disks, and the only option is one
 # it calls private. It is pasted where it is called, because handing over all the arrays takes
 # longer than most kernels do.
 kernel = njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[call-overload]

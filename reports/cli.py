@@ -59,6 +59,20 @@ Out = Annotated[
         help="Folder for the results. An earlier run there is replaced once this one is done.",
     ),
 ]
+Results = Annotated[
+    Path,
+    typer.Option(
+        metavar="DIR",
+        help="Folder for the results. Earlier ones there are replaced once these are done.",
+    ),
+]
+GoOn = Annotated[bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")]
+OneScene = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
+    ),
+]
 Workers = Annotated[
     int, typer.Option(min=0, metavar="N", help="Number of processes; 0: one for each core.")
 ]
@@ -69,8 +83,8 @@ Timeout = Annotated[
         max=1e6,
         metavar="S",
         help=(
-            "Time limit of a cell, and of an exact answer. A cell is stopped then, also inside an"
-            " engine's C code; of an exact answer the part up to there is given."
+            "Time limit of each cell, which is stopped then, also inside an engine's C code; and of"
+            " each exact answer, which is cut where it has got to."
         ),
     ),
 ]
@@ -165,15 +179,16 @@ def report(
     ],
     scenes: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[SCENE]...", help="With --print: scenes to have on paper."),
+        typer.Argument(metavar="SCENE", help="With --print: scenes to print with the page."),
     ] = None,
     printed: Annotated[
-        bool, typer.Option("--print", help="Give each SCENE half a page where the page is printed.")
+        bool,
+        typer.Option("--print", help="Where the page is printed, half a page for each SCENE."),
     ] = False,
 ) -> None:
     """Write the tables and the page of a run again.
 
-    Nothing is played again: they are made from the journal of the run and its trajectories.
+    They are made from the journal and the trajectories of the run; no engine plays again.
     """
     from reports.commands.report import report_again
 
@@ -194,8 +209,8 @@ def replay(
 ) -> None:
     """Play one cell of a run again, step by step.
 
-    A cell that failed begins at its last good state, any other at the start. What the engine prints
-    is shown.
+    A cell that failed begins at its last good state, any other cell at the start. The output of
+    the engine is shown.
     """
     from reports.commands import replay as replay_command
 
@@ -209,8 +224,8 @@ def diff(
 ) -> None:
     """Show what changed between two runs.
 
-    How cells ended, their numbers, and how long they took. The exit status is 1 if anything got
-    worse.
+    Compares how the cells ended, their numbers, and how long they took. The exit status is 1 if
+    anything got worse.
     """
     from reports.commands import diff as diff_command
 
@@ -219,12 +234,7 @@ def diff(
 
 @app.command()
 def truth(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
-        ),
-    ],
+    scene: OneScene,
     events: Annotated[
         bool,
         typer.Option("--events", help="Print all collisions, not only the first and last ten."),
@@ -235,7 +245,8 @@ def truth(
 ) -> None:
     """Print the exact answer to a scene.
 
-    Its collisions, its horizon (up to when it holds, and what ends it), and its error bound.
+    Shows its collisions, its horizon (the time up to which it holds, and what ends it), and its
+    error bound.
     """
     from reports.commands.truth import show_truth
 
@@ -270,7 +281,7 @@ def check(
 ) -> None:
     """Check a hand-written solver of the exercise.
 
-    It says what is right, what is wrong, and what likely causes it.
+    Says what is right, what is wrong, and what likely causes each fault.
 
     A solver.py runs with all your permissions. It may import installed packages, and modules beside
     it that are not named like one of those.
@@ -317,7 +328,7 @@ def lesson(
 ) -> None:
     """Show why engines differ, in lessons with sliders.
 
-    Each is a page in a browser: a scene that runs, the exact answer beside it, and sliders.
+    A lesson is a page in a browser: a scene that runs, the exact answer beside it, and sliders.
     """
     if export is None:
         from reports.commands import serve
@@ -348,17 +359,9 @@ def speed(
             "--full", help="All scenarios, finer steps, more rounds, up to 100 000 disks."
         ),
     ] = False,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")
-    ] = False,
+    resume: GoOn = False,
     seed: Seed = 0,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for the results. Earlier ones there are replaced once these are done.",
-        ),
-    ] = Path("reports/out/speed"),
+    out: Results = Path("reports/out/speed"),
 ) -> None:
     """Measure error against time for every engine.
 
@@ -379,7 +382,7 @@ def speed(
 
 @app.command()
 def advise(
-    scene: Annotated[str, typer.Argument(metavar="SCENARIO|FILE.toml")],
+    scene: OneScene,
     error: Annotated[
         str, typer.Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
     ] = "1%",
@@ -395,7 +398,10 @@ def advise(
     seed: Seed = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Find the cheapest engine and step size for a scene, and what the scene does not need."""
+    """Find the cheapest engine and step size for a scene.
+
+    Also shows which options of an engine the scene does not need, and what they cost in it.
+    """
     from reports.speed.advise import give_advice
 
     give_advice(scene, error, purpose, engine or [], seed, as_json)
@@ -424,22 +430,14 @@ def stability(
             "--full", help="All runs at every value, more values, brackets of 1 % instead of 5 %."
         ),
     ] = False,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")
-    ] = False,
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for the results. Earlier ones there are replaced once these are done.",
-        ),
-    ] = Path("reports/out/stability"),
+    resume: GoOn = False,
+    out: Results = Path("reports/out/stability"),
     workers: Workers = 0,
 ) -> None:
     """Find where each engine fails.
 
-    Each is driven from gentle to harsh along one parameter until it fails. The failing run is kept
-    and shown.
+    Changes one parameter from gentle to harsh until the engine fails, and shows the failing run
+    with its cause.
     """
     from reports.stability.command import find_limits
 
@@ -461,7 +459,7 @@ def tune(
 ) -> None:
     """Search the public settings of engines.
 
-    Those are found that come nearest to the exact answers at equal cost.
+    Finds those that bring an engine nearest to the exact answers at equal cost.
     """
     from reports.tune.command import tune as search_settings
 

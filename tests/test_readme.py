@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from adapters.conformance.conform import PROBES
-from adapters.engines import DISTINCT
+from adapters.engines import UNASKED
 from reports.lessons.catalogue import LESSONS
 from scenarios.catalogue import SCENARIOS
 from tests.reports.terminal.command_line import crosscheck
@@ -180,7 +180,7 @@ def test_the_readme_counts_as_the_tables_do():
 
     assert [int(number) for one in said if one for number in one.groups()] == [
         len(SCENARIOS),
-        len(DISTINCT),
+        len(UNASKED),
         len(PROBES),
         len(LESSONS),
     ]
@@ -189,7 +189,7 @@ def test_the_readme_counts_as_the_tables_do():
 def test_the_readme_counts_the_solvers_of_the_confusion_table():
     """As many faulty and correct ones as the catalogue has, and the table a row for each."""
     said = re.search(
-        r"what it says of (\d+) solvers with one or two faults and of (\d+) without",
+        r"what `check` says of (\d+) solvers with one or two faults and of (\d+) without",
         TEXTS["reports/check/README.md"],
     )
 

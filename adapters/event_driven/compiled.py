@@ -16,7 +16,7 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 # Kernels make no arrays, so nothing needs counting; numba would count every use of those they are
 # handed, which takes three quarters of the time (0.65 against 2.5 million collisions a second), and
-# the only switch is one it calls private. Entries for callers in C, and for Python where only
+# the only option is one it calls private. Entries for callers in C, and for Python where only
 # kernels call, are a seventh of the time it takes to compile all.
 OPTIONS: dict[str, Any] = {
     "cache": True,

@@ -151,7 +151,7 @@ class Arena(NamedTuple):
     rules: Rules
     walls: Walls
     clock: Array  # s: when the present epoch began, when the answer ends
-    log: Array  # (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
+    log: Array  # (h, 4) t s, disk, other disk or -1 - wall, impulse N s
     # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes
     # back
     counters: Ints

@@ -80,7 +80,7 @@ class EventEngine:
             rules=rules,
             walls=walls_of(scene, grid, low),
             clock=np.zeros(2),
-            log=np.zeros((LOG_ROWS, 5)),
+            log=np.zeros((LOG_ROWS, 4)),
             counters=np.zeros(4, np.int64),
             runs=np.zeros(scene.n, RUN).view(np.recarray),
             spins=spins_of(scene),
@@ -143,7 +143,7 @@ class EventEngine:
 
     def partners(self, i: int, last: int, since: float) -> str:
         """What disk `i` has struck since a time, in words; `last` was the last of it."""
-        log = np.concatenate([np.empty((0, 5)), *self.kept[-2:]])
+        log = np.concatenate([np.empty((0, 4)), *self.kept[-2:]])
         log = log[log[:, 0] >= since * (1 - 1e-12)]
         found = {
             last,
@@ -185,7 +185,7 @@ class EventEngine:
     @property
     def collisions(self) -> Array:
         """(h, 4): t s, disk, other disk or -1 - wall, impulse N s, of all collisions so far."""
-        return np.concatenate([np.empty((0, 5)), *self.kept])[:, :4]
+        return np.concatenate([np.empty((0, 4)), *self.kept])
 
     def refuse_pairs(self) -> None:
         """`NoTruth` if two disks overlap, or touch and close in, judged in rationals: floats cannot

@@ -48,8 +48,8 @@ def rub_disks(arena: Arena, i: int, j: int, impulse: float) -> None:
     slip = tx * (b.vx - a.vx) + ty * (b.vy - a.vy) - a.radius * s.spin - b.radius * r.spin
     softness = a.weight + b.weight + a.radius**2 * s.turns + b.radius**2 * r.turns
     kick = limited(-slip / softness, arena.rules.friction * impulse)
-    push(a, s, -kick * tx, -kick * ty, kick)
-    push(b, r, kick * tx, kick * ty, kick)
+    apply_impulse(a, s, -kick * tx, -kick * ty, kick)
+    apply_impulse(b, r, kick * tx, kick * ty, kick)
     noise = ROUNDING * abs(kick) * (a.weight + b.weight)
     a.noise += noise
     b.noise += noise
@@ -74,12 +74,12 @@ def rub_wall(arena: Arena, i: int, w: int, part: int, impulse: float) -> None:
     slip = tx * a.vx + ty * a.vy + a.radius * s.spin
     softness = a.weight + a.radius**2 * s.turns
     kick = limited(-slip / softness, arena.rules.friction * impulse)
-    push(a, s, kick * tx, kick * ty, -kick)
+    apply_impulse(a, s, kick * tx, kick * ty, -kick)
     a.noise += ROUNDING * abs(kick) * a.weight
 
 
 @kernel
-def push(a: Any, s: Any, jx: float, jy: float, kick: float) -> None:
+def apply_impulse(a: Any, s: Any, jx: float, jy: float, kick: float) -> None:
     """An impulse (jx, jy) N s on the rim of a disk, which turns it by r `kick`, clockwise."""
     a.vx += a.weight * jx
     a.vy += a.weight * jy

@@ -33,9 +33,8 @@ from adapters.event_driven.search import ROUNDING, image
 @inlined
 def collide(
     a: Any, b: Any, i: int, j: int, shift: tuple[float, float], restitution: float
-) -> tuple[float, float]:
-    """Collision of disks i and j that are in contact; impulse N s, 0 if they do not close in, and
-    cosine of the angle.
+) -> float:
+    """Collision of disks i and j that are in contact; its impulse N s, 0 if they do not close in.
 
     v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a
     unit vector by a square root would let the energy drift by 1.5e-17 a collision.
@@ -46,22 +45,20 @@ def collide(
     a.last, b.last = j, i
     a.noise = b.noise = ROUNDING * (abs(a.vx) + abs(a.vy) + abs(b.vx) + abs(b.vy))
     if closing >= 0.0:
-        return 0.0, 0.0
+        return 0.0
     distance2 = dx * dx + dy * dy
     q = -(1.0 + restitution) * closing / (distance2 * (a.weight + b.weight))
     a.vx -= q * a.weight * dx
     a.vy -= q * a.weight * dy
     b.vx += q * b.weight * dx
     b.vy += q * b.weight * dy
-    return q * sqrt(distance2), min(-closing / sqrt(distance2 * (ux * ux + uy * uy)), 1.0)
+    return q * sqrt(distance2)
 
 
 @kernel
-def collide_wall(
-    walls: Walls, a: Any, w: int, part: int, restitution: float
-) -> tuple[float, float]:
+def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) -> float:
     """Collision of a disk on a wall it touches, set exactly beside the face; as `collide`."""
-    ux, uy, speed2 = walls.segment[w, 2], walls.segment[w, 3], a.vx * a.vx + a.vy * a.vy
+    ux, uy = walls.segment[w, 2], walls.segment[w, 3]
     dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
     a.bounces = 0 if part else (a.bounces + 1 if a.last == -1 - w else 1)
     a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
@@ -75,25 +72,19 @@ def collide_wall(
         dx, dy = dx - walls.segment[w, 4] * ux, dy - walls.segment[w, 4] * uy
     closing = dx * a.vx + dy * a.vy
     if closing >= 0.0:
-        return 0.0, 0.0
+        return 0.0
     distance2 = dx * dx + dy * dy
     q = -(1.0 + restitution) * closing / distance2
     a.vx += q * dx
     a.vy += q * dy
-    return q * sqrt(distance2) / a.weight, min(-closing / sqrt(distance2 * speed2), 1.0)
+    return q * sqrt(distance2) / a.weight
 
 
 @inlined
-def tell(arena: Arena, now: float, i: int, j: int, impulse: float, cosine: float) -> None:
+def tell(arena: Arena, now: float, i: int, j: int, impulse: float) -> None:
     """Write a collision into the log."""
     log, k = arena.log, arena.counters[LOGGED]
-    log[k, 0], log[k, 1], log[k, 2], log[k, 3], log[k, 4] = (
-        arena.clock[BASE] + now,
-        i,
-        j,
-        impulse,
-        cosine,
-    )
+    log[k, 0], log[k, 1], log[k, 2], log[k, 3] = arena.clock[BASE] + now, i, j, impulse
     arena.counters[LOGGED] += 1
 
 
@@ -104,12 +95,12 @@ def stop(arena: Arena, now: float, i: int, j: int) -> None:
 
 
 @inlined
-def note(arena: Arena, a: Any, i: int, j: int, impulse: float, cosine: float) -> bool:
+def note(arena: Arena, a: Any, i: int, j: int, impulse: float) -> bool:
     """Count and log a collision; True if collisions of disk `i` follow each other faster than
     float64 resolves times apart."""
     a.count += 1
     if impulse > 0.0:
-        tell(arena, a.t, i, j, impulse, cosine)
+        tell(arena, a.t, i, j, impulse)
     a.mark_collisions += 1
     if a.mark_collisions < COLLISIONS:
         return False
@@ -153,12 +144,12 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     """
     a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
     changed = a.last != -1 - w
-    impulse, cosine = collide_wall(walls, a, w, part, arena.rules.restitution)
+    impulse = collide_wall(walls, a, w, part, arena.rules.restitution)
     rubs = arena.rules.friction > 0.0
     if rubs:
         rub_wall(arena, i, w, part, impulse)
     jolt(walls, a)
-    crowded = note(arena, a, i, -1 - w, impulse, cosine)
+    crowded = note(arena, a, i, -1 - w, impulse)
     run.walls += 1
     walls_only = run.walls >= COLLISIONS  # no other disk has a part in it
     trapped = False
@@ -173,7 +164,7 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
     may_rest = part == 0 and mixed and (walls_only or not trapped)
     if may_rest and rests(walls, a, w, corner, crowded, trapped):
         if impulse == 0.0:  # a contact whose impulses begin without a collision
-            tell(arena, a.t, i, -1 - w, 0.0, 1.0)
+            tell(arena, a.t, i, -1 - w, 0.0)
         if rubs:
             drag(arena, i)
         return GOES_ON

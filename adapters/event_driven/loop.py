@@ -135,7 +135,7 @@ def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
     """Disks i and j collide."""
     a, b = arena.disks[i], arena.disks[j]
     new_to_a, new_to_b = a.last != j, b.last != i
-    impulse, cosine = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
+    impulse = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
     if len(scenery) and arena.rules.friction > 0.0:
         rub_disks(arena, i, j, impulse)
     if len(scenery) and arena.rules.falling:
@@ -146,7 +146,7 @@ def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
         drag(arena, j)
     if b.weight > 0.0:
         b.count += 1
-    crowded = note(arena, a, i, j, impulse, cosine)
+    crowded = note(arena, a, i, j, impulse)
     if len(scenery) and (arena.rules.falling or arena.rules.restitution < 1.0):
         e, lasting = arena.rules.restitution, arena.rules.lasting
         if rattles_on_disk(arena.runs[i], a, b, e, impulse, new_to_a or lasting):

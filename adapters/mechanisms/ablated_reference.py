@@ -1,9 +1,9 @@
-"""The exercise's solver with every mechanism by which engines differ: an engine is an order of
-stages.
+"""The exercise's solver with every mechanism by which engines differ: an order of stages stands for
+an engine.
 
-Every stage is a function below, and `Parameters` holds the numbers they take. Accelerate, move,
-pairs, walls is the exercise, to the bit. It asks all pairs and is for some hundred disks. Compiled
-by numba, as `exercise` is.
+Every stage is a function below, and `Parameters` holds their numbers. The order accelerate, move,
+pairs, walls gives the bits of the exercise. The solver tests all pairs, so it is for some hundred
+disks. Compiled by numba, as `exercise` is.
 """
 
 from math import atan, inf, pi, sqrt
@@ -71,7 +71,7 @@ STAGES = (
 
 
 class Parameters(NamedTuple):
-    """What may be other than in the exercise; the defaults are the exercise's."""
+    """The numbers of the stages; the defaults are those of the exercise."""
 
     order: np.ndarray  # the stages of a step, as places in STAGES
     drift: float = 0.0  # of a h2, by which `move` goes farther than v h
@@ -165,7 +165,7 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
 
 @compiled
 def accelerate(disks: Disks, world: World, h: float) -> None:
-    """v += a h of what can move; the turning alike."""
+    """v += a h for disks that can move; the angular velocity alike."""
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
@@ -177,10 +177,10 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
 
 @compiled
 def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -> None:
-    """x += v h + drift a h2, and what a nudge adds; the turning alike.
+    """x += v h + drift a h2, and what `nudge` adds; the angle alike.
 
-    The moves of a step are added up first, as Box2D 3.1 does: it is them that are rounded, not the
-    place.
+    As in Box2D 3.1 the moves of a step are added up before they are added to the position, so that
+    the moves are rounded, not the position.
     """
     v, moved, more = disks.velocity, kept.moved, on.drift * h * h
     for i in range(len(disks.mass)):
@@ -198,7 +198,7 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
 
 @compiled
 def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
-    """Task 2 of the exercise for one pair of disks after the other."""
+    """Task 2 of the exercise for each pair of disks in turn."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for j in range(i + 1, len(radius)):
@@ -208,7 +208,7 @@ def pairs(disks: Disks, world: World, on: Parameters, k: int, collisions: list[C
 
 @compiled
 def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[Collision]) -> None:
-    """The same for one disk and wall after the other."""
+    """Task 2 of the exercise for each disk and wall in turn."""
     x, radius = disks.position, disks.radius
     for i in range(len(radius)):
         for w in range(len(world.walls)):
@@ -220,8 +220,8 @@ def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[C
 def meet(
     disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list[Collision]
 ) -> None:
-    """One pair, by the exercise with friction; where nothing is to be projected, both are set back
-    to where they met."""
+    """Collide one pair as the exercise with friction does; without projection, both positions are
+    restored afterwards."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
     _, nx, ny = gap_of(disks, world, i, j)
@@ -248,8 +248,8 @@ def meet(
 
 @compiled
 def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Fix, for every contact at once, the velocity it shall have: e times the closing speed; 0 for
-    slow collisions."""
+    """Set the target velocity of every contact, before any impulse: e times the closing speed, 0
+    for slow collisions."""
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         speed = closing(v, contact.i, contact.j, contact.nx, contact.ny)
@@ -258,10 +258,10 @@ def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # typ
 
 @compiled
 def warm_start(disks: Disks, on: Parameters, kept: Contacts) -> None:
-    """Begin with the impulses that the contacts had in the last step.
+    """Apply the impulses that the contacts had in the last step.
 
-    What one had before that is not given, but counts as if it were, and may be taken back (Munk2D,
-    cpArbiterUpdate).
+    An impulse of an earlier step is not applied, but `bounce` counts it as if it were, and may take
+    it back (Munk2D, cpArbiterUpdate).
     """
     for c in range(kept.found[0]):
         contact = kept.rows[c]
@@ -274,8 +274,8 @@ def warm_start(disks: Disks, on: Parameters, kept: Contacts) -> None:
 
 @compiled
 def bounce(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
-    """Sequential impulses: go through all contacts again and again; an impulse may be taken
-    back."""
+    """Sequential impulses: solve all contacts in turn, `iterations` times; a later pass may take
+    an impulse back."""
     for _ in range(on.iterations):
         for c in range(kept.found[0]):
             contact = kept.rows[c]
@@ -298,7 +298,7 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
 
 @compiled
 def position_correction(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
-    """Undo a share of every overlap beyond the slop, some times in every island."""
+    """Undo a share of every overlap beyond the slop, `correction_iterations` times in an island."""
     first = 0
     while on.correction_share > 0.0 and first < kept.found[0]:
         end = first
@@ -315,8 +315,8 @@ def position_correction(disks: Disks, world: World, on: Parameters, kept: Contac
 def correct_island(
     disks: Disks, world: World, on: Parameters, kept: Contacts, first: int, end: int
 ) -> float:
-    """Once through the contacts from `first` to before `end`; returns the smallest gap in m there
-    was, at most 0."""
+    """Correct the contacts from `first` to before `end` once; returns the smallest gap in m before
+    it, at most 0."""
     worst = 0.0
     for c in range(first, end):
         i, j = kept.rows[c].i, kept.rows[c].j
@@ -330,7 +330,7 @@ def correct_island(
 
 @compiled
 def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
-    """Give overlaps a velocity that lasts for the next move only, and undoes a share of what is
+    """Give overlapping disks a velocity for the next move only, which undoes a share of the overlap
     beyond the slop."""
     for c in range(kept.found[0]):
         kept.rows[c].nudged = 0.0
@@ -348,11 +348,11 @@ def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: igno
 def soften(
     disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, biased: bool
 ) -> None:
-    """A damped spring a contact, solved for the end of the substep (E. Catto, Solver2D, 2024: soft
-    step).
+    """Solve each contact as a damped spring, implicitly for the end of the substep (E. Catto,
+    Solver2D, 2024: soft step).
 
-    Not `biased` is its second pass, which takes the bias out of the velocities again. What is not
-    yet touching may come together, but no farther.
+    The second pass, not `biased`, takes the bias out of the velocities again. Bodies that do not
+    touch yet may close their gap, and no more.
     """
     for c in range(kept.found[0]):
         contact = kept.rows[c]
@@ -375,7 +375,7 @@ def soften(
 
 @compiled
 def restitute(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
-    """One sweep that gives every contact which was pressed the velocity it was aimed at."""
+    """Give every contact that had an impulse its target velocity, in one pass."""
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         if contact.target != 0.0 and contact.strongest > 0.0:

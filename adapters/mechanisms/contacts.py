@@ -1,5 +1,5 @@
-"""Who touches whom, and their impulses: what `ablated_reference` keeps of a step, and from step to
-step.
+"""The contacts of `ablated_reference`: which bodies touch, with which impulses, within a step and
+from step to step.
 
 A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is
 that of the moment it was found. Compiled by numba, as `exercise` is.
@@ -34,7 +34,7 @@ CONTACT = np.dtype(
 
 
 class Contacts(NamedTuple):
-    """`found[0]` contacts, and what else is kept from stage to stage."""
+    """The contacts of a step, the first `found[0]` of `rows`, and what else the stages share."""
 
     found: np.ndarray  # (1,): how many
     rows: np.ndarray  # of CONTACT, enough for twice as many as there can be
@@ -47,7 +47,7 @@ class Contacts(NamedTuple):
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
-    """None yet, of `n` disks whose places are kept in this precision, and so many walls."""
+    """An empty table of contacts of `n` disks and so many walls; positions have this precision."""
     most = n * (n - 1) // 2 + n * walls
     place: np.ndarray = np.zeros((n, 2), precision)
     return Contacts(
@@ -71,11 +71,10 @@ def detect(
     memory: int,
     kept: Contacts,
 ) -> None:
-    """Find all that are nearer than `margin`, pairs i < j first, then walls, which are thicker by
-    `skin`.
+    """Find the contacts: pairs i < j with a gap below `margin`, then walls, thicker by `skin`.
 
-    If `touching`, also what is just as near. A pair has the impulses it last had, if not more than
-    `memory` steps ago.
+    If `touching`, a gap of exactly `margin` counts as well. A contact starts with the impulses that
+    it had last, unless that was more than `memory` steps ago.
     """
     n = len(disks.radius)
     remember(memory, kept)
@@ -101,7 +100,7 @@ def detect(
 
 @compiled
 def remember(memory: int, kept: Contacts) -> None:
-    """Keep what the contacts of the last step had, and of the others what is not too old."""
+    """Keep the impulses of the last step's contacts, and drop those older than `memory` steps."""
     rows, columns = kept.before.shape[:2]
     for i in range(rows):
         for other in range(columns):
@@ -117,7 +116,7 @@ def remember(memory: int, kept: Contacts) -> None:
 
 @compiled
 def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
-    """One contact more, with the impulses it last had."""
+    """Add a contact, with the impulses that it had last."""
     contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
     kept.found[0] += 1
     contact.i, contact.j = i, j
@@ -131,17 +130,17 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
 
 @compiled
 def column(j: int, n: int) -> int:
-    """Where `before` keeps disk j, or wall -1 - j."""
+    """The column of `before` for disk j, or for wall -1 - j."""
     return j if j >= 0 else n - 1 - j
 
 
 @compiled
 def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts into islands, which share no disk that moves, in the order in which a
-    search finds them.
+    depth-first search finds them.
 
-    It goes from disk to disk, from the last on, and knows the last contact of a disk first (Box2D
-    2.3, b2World::Solve).
+    The search starts from the last disk, and takes the last contact of a disk first (Box2D 2.3,
+    b2World::Solve).
     """
     rows, n, count, copies = kept.rows, len(mass), kept.found[0], len(kept.rows) // 2
     for c in range(count):
@@ -168,9 +167,9 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 @compiled
 def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Sort the contacts by colours, none of which has a disk that moves twice.
+    """Sort the contacts by colour: no disk that moves has two contacts of one colour.
 
-    A new contact takes the first colour that is free, or the second where only one can move, and
+    A new contact takes the first free colour, from the second on if only one body can move, and
     keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor).
     """
     rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
@@ -208,7 +207,7 @@ def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no
 
 @compiled
 def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, float]:
-    """m between the surfaces, and the normal, as they are now."""
+    """The gap between the surfaces in m, and the normal, at the present positions."""
     x, reach = disks.position, disks.radius[i]
     if j >= 0:
         px, py = x[j, 0], x[j, 1]
@@ -221,8 +220,8 @@ def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, fl
 
 @compiled
 def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
-    """m: the gap when it was found, before anything moved, and what both have moved along its
-    normal since."""
+    """The gap in m along the normal of the contact: when it was found, plus what both bodies have
+    moved since."""
     i, j = contact.i, contact.j
     gap = contact.gap + moved[i, 0] * contact.nx + moved[i, 1] * contact.ny
     if j >= 0:
@@ -232,7 +231,7 @@ def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
 
 @compiled
 def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-def]
-    """m, by which the gap seems wider because the points that touched have turned with the disks
+    """How much wider the gap seems, in m, as the points that touched have turned with the disks
     (Box2D 3.1, b2SolveContact: moving anchors)."""
     i, j = contact.i, contact.j
     gap = (radius[i] + contact.gap / 2) * (1.0 - cos(turned[i]))
@@ -243,7 +242,7 @@ def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-de
 
 @compiled
 def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
-    """m/s along n, negative while they close in."""
+    """The relative velocity along n in m/s, negative while the bodies approach."""
     speed = v[i, 0] * nx + v[i, 1] * ny
     if j >= 0:
         speed -= v[j, 0] * nx + v[j, 1] * ny
@@ -252,15 +251,15 @@ def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[n
 
 @compiled
 def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
-    """1/kg, of the two together; a wall has none."""
+    """The sum of the inverse masses in 1/kg; that of a wall is 0."""
     return 1.0 / mass[i] + (1.0 / mass[j] if j >= 0 else 0.0)
 
 
 @compiled
 def drive_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
-    """The impulse that gives a contact its target velocity, if the sum is not negative.
+    """Apply the impulse that gives a contact its target velocity; the sum stays at least 0.
 
-    `share` of it where the contact is soft, less `memory` times its impulse so far.
+    A soft contact gets `share` of it, less `memory` times its impulse so far.
     """
     i, j, nx, ny, before = contact.i, contact.j, contact.nx, contact.ny, contact.impulse
     wanted = (target - closing(disks.velocity, i, j, nx, ny)) / inverse_mass(disks.mass, i, j)
@@ -279,9 +278,10 @@ def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
 
 @compiled
 def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: ignore[no-untyped-def]
-    """Stop the sliding of the surfaces where they touch, by at most `friction` times what presses.
+    """Stop the slip of the surfaces by a tangential impulse of at most `friction` times the normal
+    one.
 
-    The lever arms are longer than the radii by the share `lever` of the gap: 1/2 in its middle.
+    A lever arm is the radius and `lever` times the gap: 1/2 is the middle of the gap.
     """
     i, j, spin, inertia = contact.i, contact.j, disks.angular_velocity, disks.inertia
     arm = disks.radius[i] + contact.gap * lever
@@ -298,7 +298,7 @@ def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: 
 
 @compiled
 def turn(disks: Disks, contact, by: float, lever: float) -> None:  # type: ignore[no-untyped-def]
-    """N s more along the tangent, which turns both the same way round."""
+    """Apply `by` N s along the tangent, which turns both disks in the same sense."""
     i, j, inertia = contact.i, contact.j, disks.inertia
     apply_pair(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
     disks.angular_velocity[i] -= (disks.radius[i] + contact.gap * lever) * by / inertia[i]

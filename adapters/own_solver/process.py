@@ -1,4 +1,4 @@
-"""Talks to a solver's file in its own process, and outlives whatever that does."""
+"""Runs a solver's file in a process of its own, so that nothing the file does ends this program."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ Request = tuple[str, Any, float]
 
 
 class SolverProcess:
-    """A solver's text, loaded in a process of its own; use it in a `with`, or close it.
+    """A process that has loaded a solver's file; use it in a `with`, or close it.
 
     Attributes:
-        functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it
-            replaced.
+        functions: which of integrate, collide, step, wrap and begin the file has, and which
+            built-ins it replaced.
         kind: "javascript" or "python".
         surface: "exercise" (functions on spheres) or "advance" (arrays, as in reference_impl).
         versions: library -> version.
 
     Raises:
-        SolverFailed: it cannot be loaded.
-        NotStarted: its process cannot be had.
+        SolverFailed: the file cannot be loaded.
+        NotStarted: the process cannot be started.
     """
 
     def __init__(self, solver: SolverText, compiled: bool = False) -> None:
@@ -66,11 +66,11 @@ class SolverProcess:
         self.versions: dict[str, str] = hello["versions"]
 
     def start(self, solver: str, settings: dict[str, str]) -> Any:
-        """Start the process and give it the solver; what it says then.
+        """Start the process and send it the solver; returns its first answer.
 
-        It stops a file that does not load by itself. A process that says nothing at all is started
-        once more before the file is blamed: a start of V8 has been seen to hang, so rarely that
-        none of 1259 that were counted did.
+        The process itself stops a file that does not load in time. If it does not answer at all, it
+        is started once more before the file is blamed: a start of V8 has been seen to hang, though
+        in none of 1259 starts that were counted.
         """
         for last in (False, True):
             try:
@@ -83,7 +83,7 @@ class SolverProcess:
         raise AssertionError("the second start returns or raises")
 
     def begin(self, settings: dict[str, str]) -> None:
-        """Start the process and hear that it is there, with nothing of the solver in it; raises
+        """Start the process, without the solver, and wait for its first line; raises
         `NotStarted`."""
         self.process: subprocess.Popen[bytes] | None = None
         try:
@@ -98,7 +98,7 @@ class SolverProcess:
             )
             if self.receive(STARTING) == HERE:
                 return
-            why = "it said something else than that it is there"
+            why = "its first line was not the expected one"
         except (OSError, SolverFailed) as fault:
             why = str(fault)
         raise NotStarted(f"the process for a solver's file could not be started: {why}")
@@ -133,7 +133,7 @@ class SolverProcess:
         return answer
 
     def exchange(self, what: Any, limit: float) -> Any:
-        """One line there and one back."""
+        """Send one line, and return the line that answers it."""
         assert self.process is not None
         assert self.process.stdin is not None
         try:
@@ -143,14 +143,14 @@ class SolverProcess:
         return self.receive(limit)
 
     def receive(self, limit: float) -> Any:
-        """One line from the process."""
+        """Read one line from the process, within `limit` s."""
         assert self.process is not None
         assert self.process.stdout is not None
         received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
             left = deadline - monotonic()
             ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, left))
-            if not ready or left < 0:  # for who writes without end is always ready
+            if not ready or left < 0:  # a process that writes without end is always ready
                 self.close()
                 raise SolverFailed(
                     "timeout", f"does not come back within {limit:g} s and had to be stopped"
@@ -168,10 +168,10 @@ class SolverProcess:
             raise SolverFailed("crashed", INTRUDED) from None
 
     def lost(self) -> SolverFailed:
-        """Why the process is gone."""
+        """The failure that says how the process ended."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
-        # V8's word for a full heap
+        # what V8 sends when its heap is full
         ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)
         if ends_v8:
             return SolverFailed(
@@ -203,9 +203,9 @@ def kept_copies(solver: SolverText, kept: Path) -> Path | None:
     """A folder below `kept` with the texts of a Python solver, named by what they are; None if it
     cannot be written.
 
-    numba keeps what it compiled from a file under that file's place and content of the moment. The
-    file itself may have been saved since it was read, and what it imports is compiled into it: both
-    would be taken for what they were not.
+    numba caches compiled code by path and content of the file at that moment. The file may have
+    been saved again since it was read, and the modules that it imports are compiled into it; in
+    either case numba would use outdated code.
     """
     copies = kept / "solvers" / solver.source
     try:

@@ -163,11 +163,11 @@ def task_2(
     rows, usable = implemented("2a", process.functions["collide"], mine, text, part)
     if not usable:
         why = "the collision function cannot be judged further"
-        return rows + not_judged(rows[0].task, why), None
+        return rows + not_asked_of_task_2(rows[0].task, why), None
     rows += detection_rows(mine, text)
     if not reacts(mine):
         why = "the overlapping pairs of these questions are taken to be apart"
-        return rows + not_judged("2a", why), None
+        return rows + not_asked_of_task_2("2a", why), None
     restitution = restitution_of(with_beside, mine)
     found = explain(mine, restitution)
     if found is not None and found.impulse == APPROACH and moved_together(mine):
@@ -178,7 +178,7 @@ def task_2(
     return sorted(rows, key=lambda row: row.task), restitution
 
 
-def not_judged(but: str, why: str) -> list[CheckRow]:
+def not_asked_of_task_2(but: str, why: str) -> list[CheckRow]:
     """A row for each part of task 2 that could not be asked, without the part that says why."""
     first = {"2a": "reach", "2b": "one point", "2c": "impulse", "2d": "velocity of A"}
     return [not_asked(name, task, why) for task, name in first.items() if task != but]

@@ -44,7 +44,7 @@ def finish(report: Report, out: Path) -> NoReturn:
 def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
     """Tables and page from the journal in `out`; `scenes` are on paper where it is printed."""
     if scenes and not printed:
-        refuse([f"{' '.join(scenes)}: scenes are named after --print, to have them on paper"])
+        refuse([f"{' '.join(scenes)}: to print scenes with the page, name them after --print"])
     if printed and not scenes:
         refuse(["--print: name the scenes that are to be on paper; the overview always is"])
     with refusing(str(out)), Progress() as progress:

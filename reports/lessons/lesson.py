@@ -161,11 +161,11 @@ class Shown:
         raise KeyError(f"{name}: not in the chart {self.charts[chart].title}")
 
     def x(self, name: str, chart: int = 0) -> Array:
-        """(k,) where its points lie, in the unit of the chart."""
+        """(k,) the abscissas of the curve, in the unit of the chart."""
         return np.asarray(self.curve(name, chart).x, float)
 
     def y(self, name: str, chart: int = 0) -> Array:
-        """(k,) how high they lie, in the unit of the chart."""
+        """(k,) the ordinates of the curve, in the unit of the chart."""
         return np.asarray(self.curve(name, chart).y, float)
 
     def gap(self, name: str, other: str = TRUTH, chart: int = 0) -> float:
@@ -175,14 +175,14 @@ class Shown:
         return float(np.nanmax(np.abs(pair[0][:k] - pair[1][:k])))
 
     def drawn(self) -> list[str]:
-        """Who is drawn, in a chart or in the replay."""
+        """The names with a curve in a chart, or with disks in the replay."""
         names = {curve.name for chart in self.charts for curve in chart.curves}
         if self.film is not None:
             names |= {name_of(run) for run, _ in played(self.film)}
         return sorted(names)
 
     def refusals(self) -> list[tuple[str, str]]:
-        """Who was not played to the end, and why."""
+        """The engines that were not played to the end, and why."""
         runs = [] if self.film is None else self.film.runs
         return [(run.name, f"{run.status}: {run.reason}") for run in runs if run.status != "ok"]
 

@@ -466,8 +466,9 @@ def nearest(table: pd.DataFrame) -> str:
 
 
 def halving(table: pd.DataFrame, timed: bool) -> str:
-    """What half the step does to the time and to the error of those who take steps, and whom it
-    brings no nearer."""
+    """What half the step does, on average from the coarsest to the finest, to the time and to the
+    error of those who take steps, and whom it brings no nearer. (A single halving may do more, or
+    make the error larger.)"""
     dearer, nearer, stuck = [], [], []
     for engine, profile, group in by_engine(table):
         fine = group[group.cost.notna() & np.isfinite(group.error)].sort_values("step_size")
@@ -487,7 +488,7 @@ def halving(table: pd.DataFrame, timed: bool) -> str:
     if not nearer:
         return f"Smaller steps {lost.format('')}"
     costs = f"multiplies the time by {span(dearer)} and " if timed else ""
-    said = f"Half the step {costs}divides the error by {span(nearer)}"
+    said = f"On average half the step {costs}divides the error by {span(nearer)}"
     return (
         f"{said}; it {lost.format('s')}" if stuck else f"{said}, for every engine that takes steps."
     )

@@ -58,13 +58,13 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
             else "computed at two precisions that agree"
         )
         parts.append(
-            f"{event_driven} are computed event by event in many digits, {how}, and off by at most"
-            f" {number(bound)} m"
+            f"{event_driven} {'is' if event_driven == 1 else 'are'} computed event by event in"
+            f" many digits, {how}, and off by at most {number(bound)} m"
         )
     if none:
         parts.append(
-            f"{none} have no exact answer and no score: engines are checked there against the laws"
-            " of physics only"
+            f"{none} {'has' if none == 1 else 'have'} no exact answer and no score: engines are"
+            " checked there against the laws of physics only"
         )
     return "; ".join(parts) + "."
 

@@ -1,5 +1,5 @@
 """The exact answer to a scene, computed in a worker within a time limit, and kept in a file beside
-the shares that are compared with it."""
+the scene tables that are compared with it."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell t
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
 made.json       what of all this was written by whom, so that nothing else is ever replaced
-compared/       the scenarios' exact answers and shares of deviations.csv, so that a report does not
+compared/       the scenarios' exact answers and parts of deviations.csv, so that a report does not
 measure again deviations.csv, runs.csv, report.html
 """
 

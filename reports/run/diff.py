@@ -1,4 +1,4 @@
-"""What changed between two runs: how cells ended, what their numbers are, how long they took."""
+"""The differences between two runs: how cells ended, their numbers, how long they took."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from reports.run.tables import is_sealed
 from reports.run.timing_pass import is_busy, noise_floor
 from reports.terminal.foreign_text import encoded
 
-# Measured on two cores under a load of 15 to 20 (no idler machine could be had), 3 scenes and
-# five rounds of timings. 8 runs of one build set against each other, 280 verdicts from 4200 ratios
-# of rounds: "worse" 4 times, as often with a factor of 1.1 as with 1.35; 8 times when the factor
-# was the median of the ratios, for other work lengthens a round, but seldom all of them. Every
-# engine made half as slow again, 240 verdicts: the factor is above 1.25 in 227, but found are 118:
-# what fails under such a load is to be sure, which more rounds and more scenes mend.
+# Measured on two busy cores (load 15 to 20), with 3 scenes and five rounds of timings. Eight runs
+# of one build, compared with each other, gave 280 verdicts from 4200 ratios of rounds: 4 were
+# "worse", as many with a factor of 1.1 as with 1.35. With the median of the ratios as the factor 8
+# were "worse", because other work lengthens a round, but seldom all of them. With every engine
+# slowed to 1.5 times its time, 240 verdicts: the factor was above 1.25 in 227, but only 118 were
+# "worse". Under such a load the interval is too wide; more rounds and more scenes narrow it.
 FACTOR = 1.25
 CONFIDENCE = 0.99
 WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
@@ -33,7 +33,7 @@ MACHINE = ("system", "architecture", "processor", "cores")
 
 
 class Change(NamedTuple):
-    """One thing that is not as it was: of which engine, what, before and after, and "better",
+    """A difference: the engine, what changed, its value before and after, and the verdict "better",
     "worse" or "other"."""
 
     engine: str
@@ -45,7 +45,7 @@ class Change(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """How much longer an engine takes.
+    """How the times of an engine changed.
 
     Attributes:
         engine: `engine:profile`.
@@ -61,8 +61,8 @@ class Timing(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """ "worse" or "better" if it is both sure (the interval leaves out 1) and large (by
-        `FACTOR`), else "same"."""
+        """ "worse" or "better" if the change is both certain (the interval excludes 1) and large
+        (more than `FACTOR`), else "same"."""
         if self.low > 1 and self.factor > FACTOR:
             return "worse"
         return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
@@ -74,7 +74,7 @@ Cells = dict[Name, dict[str, Any]]  # -> the line of the cell
 
 @dataclass(frozen=True)
 class Difference:
-    """What came out.
+    """All differences between two runs.
 
     Attributes:
         warnings: why the two may differ for other reasons than their engines.
@@ -99,7 +99,7 @@ class Difference:
 
 
 def difference(before: Path, after: Path) -> Difference:
-    """Set two folders of runs against each other.
+    """Compare the runs in two folders.
 
     Raises:
         ValueError: naming the folder that cannot be used, and what to do.
@@ -167,7 +167,7 @@ def equal_keys(before: Cells, after: Cells) -> set[Name]:
 
 
 def changed_statuses(before: Cells, after: Cells) -> list[Change]:
-    """The cells that ended in another way, or were not played again: that is worse, too."""
+    """The cells that ended differently; a cell that was not played again is worse, too."""
     changes = []
     for name, record in before.items():
         scenario, engine, dt = name
@@ -187,8 +187,8 @@ def changed_statuses(before: Cells, after: Cells) -> list[Change]:
 def changed_judgement(
     before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name]
 ) -> list[Change]:
-    """Which cells, of those that `both` have, are not judged any more, or are now: of that only one
-    has numbers."""
+    """The cells that `both` runs played and only one of them judged, so that only one has
+    numbers."""
     was, now = reasons(before), reasons(after)
     changes = []
     for cell, versus in sorted(was.keys() ^ now.keys()):
@@ -216,8 +216,8 @@ def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
 
 
 def table_of(folder: Path) -> pd.DataFrame:
-    """deviations.csv as text: what is written the same has the same bits; raises `ValueError` if it
-    is another one."""
+    """deviations.csv as text, in which equal text means equal bits; raises `ValueError` if the file
+    was changed."""
     path = folder / "deviations.csv"
     try:
         same, table = is_sealed(folder), pd.read_csv(path, dtype=str, keep_default_na=False)
@@ -266,12 +266,12 @@ def changed_numbers(
 
 
 def said_of(value: str, note: str) -> str:
-    """A number as the table has it, or that too little carries it."""
+    """A number as the table has it, or that it is not judged."""
     return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
 
 
 def engines_of(row: Mapping[Hashable, Any]) -> list[str]:
-    """Who played for a number: an engine, or the two that are set against each other."""
+    """The engines of a number: one, or the two that it compares."""
     return [row["name"]] + ([row["versus"]] if ":" in row["versus"] else [])
 
 
@@ -287,7 +287,7 @@ def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
 
 
 def ratio(was: float, now: float) -> float:
-    """By how much a number grew or shrank, 1 or more; `inf` where there is no saying."""
+    """The factor by which a number grew or shrank, 1 or more; `inf` where it is undefined."""
     small, large = sorted((abs(was), abs(now)))
     return large / small if small > 0 and math.isfinite(large) else math.inf
 
@@ -298,8 +298,8 @@ def timings_of(
     before: Cells,
     after: Cells,
 ) -> list[Timing]:
-    """Of every engine the ratio after : before, over the cells that were timed in both, round by
-    round."""
+    """The ratio after : before of every engine, over the cells that were timed in both runs, round
+    by round."""
     ratios: dict[str, list[float]] = {}
     least: dict[str, list[float]] = {}
     for name in before.keys() & after.keys():

@@ -1,4 +1,4 @@
-"""Where a run goes: into OUT.part while it lasts, which takes the place of OUT when all is done."""
+"""The folder of a run: OUT.part while the run lasts, which replaces OUT when it is complete."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ RUN = Kind(
 
 
 def part_of(out: Path) -> Path:
-    """Where a run into `out` is while it lasts."""
+    """The folder in which a run into `out` is written while it lasts."""
     return out.parent / f"{out.name}.part"
 
 
 def place_of(out: Path, option: str = "--out") -> Path:
-    """The folder that is meant, links followed.
+    """The folder that `out` names, links followed.
 
     Raises:
-        FolderTaken: a link to nothing, that is not what an interrupted command has left of one.
-        OSError: there is no current folder any more.
+        FolderTaken: `out` is a link to nothing, unless an interrupted command has left it so.
+        OSError: the current folder is gone.
     """
     # of a link to itself `resolve` makes an error of another kind
     place = Path(os.path.realpath(out))
@@ -51,8 +51,7 @@ def place_of(out: Path, option: str = "--out") -> Path:
 
 
 def open_part(out: Path, kind: Kind) -> Journal:
-    """The journal of what will be `out`, where that is while it is made; raises as `may_replace`,
-    or `OSError`."""
+    """Open the journal of `out` in its OUT.part; raises as `may_replace`, or `OSError`."""
     part = part_of(out)
     may_replace(out, kind)
     may_be_part(part, out, kind)
@@ -64,8 +63,8 @@ def open_part(out: Path, kind: Kind) -> Journal:
 
 
 def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise as `may_write`, and also if `part` is somebody's finished result that is only called
-    so."""
+    """Raise as `may_write`, and also if `part` holds a finished result that merely has such a
+    name."""
     may_write(part, kind, option)
     if not is_interrupted(part, out):
         raise FolderTaken(
@@ -75,19 +74,18 @@ def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> Non
 
 
 def is_interrupted(part: Path, out: Path) -> bool:
-    """Whether the folder may be `out` while that is made, not a finished result: one may have been
-    made by `--out`.
+    """Whether `part` holds an unfinished `out`, not a finished result of `--out OUT.part`.
 
-    What was killed when all was done, a moment before it took the place of `out`, still says that
-    it is to do so.
+    A command that was killed after its last result, before `part` replaced `out`, counts as
+    unfinished: its record still names `out`.
     """
     made = read_made(part)
     return made is None or not made.finished or made.out == out.name
 
 
 def begun(part: Path, kind: Kind, out: Path) -> None:
-    """Record in a folder that it is this program's, will be `out`, and is not finished; other
-    records stay."""
+    """Record in `part` that this program makes it, that it will be `out`, and that it is not
+    finished; other records stay."""
     made = read_made(part) or Made(kind.command, False, {})
     if (anew := made._replace(finished=False, out=out.name)) != made or not (part / MADE).exists():
         put_made(part, anew)
@@ -95,7 +93,7 @@ def begun(part: Path, kind: Kind, out: Path) -> None:
 
 @contextmanager
 def given_back(journal: Journal) -> Iterator[None]:
-    """Give the journal back as it is if what is first done with it fails."""
+    """Close the journal unchanged if the block fails."""
     try:
         yield
     except BaseException:
@@ -120,8 +118,8 @@ def open_new(out: Path) -> Journal:
 
 
 def ended_in(journal: Journal) -> int:
-    """How many cells have ended in an interrupted run; raises `FolderTaken` if it is none, or
-    cannot be read."""
+    """How many cells have ended in an interrupted run; raises `FolderTaken` if the folder holds no
+    run that can be read."""
     part = journal.path.parent
     try:
         return len(Archive.read(part).records)
@@ -151,12 +149,12 @@ def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
 
 
 def open_again(out: Path) -> Journal:
-    """The journal of a run into `out` that is to be completed, locked where it is; nothing is moved
+    """Open the journal of a run into `out` that is to be completed, and lock it; nothing is moved
     yet.
 
     Raises:
-        FolderTaken: no run is there, or another process has it, or somebody else's files are there.
-        OSError: it cannot be opened.
+        FolderTaken: no run is there, another process writes it, or other files are there.
+        OSError: the journal cannot be opened.
     """
     part = part_of(out)
     may_be_part(part, out, RUN, "--resume")
@@ -171,8 +169,7 @@ def open_again(out: Path) -> Journal:
 
 
 def reopened(journal: Journal, out: Path) -> None:
-    """Move a finished run to where it is while it is written; its journal stays locked
-    meanwhile."""
+    """Rename a finished run to OUT.part, with its journal locked, so that it can be completed."""
     part = part_of(out)
     if journal.path.parent == out:
         with unbroken():
@@ -182,7 +179,7 @@ def reopened(journal: Journal, out: Path) -> None:
 
 
 def held(folder: Path, out: Path) -> Journal:
-    """The journal of a folder, locked; raises `FolderTaken` if another process has it."""
+    """Open the journal of a folder and lock it; raises `FolderTaken` if another process has it."""
     try:
         return Journal(folder)
     except Busy:
@@ -192,8 +189,8 @@ def held(folder: Path, out: Path) -> Journal:
 
 
 def found(out: Path) -> Path:
-    """The folder of a run into `out`: itself, or where it is while it lasts; raises `FolderTaken`
-    if there is none."""
+    """The folder of a run into `out`: OUT, or OUT.part while the run lasts; raises `FolderTaken` if
+    there is none."""
     part = part_of(out)
     if (out / JOURNAL).is_file():
         return out
@@ -203,13 +200,11 @@ def found(out: Path) -> Path:
 
 
 def replace_folder(made: Path, target: Path, kind: Kind) -> None:
-    """Put the finished folder `made` in the place of `target`, which is moved aside until that is
-    done.
+    """Replace `target` by the finished folder `made`; `target` is kept aside until that is done.
 
     Raises:
-        FolderTaken: `target` is not what the command made alone, maybe since a moment ago; both
-            stay as they are.
-        OSError: it cannot be moved; `target` is where it was.
+        FolderTaken: `target` holds something that the command did not make; both folders stay.
+        OSError: the folder cannot be moved; `target` stays.
     """
     may_replace(target, kind)
     record = read_made(made)
@@ -237,12 +232,12 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
 
 @contextmanager
 def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
-    """A folder beside `target` to write into: it takes the place of that when all is well, and else
-    is gone.
+    """Make a folder beside `target` to write into, which replaces `target` at the end of the block,
+    and is deleted if the block fails.
 
     Raises:
-        FolderTaken: as `may_replace`, before and after.
-        OSError: it cannot be made.
+        FolderTaken: as `may_replace`, before and after the block.
+        OSError: the folder cannot be made.
     """
     may_replace(target, kind, option)
     part = target.with_name(f"{target.name}.part-{os.getpid()}")
@@ -260,6 +255,6 @@ def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
 
 
 def discard(part: Path, kind: Kind) -> None:
-    """Delete what a command has made of no use, unless somebody has put something there."""
+    """Delete a folder that is of no use any more, unless it holds something not of this program."""
     if not stranger_in(part, kind):
         shutil.rmtree(part)

@@ -246,7 +246,7 @@ def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
     if path.is_file():
         with path.open("rb") as file:
             if mark not in file.read(HEAD):
-                raise FolderTaken(f"{option} {path}: is there and no {what}; name another file")
+                raise FolderTaken(f"{option} {path}: exists and is no {what}; name another file")
             file.seek(0)
             if not is_sealed(file.read()):
                 raise FolderTaken(

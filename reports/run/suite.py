@@ -26,9 +26,9 @@ from reports.run.machine import about
 from reports.run.made import writing
 from reports.run.playing import CellResult, conform_here, engine, play_here
 from reports.run.runner import TIMEOUT, run_all
+from reports.run.scene_tables import SceneTasks
 from reports.run.scenes import open_scene, with_steps
-from reports.run.shares import Gathering
-from reports.run.timing_pass import Pass, is_timed, laps_of
+from reports.run.timing_pass import Pass, cells_to_time, is_timed
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes, put_text
 from reports.terminal.progress import Progress
@@ -130,8 +130,8 @@ def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress)
     finished = finished_tasks(archive, plan, means, scenarios)
     missing = {task: work for task, work in tasks.items() if task not in finished}
     cells = [task for task in missing if isinstance(task, Cell)]
-    gathering = Gathering(archive, cells, means.timeout, progress.note)
-    Playing(plan, means, journal, scenarios, gathering, progress).run(missing, len(tasks))
+    scene_tasks = SceneTasks(archive, cells, means.timeout, progress.note)
+    Playing(plan, means, journal, scenarios, scene_tasks, progress).run(missing, len(tasks))
     archive = Archive.read(folder)
     take_timings(archive, plan, means, journal, scenarios, progress)
     delete_unused_trajectories(archive)
@@ -145,15 +145,15 @@ class Playing:
 
     Attributes:
         scenarios: scene -> its scenario.
-        gathering: gives out the exact answer and the comparison of each scene whose cells have all
-            ended.
+        scene_tasks: gives out the exact answer and the comparison of each scene whose cells have
+            all ended.
     """
 
     plan: RunPlan
     means: Means
     journal: Journal
     scenarios: Mapping[str, Scenario]
-    gathering: Gathering
+    scene_tasks: SceneTasks
     progress: Progress
 
     def run(self, missing: Mapping[Any, Callable[[], Any]], tasks: int) -> None:
@@ -163,7 +163,7 @@ class Playing:
         checks = {task: work for task, work in missing.items() if isinstance(task, Checking)}
         played = {task: work for task, work in missing.items() if task not in checks}
         alone = {task for task in played if isinstance(task, Cell) and self.leaves_state(task)}
-        urgent: deque[Any] = deque([*checks.items(), *self.gathering.tasks()])
+        urgent: deque[Any] = deque([*checks.items(), *self.scene_tasks.tasks()])
         self.progress.start(len(missing), tasks)
         if not missing:
             self.show_waiting()
@@ -182,9 +182,9 @@ class Playing:
     def keep(self, task: Any, result: Any) -> Iterable[Any]:
         """Write the result of a task and show its status; the tasks that can be given out now."""
         if isinstance(task, Path):  # the file of an exact answer or of a comparison
-            return self.gathering.task_ended(task, result)
+            return self.scene_tasks.task_ended(task, result)
         if isinstance(task, Cell):
-            return self.gathering.cell_ended(self.keep_cell(task, result))
+            return self.scene_tasks.cell_ended(self.keep_cell(task, result))
         if isinstance(task, Checking):
             self.progress.done(*keep_check(self.journal, self.plan, task.engine, result))
         else:
@@ -202,8 +202,8 @@ class Playing:
 
     def show_waiting(self) -> None:
         """Once every cell has ended: show which exact answers the run still waits for."""
-        if self.gathering.asked and not self.gathering.playing:
-            self.progress.say(waiting_for(self.gathering.asked))
+        if self.scene_tasks.asked and not self.scene_tasks.playing:
+            self.progress.say(waiting_for(self.scene_tasks.asked))
 
 
 def waiting_for(scenes: Sequence[str]) -> str:
@@ -408,11 +408,11 @@ def take_timings(
     progress: Progress,
 ) -> None:
     """Run the timing pass, unless the journal has its result; no other task runs meanwhile."""
-    laps = laps_of(archive, plan.engines, scenarios) if plan.timings else []
-    if not laps or is_timed(archive, laps):
+    cells = cells_to_time(archive, plan.engines, scenarios) if plan.timings else []
+    if not cells or is_timed(archive, cells):
         return
     progress.start(1, 1, f"timing, at most {plan.timings:g} s")
-    task: dict[Any, Callable[[], Any]] = {"timing": Pass(laps, plan.timings, plan.seed)}
+    task: dict[Any, Callable[[], Any]] = {"timing": Pass(cells, plan.timings, plan.seed)}
     with closing(run_all(task, 1, plan.timings + means.timeout, means.memory)) as results:
         for _, result in results:
             if isinstance(result, Failure):

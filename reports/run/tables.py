@@ -21,20 +21,20 @@ from reports.run.archive import Archive, digest, run_of
 from reports.run.folders import RUN
 from reports.run.journal import JOURNAL
 from reports.run.runner import run_all
-from reports.run.shares import (
+from reports.run.scene_tables import (
     ANSWER,
     PATHS,
-    Gathering,
     Records,
+    SceneTasks,
     answer_file,
     csv_of,
     in_order,
-    kept_share,
+    kept_scene_table,
     name_of,
-    not_judged,
-    read_share,
+    read_scene_table,
+    rows_not_judged,
     scenario_of,
-    share_file,
+    scene_table_file,
 )
 from reports.run.timing_pass import TABLE, timings
 from reports.run.worker_process import Failure
@@ -54,9 +54,9 @@ class Tables(NamedTuple):
         runs: runs.csv.
         timed: timings.csv.
         answers: scene -> its exact answer, or why there is none.
-        shares: scene -> where its share of deviations.csv is.
-        unkept: scene -> its comparison, of which no share is kept: it could not be made, or a file
-            is gone or torn.
+        scene_tables: scene -> where its table for deviations.csv is.
+        unkept: scene -> its comparison, of which no scene table is kept: it could not be made, or a
+            file is gone or torn.
         unjudged: name of a scene -> why it is not held to its answer, or not compared at all,
             though it should be.
     """
@@ -64,7 +64,7 @@ class Tables(NamedTuple):
     runs: pd.DataFrame
     timed: pd.DataFrame
     answers: dict[str, Answer]
-    shares: dict[str, Path]
+    scene_tables: dict[str, Path]
     unkept: dict[str, Comparison]
     unjudged: dict[str, str]
 
@@ -81,18 +81,19 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
         raise ValueError(
             f"{folder / JOURNAL}: no cell has ended yet, so there is nothing to report"
         )
-    gathering = compare_missing(archive, by_scene, say)
+    scene_tasks = compare_missing(archive, by_scene, say)
     answers = {
         scene: read_answer(answer_file(folder, records)) for scene, records in by_scene.items()
     }
     known = {scene: answer for scene, answer in answers.items() if answer is not None}
     assert len(known) == len(by_scene)
-    shares = {
-        scene: share_file(folder, records, known[scene]) for scene, records in by_scene.items()
+    scene_tables = {
+        scene: scene_table_file(folder, records, known[scene])
+        for scene, records in by_scene.items()
     }
     unkept = {
-        scene: unkept_comparison(folder, by_scene[scene], known[scene], share)
-        for scene, share in (gathering.unkept | gathering.failed).items()
+        scene: unkept_comparison(folder, by_scene[scene], known[scene], scene_table)
+        for scene, scene_table in (scene_tasks.unkept | scene_tasks.failed).items()
     }
     unjudged = {
         by_scene[scene][0]["scenario"]: answer.lost
@@ -101,17 +102,17 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
     }
     unjudged |= {
         unkept[scene].scenario.name: not_compared(failure)
-        for scene, failure in gathering.failed.items()
+        for scene, failure in scene_tasks.failed.items()
     }
     say("writing the tables")
-    write_deviations(folder, shares, unkept)
+    write_deviations(folder, scene_tables, unkept)
     answer_files = {answer_file(folder, records) for records in by_scene.values()}
-    sweep(folder / "compared", {*shares.values(), *answer_files, seal_of(folder)})
+    sweep(folder / "compared", {*scene_tables.values(), *answer_files, seal_of(folder)})
     runs = table_of_runs([record for records in by_scene.values() for record in records], unkept)
     put_text(folder / "runs.csv", runs.to_csv(index=False))
     timed = timings(archive, scenarios_by_name(folder, by_scene))
     put_text(folder / TABLE, timed.to_csv(index=False, float_format="%.6g"))
-    return Tables(runs, timed, known, shares, unkept, unjudged)
+    return Tables(runs, timed, known, scene_tables, unkept, unjudged)
 
 
 def scenarios_by_name(folder: Path, by_scene: Mapping[str, Records]) -> dict[str, Scenario]:
@@ -122,21 +123,23 @@ def scenarios_by_name(folder: Path, by_scene: Mapping[str, Records]) -> dict[str
 
 def compare_missing(
     archive: Archive, by_scene: Mapping[str, Records], say: Callable[[str], None]
-) -> Gathering:
-    """Have the answers and make the shares that are not kept, in worker processes, each within its
-    time."""
+) -> SceneTasks:
+    """Have the answers and make the scene tables that are not kept, in worker processes, each
+    within its time."""
     (archive.folder / "compared").mkdir(exist_ok=True)
     # As much time as the cells had: it is the same option.
-    gathering = Gathering(archive, [], max(record["timeout_s"] for record in archive.records), warn)
-    tasks = deque(gathering.tasks())
+    scene_tasks = SceneTasks(
+        archive, [], max(record["timeout_s"] for record in archive.records), warn
+    )
+    tasks = deque(scene_tasks.tasks())
     for records in by_scene.values():
         scenario_of(archive.folder, records)  # a scene that is another one now is found here
-    with closing(run_all({}, os.cpu_count() or 1, gathering.timeout, urgent=tasks)) as results:
+    with closing(run_all({}, os.cpu_count() or 1, scene_tasks.timeout, urgent=tasks)) as results:
         for path, result in results:
-            name = by_scene[gathering.scenes[path]][0]["scenario"]
+            name = by_scene[scene_tasks.scenes[path]][0]["scenario"]
             say(f"{'answered' if path.suffix == ANSWER else 'compared'}: {name}")
-            tasks.extend(gathering.task_ended(path, result))
-    return gathering
+            tasks.extend(scene_tasks.task_ended(path, result))
+    return scene_tasks
 
 
 def not_compared(failure: Failure) -> str:
@@ -147,18 +150,18 @@ def not_compared(failure: Failure) -> str:
 
 
 def unkept_comparison(
-    folder: Path, records: Records, answer: Answer, share: bytes | Failure
+    folder: Path, records: Records, answer: Answer, scene_table: bytes | Failure
 ) -> Comparison:
-    """What can be shown of a scene of which no share is kept; what could not be compared is held to
-    no answer."""
+    """What can be shown of a scene of which no scene table is kept; what could not be compared is
+    held to no answer."""
     runs = [run_of(folder, record) for record in records]
     scenario = scenario_of(folder, records)
-    if isinstance(share, bytes):
+    if isinstance(scene_table, bytes):
         scenario, truth = answered(answer.given_to(scenario))
-        return Comparison(scenario, truth, runs, read_share(share))
-    why = not_compared(share)
+        return Comparison(scenario, truth, runs, read_scene_table(scene_table))
+    why = not_compared(scene_table)
     scenario = replace(scenario, truth=None, without_truth=why)
-    return Comparison(scenario, None, runs, not_judged(runs, why, ITSELF))
+    return Comparison(scenario, None, runs, rows_not_judged(runs, why, ITSELF))
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
@@ -181,7 +184,12 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
             for record in records
         ]
         comparisons.append(
-            Comparison(scenario, truth, runs, read_share(kept_share(tables.shares[scene])))
+            Comparison(
+                scenario,
+                truth,
+                runs,
+                read_scene_table(kept_scene_table(tables.scene_tables[scene])),
+            )
         )
     return comparisons
 
@@ -197,14 +205,14 @@ def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
 
 
 def write_deviations(
-    folder: Path, shares: Mapping[str, Path], unkept: Mapping[str, Comparison]
+    folder: Path, scene_tables: Mapping[str, Path], unkept: Mapping[str, Comparison]
 ) -> None:
-    """Put the scenes' shares one after the other into deviations.csv, and its digest beside
+    """Put the scenes' scene tables one after the other into deviations.csv, and its digest beside
     them."""
     all_of_it = hashlib.sha256()
     with whole(folder / "deviations.csv") as file:
-        for number, (scene, share) in enumerate(shares.items()):
-            csv = csv_of(unkept[scene].table) if scene in unkept else kept_share(share)
+        for number, (scene, scene_table) in enumerate(scene_tables.items()):
+            csv = csv_of(unkept[scene].table) if scene in unkept else kept_scene_table(scene_table)
             rows = csv.partition(b"\n")[2] if number else csv  # the names of the columns once
             text = encoded(rows.decode(errors=PATHS))
             all_of_it.update(text)
@@ -224,8 +232,7 @@ def is_sealed(folder: Path) -> bool:
 
 
 def sweep(folder: Path, kept: Set[Path]) -> None:
-    """Delete the answers and shares that are of something else, and nothing that is no answer or
-    share."""
+    """Delete the answers and scene tables that are of something else, and no other file."""
     for other in set(folder.iterdir()) - kept:
         if is_part(other) or RUN.names(f"{folder.name}/{other.name}"):
             other.unlink()

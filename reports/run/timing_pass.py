@@ -64,8 +64,9 @@ which `binding` is what as many steps and calls take in a world with nothing to 
 read-out; `again` is the same cell timed a second time in the same rounds, where it was."""
 
 
-class Lap(NamedTuple):
-    """A cell to be timed: its key, its engine, and the scenario without its answer."""
+class CellToTime(NamedTuple):
+    """A cell of the run that the timing pass times: its key, its engine, and the scenario without
+    its answer."""
 
     key: str
     name: str
@@ -84,14 +85,14 @@ class Lap(NamedTuple):
         return replace(scenario, duration=samples * scenario.sample_interval)
 
 
-def laps_of(
+def cells_to_time(
     archive: Archive, engines: Mapping[str, EngineRow], scenarios: Mapping[str, Scenario]
-) -> list[Lap]:
+) -> list[CellToTime]:
     """The cells that are timed: of `timed_scenes`, those that were played to their end."""
     played = {record["scene"] for record in archive.records if record["status"] == "ok"}
     chosen = set(timed_scenes([scene for scene in scenarios if scene in played]))
     return [
-        Lap(
+        CellToTime(
             record["cell"],
             name,
             engines[name],
@@ -114,9 +115,10 @@ def timed_scenes(played: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class Pass:
-    """The task of the worker: times the laps and what is measured beside them, in so many s."""
+    """The task of the worker: it times `cells`, and what is measured beside them, within
+    `seconds`."""
 
-    laps: Sequence[Lap]
+    cells: Sequence[CellToTime]
     seconds: float
     seed: int
 
@@ -127,10 +129,10 @@ class Pass:
         started = perf_counter()
         what = [
             timed
-            for lap, copies in in_turns(self.laps)
-            for timed in (lap_of(lap, copy) for copy in range(copies))
+            for cell, copies in in_turns(self.cells)
+            for timed in (timed_cell(cell, copy) for copy in range(copies))
         ]
-        what += besides(self.laps)
+        what += besides(self.cells)
         left = self.seconds - (perf_counter() - started)  # the engines have been imported, too
         samples = interleaved(what, ROUNDS, self.seconds, self.seed, left)
         rounds: dict[Any, list[Any]] = {}
@@ -140,27 +142,27 @@ class Pass:
         return [line_of(key, found) for key, found in rounds.items()]
 
 
-def in_turns(laps: Sequence[Lap]) -> list[tuple[Lap, int]]:
-    """The laps, and how often each takes part: twice at the middle step size of its scene, which
-    gives the noise floor."""
-    return [(lap, 2 if lap.substeps == lap.scenario.middle_substeps else 1) for lap in laps]
+def in_turns(cells: Sequence[CellToTime]) -> list[tuple[CellToTime, int]]:
+    """The cells to time, and how often each takes part: twice at the middle step size of its scene,
+    which gives the noise floor."""
+    return [(cell, 2 if cell.substeps == cell.scenario.middle_substeps else 1) for cell in cells]
 
 
-def lap_of(lap: Lap, copy: int) -> Timed:
-    """A lap as it is timed, its cost in s per simulated second."""
-    part = lap.part
-    key = ("timing", lap.key, copy, part.duration)
-    return Timed(key, Stepping(lap.row.make, part, lap.substeps), part.duration)
+def timed_cell(cell: CellToTime, copy: int) -> Timed:
+    """The measurement of a cell: its steps, with a cost in s per simulated second."""
+    part = cell.part
+    key = ("timing", cell.key, copy, part.duration)
+    return Timed(key, Stepping(cell.row.make, part, cell.substeps), part.duration)
 
 
-def besides(laps: Sequence[Lap]) -> list[Timed]:
+def besides(cells: Sequence[CellToTime]) -> list[Timed]:
     """The empty steps, calls and read-outs of all engines that have an answer to a world with
     nothing to do."""
     found: dict[Any, Timed] = {}
-    for lap in laps:
-        for what, run, amount in beside(lap.row.make, lap.scenario):
+    for cell in cells:
+        for what, run, amount in beside(cell.row.make, cell.scenario):
             # Nothing but a read-out depends on the scene.
-            key = ("beside", what, lap.name, lap.scenario.name if what == READ else "")
+            key = ("beside", what, cell.name, cell.scenario.name if what == READ else "")
             found.setdefault(key, Timed(key, run, amount))
     return [timed for timed in found.values() if can(timed)]
 
@@ -189,9 +191,9 @@ def is_busy(archive: Archive) -> bool:
     return noise_floor(archive).floor > BUSY
 
 
-def is_timed(archive: Archive, laps: Sequence[Lap]) -> bool:
-    """Whether the journal has a timing of each of the laps."""
-    return all(lap.key in archive.timings for lap in laps)
+def is_timed(archive: Archive, cells: Sequence[CellToTime]) -> bool:
+    """Whether the journal has a timing of each of the cells."""
+    return all(cell.key in archive.timings for cell in cells)
 
 
 def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame:

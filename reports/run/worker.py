@@ -1,5 +1,5 @@
-"""A worker as the parent sees it: a process that may abort, hang or eat the memory, and says how it
-ended."""
+"""Worker processes, seen from the parent: one may abort, hang or use up the memory, and the parent
+learns how it ended."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) 
 
 
 class Worker:
-    """One process and the three lines to it: tasks and results, what it prints, and the trail of
-    its task.
+    """A process and three channels to it: tasks and results, its output, and the trail of its task.
 
-    The trail is a file without a name that both hold open: what a task leaves there outlives the
-    process.
+    The trail is a file without a name that both processes hold open: what a task writes there is
+    kept when the worker dies.
     """
 
     def __init__(self, memory: int, show: bool = False) -> None:
-        """Start it; `memory` in bytes, 0: no limit; `show` what it prints on standard error."""
+        """Start the process; `memory` in bytes, 0: no limit; `show`: copy its output to standard
+        error."""
         self.memory, self.show, self.stopped = memory, show, False
         self.printed = b""
         self.connection, theirs = Pipe()
@@ -53,11 +53,10 @@ class Worker:
         os.close(printing)
 
     def do(self, task: Callable[[], Any], timeout: float) -> bytes | Failure | None:
-        """What the task gave, pickled, or how it failed; None if it is to be tried again with
-        another worker.
+        """Carry out a task: its result, pickled, or how it failed; None if another worker should
+        try it again.
 
-        The clock of `timeout` starts when the worker has the task, and anew when the task says so
-        (`allow`).
+        `timeout` counts from when the worker has the task, and again from each call of `allow`.
         """
         self.printed = b""
         os.ftruncate(self.trail, 0)
@@ -80,8 +79,8 @@ class Worker:
             return Failure("timeout", said, self.left(), outside=not begun)
 
     def answer(self, timeout: float) -> bytes:
-        """The next message; what is printed meanwhile is kept. Raises `TimeoutError`, or `EOFError`
-        if it died."""
+        """The next message of the worker; its output meanwhile is kept. Raises `TimeoutError`, or
+        `EOFError` if the worker died."""
         end = monotonic() + timeout
         lines: list[Any] = [self.connection, self.output]
         while True:
@@ -94,8 +93,8 @@ class Worker:
                 raise TimeoutError
 
     def listen(self) -> int:
-        """Take in what was printed, keep the last of it; returns how many bytes came, 0 at the
-        end."""
+        """Read the output of the worker and keep the end of it; returns how many bytes came, 0 at
+        the end."""
         new = os.read(self.output, PRINTED)
         self.printed = (self.printed + new)[-PRINTED:]
         if self.show:
@@ -103,8 +102,7 @@ class Worker:
         return len(new)
 
     def death(self, begun: bool) -> Failure | None:
-        """How a process that hung up has ended, its task `begun` or not; None if it was ended from
-        outside."""
+        """How a worker died, its task `begun` or not; None if it was killed from outside."""
         while self.listen():
             pass
         code = self.process.wait()
@@ -116,7 +114,7 @@ class Worker:
         )
 
     def abort(self) -> str:
-        """Kill a process that hangs; returns where in Python it was."""
+        """Kill a worker that hangs; returns where in Python it was."""
         self.process.send_signal(signal.SIGABRT)  # faulthandler answers even from within C
         end = monotonic() + 1.0
         while wait([self.output], max(0.0, end - monotonic())) and self.listen():
@@ -126,14 +124,14 @@ class Worker:
         return self.place()
 
     def place(self) -> str:
-        """Where Python was when faulthandler was called, and the last line printed before, as the
-        end of a sentence."""
+        """The place in Python at which faulthandler was called, and the last line of output before
+        it, as the end of a sentence."""
         printed = self.printed.decode(errors="replace")
         before, fatal, dump = printed.rpartition("Fatal Python error: ")
         found = INNERMOST.search(dump)
         file = "/".join(Path(found[1]).parts[-2:]) if found else ""
         place = f" in {found[3]}, line {found[2]} of {file}" if found else ""
-        # somebody's solver runs in a process of its own, and where, nobody here can tell
+        # a solver's file runs in a process of its own, whose place in the file is not known here
         if file == ASKING:
             place = ", while the solver's file had not come back from a call"
         said = [line for line in (before if fatal else printed).splitlines() if line.strip()]
@@ -144,7 +142,7 @@ class Worker:
         return os.pread(self.trail, os.fstat(self.trail).st_size, 0)
 
     def close(self) -> None:
-        """End it, whatever it is doing."""
+        """Kill the process, whatever it is doing."""
         self.stopped = True
         self.process.kill()
         self.process.wait()
@@ -155,9 +153,9 @@ class Worker:
 
 
 def start(theirs: Connection, trail: int, printing: int, memory: int) -> subprocess.Popen[bytes]:
-    """A fresh interpreter that serves the other end of a worker's lines."""
-    # As here, so that it finds what a task is made of, but nothing that only lies where this
-    # command was started.
+    """A new interpreter at the other end of a worker's channels."""
+    # The same path as here, so that it finds the modules of a task, but none that only lie in the
+    # folder in which this command was started.
     return subprocess.Popen(
         [*python(WORK), *map(str, (theirs.fileno(), trail, memory))],
         stdin=subprocess.DEVNULL,
@@ -169,8 +167,7 @@ def start(theirs: Connection, trail: int, printing: int, memory: int) -> subproc
 
 
 def nameless_file() -> int:
-    """A file descriptor that nothing but its holders knows: in memory where the system can
-    (Linux)."""
+    """The descriptor of a file without a name, which is in memory on Linux."""
     if sys.platform == "linux":
         return os.memfd_create("trail")
     file, path = tempfile.mkstemp()
@@ -179,8 +176,8 @@ def nameless_file() -> int:
 
 
 class Crew:
-    """The workers of this process: one a thread, started when a task comes, replaced when it
-    died."""
+    """The workers of this process, one for each thread: started when a task comes, replaced when it
+    has died."""
 
     def __init__(self) -> None:
         self.mine = threading.local()
@@ -201,7 +198,7 @@ class Crew:
         return worker
 
     def let_go(self) -> None:
-        """End the worker of this thread, if it has one."""
+        """Kill the worker of this thread, if there is one."""
         worker = self.mine.__dict__.pop("worker", None)
         if worker is not None:
             worker.close()
@@ -209,7 +206,7 @@ class Crew:
                 self.all.discard(worker)
 
     def dismiss(self) -> None:
-        """End all workers, and start no more."""
+        """Kill all workers, and start no more."""
         with self.lock:
             self.dismissed = True
             for worker in self.all:
@@ -223,8 +220,8 @@ CREW = Crew()
 def in_worker(task: Callable[[], Any], timeout: float, memory: int, alone: bool) -> bytes | Failure:
     """Carry out a task in the worker of this thread: its result, pickled, or how it failed.
 
-    `alone`: in a process that has seen no other task and will see none. A worker that is killed
-    from outside (out of memory, `kill -9`) is no fault of the task, which is tried again.
+    `alone`: in a process of its own, which carries out no other task. If a worker is killed from
+    outside (out of memory, `kill -9`), which is no fault of the task, the task is tried again.
     """
     for _ in range(ATTEMPTS):
         if alone:
@@ -232,7 +229,7 @@ def in_worker(task: Callable[[], Any], timeout: float, memory: int, alone: bool)
         worker = CREW.worker(memory)
         try:
             outcome = worker.do(task, timeout)
-        except BaseException:  # an answer that nobody read would be taken for that of the next task
+        except BaseException:  # an unread answer would be taken for that of the next task
             CREW.let_go()
             raise
         if alone or isinstance(outcome, Failure):

@@ -48,7 +48,7 @@ HALF = 0.5  # of the error is left: more accurate
 
 
 class NoAdvice(Exception):
-    """Nothing can be advised for the scene, and why."""
+    """No advice can be given for the scene; str() says why."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Attempt:
 
     @property
     def task(self) -> tuple[str, str, int]:
-        """What stands for it among others of its scene."""
+        """The key of the attempt among those of its scene."""
         return (self.name, self.change, self.substeps)
 
     def keeps(self, bound: float) -> bool:
@@ -96,8 +96,8 @@ class Change(NamedTuple):
     changed: Attempt
 
     def verdict(self, bound: float, floor: float) -> str:
-        """What the change does: to the error, else to the cost if by more than the part `floor` of
-        it."""
+        """The effect of the change: on the error, or else on the cost, if the cost changes by more
+        than the fraction `floor`."""
         ratio = self.changed.cost / self.plain.cost
         if not self.changed.keeps(bound):
             return TOO_FAR_OFF
@@ -115,10 +115,10 @@ class Short(NamedTuple):
 
 @dataclass(frozen=True)
 class Advice:
-    """What was found.
+    """The result of `advise`.
 
     Attributes:
-        scene: its name.
+        scene: the name of the scene.
         until, duration: s, how far the exact answer goes and how long the scene is.
         step_sizes: s, those that were tried, coarse to fine.
         keeping: of every engine that keeps the error its coarsest step size that does, as does
@@ -146,7 +146,7 @@ class Advice:
 
     @property
     def floor(self) -> float:
-        """The part of a cost by which two must differ to be told apart; inf where no two can be."""
+        """The fraction by which two costs must differ to be compared; inf where none can be."""
         return max(self.noise, LOUD) if self.quiet else inf
 
 
@@ -172,12 +172,12 @@ def advise(
     scenario = held_by(scene, seed)
     step_sizes = ladder_of(scenario)
     tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
-    found = [(rungs, those_that_keep(rungs, bound)) for rungs in by_engine(tried)]
+    found = [(ladder, those_that_keep(ladder, bound)) for ladder in by_engine(tried)]
     keeping = [kept[0] for _, kept in found if kept]
     changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
     priced, noise, busy = timed(scene, seed, [*keeping, *changed], progress)
     plain = {one.name: one for one in priced if one.change == PLAIN}
-    short = [min(rungs, key=smallest) for rungs, kept in found if not kept]
+    short = [min(ladder, key=smallest) for ladder, kept in found if not kept]
     return Advice(
         scenario.name,
         scenario.duration,
@@ -215,17 +215,17 @@ def changes(one: Attempt) -> list[str]:
 
 
 def smallest(one: Attempt) -> float:
-    """Its error; what failed or cannot be judged comes last."""
+    """Sort key: the error; a failed attempt, or one that cannot be judged, comes last."""
     return one.error if isfinite(one.error) else inf
 
 
-def those_that_keep(rungs: Sequence[Attempt], bound: float) -> list[Attempt]:
-    """Of attempts from coarse to fine those that keep the error, as do all after them.
+def those_that_keep(ladder: Sequence[Attempt], bound: float) -> list[Attempt]:
+    """The attempts, coarse to fine, that keep the error together with all finer ones.
 
-    An attempt that keeps it by luck, with a larger error at a finer step, does not count.
+    An attempt that keeps it by chance, with a larger error at a finer step, does not count.
     """
-    kept = kept_from(np.array([one.error for one in rungs]), bound)
-    return [one for one, keeps in zip(rungs, kept) if keeps]
+    kept = kept_from(np.array([one.error for one in ladder]), bound)
+    return [one for one, keeps in zip(ladder, kept) if keeps]
 
 
 def attempts(
@@ -304,12 +304,12 @@ def reasons(
 
 
 def played_as(name: str) -> str:
-    """The engine whose numbers it gives to the bit, if it is not its own."""
+    """The engine whose bits this engine gives in the scene, which may be itself."""
     return row_of(name).bits_of or name
 
 
 def largest(budget: Any, measure: str) -> str:
-    """The mechanism that changes most, or that none known does."""
+    """The mechanism with the largest contribution, as the end of a sentence; "" if unknown."""
     if budget is None or isinstance(budget, Failure):
         return ""
     left_out = (*TOTALS, INTERPLAY)

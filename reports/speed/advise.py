@@ -59,7 +59,7 @@ def bound_of(error: str) -> float:
 
 
 def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
-    """All of it for programs; what is not finite is null, as JSON has no such numbers."""
+    """The advice as JSON values; a number that is not finite is null."""
     return {
         "scenario": advice.scene,
         "purpose": purpose,
@@ -85,7 +85,7 @@ def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
 
 
 def row_of_attempt(one: Attempt) -> dict[str, Any]:
-    """An attempt for programs."""
+    """An attempt as JSON values."""
     return {
         "engine": one.name,
         "dt_s": one.dt,
@@ -95,7 +95,7 @@ def row_of_attempt(one: Attempt) -> dict[str, Any]:
 
 
 def finite(value: float) -> float | None:
-    """The number, None where it is none."""
+    """The number; None if it is not finite."""
     return value if isfinite(value) else None
 
 
@@ -109,6 +109,8 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
         highlight=False,
     )
     console.print()
+    if advice.keeping and not advice.quiet:  # before the costs that it concerns
+        console.print(f"{sentence_on_times(advice)}\n", highlight=False)
     if advice.keeping:
         print_choices(console, advice)
     else:
@@ -119,7 +121,7 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     if advice.changes:
         console.print()
         print_changes(console, advice, bound)
-    if advice.keeping:
+    if advice.keeping and advice.quiet:
         console.print(f"\n{sentence_on_times(advice)}", highlight=False)
 
 

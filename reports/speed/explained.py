@@ -39,12 +39,12 @@ class Extent(NamedTuple):
 
 
 class Share(NamedTuple):
-    """How many errors there are, how many leave less than each of `TO` over, and what is not among
-    them.
+    """How many errors there are, how many have a relative residual below each of `TO`, and how many
+    runs are left out.
 
-    exact: of engines right to `LEAST`, where nothing is to be explained; failed: not played, so not
-    explained. whole and whole_within: errors of scenes that are not cut, and how many of them leave
-    less than the first of `TO`.
+    exact: errors below `LEAST`, which need no explanation; failed: runs that were not played. whole
+    and whole_within: errors of scenes that are not cut, and how many of them have a relative
+    residual below the first of `TO`.
     """
 
     errors: int
@@ -71,7 +71,7 @@ def explained(budget: pd.DataFrame) -> pd.DataFrame:
 
 
 def extent(table: pd.DataFrame) -> Extent:
-    """Over how much of the scenes errors have a budget; `table` as `explained` gives it."""
+    """The part of the scenes for which errors have a budget; `table` as `explained` gives it."""
     scenes = table.drop_duplicates("scenario")
     rows = zip(scenes.scenario, scenes.until_s.astype(float), scenes.horizon_s.astype(float))
     cuts = [Cut(*row) for row in rows if row[1] < row[2] * (1 - 1e-9)]
@@ -79,7 +79,7 @@ def extent(table: pd.DataFrame) -> Extent:
 
 
 def share(table: pd.DataFrame) -> Share:
-    """How many errors are explained."""
+    """The number of errors that are explained; `table` as `explained` gives it."""
     played = table[table.note == ""]
     errors = played[played.error_radii > LEAST]
     left = errors.residual_radii / errors.error_radii
@@ -95,7 +95,7 @@ def share(table: pd.DataFrame) -> Share:
 
 
 def sentence(table: pd.DataFrame) -> str:
-    """Both in words, as the page and README have them."""
+    """The share and the extent in words, as the page and README show them."""
     known, over = share(table), extent(table)
     engines = table[["engine", "profile"]].drop_duplicates().shape[0]
     said = (

@@ -26,8 +26,8 @@ from scenarios.model import Scenario
 
 @dataclass
 class Search:
-    """One case on one engine; remembers what was read at each value and the first failing run
-    there."""
+    """The search for the limit of one case on one engine; keeps the readings at each value, and the
+    first failing run there."""
 
     case: Case
     engine: str
@@ -36,8 +36,8 @@ class Search:
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
     def limit(self) -> Limit:
-        """Scan until the first failure, bisect between it and what works before; then see what
-        works again beyond."""
+        """Scan to the first failure, and bisect between it and the value before; the values beyond
+        are played as well."""
         scan = self.case.scan(self.form)
         first = next(
             (k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan)
@@ -57,18 +57,17 @@ class Search:
         return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
 
     def bracket(self, good: float, bad: float) -> tuple[float, float]:
-        """What works and what fails, brought together by bisection as close as form and case
-        say."""
+        """The working and the failing value after bisection, as close as form and case demand."""
         ratio = max(self.form.ratio, self.case.ratio)
         while self.case.refines and (middle := self.case.half_way(good, bad, ratio)) is not None:
             good, bad = (middle, bad) if self.trial(middle).works else (good, middle)
         return good, bad
 
     def trial(self, value: float, runs: int = ALL, to_the_end: bool = False) -> Trial:
-        """Play a value up to so many runs; it is left where more have failed than may, unless the
-        form is the full one.
+        """Play up to `runs` runs at a value; stop when more have failed than are allowed, unless
+        the form is the full one.
 
-        Where a run has failed that may have by chance, all are played.
+        If a run has failed and some may fail by chance, all runs are played.
         """
         most, readings = self.case.runs, self.readings.setdefault(value, [])
         failed = sum(reading.failed for reading in readings)
@@ -86,8 +85,7 @@ class Search:
 
     @property
     def few(self) -> int:
-        """Runs at a value that is only passed on the way: half of them at least where some may fail
-        by chance."""
+        """The runs at a value of the scan: at least half of all where some may fail by chance."""
         return max(self.form.few, self.case.runs // 2) if self.case.by_chance else self.form.few
 
     @property
@@ -96,7 +94,7 @@ class Search:
         return int(self.case.by_chance * self.case.runs)
 
     def tried(self, value: float) -> Trial:
-        """What is known of a value."""
+        """The trial of a value from the readings so far."""
         readings = self.readings[value]
         count, failed = len(readings), sum(reading.failed for reading in readings)
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)

@@ -30,7 +30,7 @@ class Changed:
         self.engine, self.change = engine, change
 
     def load(self, scene: Scene, dt: float) -> None:
-        """As the engine, then the change."""
+        """Load the scene into the engine, then apply the change."""
         self.engine.load(scene, dt)
         self.change(self.engine)
 

@@ -28,7 +28,7 @@ Asked = tuple[Scenario, Trajectory | None]
 
 
 class TrialScores(NamedTuple):
-    """What settings made of the tuning scenes; s scenes, k step sizes from coarse to fine.
+    """The results of some settings on the tuning scenes; s scenes, k step sizes, coarse to fine.
 
     Attributes:
         error: (s, k) root mean square distance from the exact answer over disks and samples, in

@@ -49,7 +49,7 @@ TUNED: dict[str, EngineRow] = {
 
 
 def searched_of(engine: str) -> Searched:
-    """What is searched of an engine of `TUNED`; imports its library."""
+    """The settings of an engine of `TUNED` that are searched; imports its library."""
     searched = TUNED[engine].searched
     assert searched is not None
     return searched()
@@ -67,12 +67,12 @@ class Trial(NamedTuple):
 
     @property
     def faults(self) -> list[str]:
-        """What it breaks on either half, and the probes that it does not keep."""
+        """What the change breaks on either half, and the probes that it does not keep."""
         return [*dict.fromkeys([*self.first.faults, *self.again.faults]), *self.departs]
 
     @property
     def verdict(self) -> str:
-        """Whether it is to be taken: better on both halves by `LEAST`, and nothing broken."""
+        """Whether the change is taken: better on both halves by `LEAST`, and nothing broken."""
         if self.first.equal_cost >= LEAST or self.again.equal_cost >= LEAST:
             return NO_BETTER
         return BREAKS if self.faults else BETTER
@@ -95,11 +95,11 @@ class Search:
         self.kept = self.keeps(self.chosen)
 
     def make(self, settings: dict[str, Any]) -> Make:
-        """What makes the engine with these settings."""
+        """A function that makes the engine with these settings."""
         return partial(TUNED[self.engine].make, **settings)
 
     def keeps(self, settings: dict[str, Any]) -> set[str]:
-        """The probes of the conformance suite that it keeps."""
+        """The probes of the conformance suite that the engine keeps with these settings."""
         row = replace(TUNED[self.engine], make=self.make(settings))
         return {
             finding.probe

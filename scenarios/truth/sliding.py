@@ -109,23 +109,30 @@ def spinning_pair(scene: Scene, first: int) -> tuple[Legs, Array]:
 
 
 def slide(
-    v: float, spin: float, radius: float, k: float, friction: float, pull: float, load: float
+    v: float,
+    spin: float,
+    radius: float,
+    k: float,
+    friction: float,
+    acceleration: float,
+    load: float,
 ) -> Legs:
     """A disk on a wall that it does not leave: legs (s, 2) of its way along the wall, m, and its
     angle.
 
-    pull, load: m/s2, its acceleration without friction along the wall, and into it. While the rim
-    slips, friction gives mu N against that; it rolls from when the slip is gone, or at once where
-    there is none, if |pull| <= mu (1 + k) load: on a slope if tan(angle) <= mu (1 + m r^2 / I) (any
-    textbook of mechanics, under "rolling"). With no slope v_0 becomes 2/3 v_0 at v_0 / (3 mu g).
+    acceleration, load: m/s2, of the disk without friction, along the wall and into it. While the
+    rim slips, the friction mu N opposes the slip. The disk rolls as soon as the slip is gone, or at
+    once where there is none, if |acceleration| <= mu (1 + k) load: on a slope if
+    tan(angle) <= mu (1 + m r^2 / I) (any textbook of mechanics, under "rolling"). With no slope
+    v_0 becomes 2/3 v_0 at v_0 / (3 mu g).
     """
     slip, most = v + radius * spin, friction * load
-    rolls = abs(pull) <= most * (1 + k)
-    way = np.sign(slip) if slip else 0.0 if rolls else np.sign(pull)
+    rolls = abs(acceleration) <= most * (1 + k)
+    way = np.sign(slip) if slip else 0.0 if rolls else np.sign(acceleration)
     force = -way * most
-    slides = np.array([pull + force, k * force / radius])
-    rolling = np.array([pull, -pull / radius]) * k / (1 + k)
-    slower = -way * (pull + (1 + k) * force)
+    slides = np.array([acceleration + force, k * force / radius])
+    rolling = np.array([acceleration, -acceleration / radius]) * k / (1 + k)
+    slower = -way * (acceleration + (1 + k) * force)
     if not way:
         slides = rolling
     if not (way and slip and slower > 0):

@@ -105,7 +105,7 @@ def setting(name, value):
 
 
 NO_THRESHOLD = setting("restitution_threshold", 0.0)
-SWITCHES = {
+SETTINGS_OF_PROBES = {
     ("pymunk:shipped", "restitution_0.01"): give_each_shape_the_root,
     ("pymunk:shipped", "restitution_100"): give_each_shape_the_root,
     ("pymunk:shipped", "restitution_wall"): give_each_shape_the_root,
@@ -137,10 +137,10 @@ def tuned(row, tune):
     return replace(row, make=make)
 
 
-@pytest.mark.parametrize(("name", "probe"), SWITCHES)
+@pytest.mark.parametrize(("name", "probe"), SETTINGS_OF_PROBES)
 def test_a_departure_goes_when_its_cause_is_turned_off(name, probe):
     """One setting, and the engine keeps."""
-    reading = PROBES[probe].read(tuned(ENGINES[name], SWITCHES[name, probe]))
+    reading = PROBES[probe].read(tuned(ENGINES[name], SETTINGS_OF_PROBES[name, probe]))
     assert reading.kept, reading
 
 

@@ -1,5 +1,5 @@
 """How the engines take friction: what they are given, what it mixes to, and what they make of it in
-a bounce, each cause switched on and off."""
+a bounce, each cause enabled and disabled."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_the_friction_of_box2d_v3_does_not_see_the_restitution(name):
     assert taken[0] == pytest.approx(0.5, rel=0.002)
 
 
-SWITCHED = [
+ABLATIONS = [
     # engine, steps a second, e, friction; what is turned off; how much spin in rad/s it explains
     ("box2d_v3:shipped", 60, 1.0, 0.1, {"rub_restituted": True}, 4.0),
     ("box2d_v3:shipped", 60, 0.5, 0.1, {"rub_restituted": True}, 2.0),
@@ -115,7 +115,7 @@ SWITCHED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "rate", "e", "mu", "off", "explained"), SWITCHED)
+@pytest.mark.parametrize(("name", "rate", "e", "mu", "off", "explained"), ABLATIONS)
 def test_each_cause_is_shown_by_switching_it_off(name, rate, e, mu, off, explained):
     """With all mechanisms the reference is the engine; without this one it is off by what it
     explains."""

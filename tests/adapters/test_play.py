@@ -138,9 +138,9 @@ def test_collisions_are_the_beginnings_of_runs_of_impulses(impulses):
 
 
 def test_a_negative_impulse_is_a_collision_too():
-    """A faulty solver that pulls: its collisions are counted; only what is small is rounding."""
-    pulls = [ContactImpulse(3, 0, 1, -2.0), ContactImpulse(9, 0, 1, -1.0)]
-    found = first_collisions([*pulls, ContactImpulse(20, 0, 1, -1e-9)], 0.5)
+    """Of a faulty solver: the collisions are counted; only what is small is rounding."""
+    negative = [ContactImpulse(3, 0, 1, -2.0), ContactImpulse(9, 0, 1, -1.0)]
+    found = first_collisions([*negative, ContactImpulse(20, 0, 1, -1e-9)], 0.5)
 
     assert found.t.tolist() == [2.0, 5.0]
     assert found.impulse.tolist() == [-2.0, -1.0]

@@ -51,7 +51,7 @@ def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
     advice = advise(scene, SEED, PURPOSE, BOUND, list(ENGINES), workers, progress)
     asked = [(name, PLAIN, k) for name in ENGINES for k in ladder_of(held_by(scene, SEED))]
     tried = attempts(scene, SEED, PURPOSE, workers, progress, asked)
-    keeping = [one for rungs in by_engine(tried) for one in those_that_keep(rungs, BOUND)]
+    keeping = [one for ladder in by_engine(tried) for one in those_that_keep(ladder, BOUND)]
     if not advice.keeping or not keeping:
         return "none", not advice.keeping and not keeping
     again, noise, _ = timed(scene, SEED, keeping, progress)

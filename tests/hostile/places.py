@@ -106,8 +106,8 @@ WHOLE = [
         codes=(0,),
     ),
 ]
-# Switches of the interpreter.
-SWITCHES: dict[str, tuple[dict[str, str], tuple[int, ...]]] = {
+# Options of the interpreter.
+INTERPRETER_OPTIONS: dict[str, tuple[dict[str, str], tuple[int, ...]]] = {
     "without docstrings": ({"PYTHONOPTIMIZE": "2"}, (2,)),
     "without assertions": ({"PYTHONOPTIMIZE": "1"}, (0,)),
     "in development mode": ({"PYTHONDEVMODE": "0"}, (0,)),
@@ -117,9 +117,9 @@ SWITCHES: dict[str, tuple[dict[str, str], tuple[int, ...]]] = {
     "without kernels compiled": ({"NUMBA_DISABLE_JIT": "1"}, (0,)),
     "with a path of nothing": ({"PYTHONPATH": ":::/nonexistent:"}, (0,)),
 }
-SWITCHED = [
+WITH_OPTIONS = [
     Input(f"truth: {what}", ("truth", "two.toml"), FILES, environment=environment, codes=codes)
-    for what, (environment, codes) in SWITCHES.items()
+    for what, (environment, codes) in INTERPRETER_OPTIONS.items()
 ]
 TRAP = "open('trapped.txt', 'w').write('foreign code ran')\n"
 SHADOWS = {
@@ -268,4 +268,4 @@ STREAMS = [
     )
     for what, (line, codes, says) in LINES.items()
 ]
-PLACES = (*TURNED, *WHOLE, *SWITCHED, *PATHS, *NAMES, *STREAMS)
+PLACES = (*TURNED, *WHOLE, *WITH_OPTIONS, *PATHS, *NAMES, *STREAMS)

@@ -41,8 +41,8 @@ def next_contact(scene: Scene, x: Array, v: Array) -> tuple[float, int, int, Arr
     for i in np.flatnonzero(~scene.static):
         bodies = [(j, x[j], v[j], g[j], scene.radius[j]) for j in range(scene.n) if j != i]
         ends = [(-1, end, np.zeros(2), np.zeros(2), 0.0) for end in scene.walls.reshape(-1, 2)]
-        for j, place, speed, pull, radius in [*bodies, *ends]:
-            way = np.array([(pull - g[i]) / 2, speed - v[i], place - x[i]])
+        for j, place, speed, acceleration, radius in [*bodies, *ends]:
+            way = np.array([(acceleration - g[i]) / 2, speed - v[i], place - x[i]])
             gap = sum(np.convolve(way[:, axis], way[:, axis]) for axis in (0, 1))
             gap[-1] -= (radius + scene.radius[i]) ** 2
             if (t := first_fall(gap)) < np.inf:
@@ -120,7 +120,7 @@ def sliding(scene: Scene, until: float, steps: int) -> tuple[float, float, float
     side = np.sign(
         along[0] * (scene.position[0] - start)[1] - along[1] * (scene.position[0] - start)[0]
     )
-    pull, load = (
+    acceleration, load = (
         scene.gravity @ along,
         -side * (along[0] * scene.gravity[1] - along[1] * scene.gravity[0]),
     )
@@ -129,7 +129,7 @@ def sliding(scene: Scene, until: float, steps: int) -> tuple[float, float, float
     h = until / steps
     for _ in range(steps):
         before = v
-        v += pull * h
+        v += acceleration * h
         wanted = -(v + side * r * w) / (1 + r * r * turns)
         kick = min(max(wanted, -scene.friction * load * h), scene.friction * load * h)
         v, w = v + kick, w + side * r * turns * kick

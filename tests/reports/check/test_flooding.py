@@ -87,7 +87,7 @@ def test_a_module_that_no_file_can_have_is_not_beside_a_solver(tmp_path):
 
 
 def test_a_folder_that_is_called_as_a_solver_is_none(tmp_path):
-    """The other way round: what is there and no file is still said to be so."""
+    """The other way round: what exists and is no file is still said to be so."""
     (tmp_path / "mine.py").mkdir()
     with pytest.raises(NotASolver, match="is no file"):
         read_solver(tmp_path / "mine.py")

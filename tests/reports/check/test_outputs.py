@@ -145,7 +145,7 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
         ),
         (
             ["anna/Exercise.js", "--page", "class.txt"],
-            "class.txt: is there and no page of a check; name another file",
+            "class.txt: exists and is no page of a check; name another file",
         ),
         ([".", "--page", "p.html"], "--page p.html: shows one file"),
         (
@@ -158,11 +158,11 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
         ),
         (
             [".", "--junit", "class.txt"],
-            "--junit class.txt: is there and no JUnit file of a check; name another file",
+            "--junit class.txt: exists and is no JUnit file of a check; name another file",
         ),
         (
             ["anna/Exercise.js", "--junit", "anna/Exercise.js"],
-            "Exercise.js: is there and no JUnit file of a check",
+            "Exercise.js: exists and is no JUnit file of a check",
         ),
         (
             ["anna/Exercise.js", "--junit", "./check.html"],

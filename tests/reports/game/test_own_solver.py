@@ -260,7 +260,10 @@ def test_any_name_of_a_folder_will_do(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["Exercise.js"], "Exercise.js: is a solver and no flight; fly it by --engine Exercise.js"),
+        (
+            ["Exercise.js"],
+            "Exercise.js: is a solver, not a flight; fly it with --engine Exercise.js",
+        ),
         ([""], '"": is not there; name a file'),
         (
             [word for k in range(17) for word in ("--engine", f"{k}.js")],

@@ -126,7 +126,7 @@ ANSWER = Shown([]).to_json()  # of a lesson that shows nothing
         (["ordr"], "did you mean order?"),
         (["xyzzy"], "there are particle, thrust"),
         (["order", "--export", "folder"], "--export folder: is a folder; name a file"),
-        (["order", "--export", "other.html"], "other.html: is there and no page of a lesson"),
+        (["order", "--export", "other.html"], "other.html: exists and is no page of a lesson"),
         (["order", "--export", "nowhere/a.html"], "nowhere/a.html: No such file or directory"),
         (["order", "--export", "/proc/a.html"], "/proc/a.html: No such file or directory"),
         (["order", "--export", ""], "name a file"),

@@ -63,6 +63,14 @@ def test_the_sentences_are_of_speed_and_of_error():
     assert f"brings {STUCK} no nearer" in halving
 
 
+def test_where_one_halving_makes_the_error_larger_the_ratio_is_called_an_average():
+    """0.4, then 0.5, then 0.1 radii: a factor of 2 for each of two halvings, on average."""
+    uneven = shown(errors={FAST: (0.4, 0.5, 0.1), NEAR: (0.4, 0.2, 0.1)}).sentences[-1]
+
+    assert uneven.startswith("On average half the step multiplies the time by 2.0")
+    assert "divides the error by 2.0" in uneven
+
+
 def test_with_the_numbers_of_two_engines_swapped_the_sentences_name_the_other():
     """Errors and costs of one given to the other: nothing is written by hand."""
     swapped = {FAST: NEAR, NEAR: FAST, STUCK: STUCK}

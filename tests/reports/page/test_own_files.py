@@ -8,7 +8,7 @@ import pandas as pd
 from adapters.run import Run
 from reports.page.charts import ChartLine, Drawing, figure_of
 from reports.page.findings import how_right, not_counted
-from reports.page.page import conformance_matrix
+from reports.page.page_tables import conformance_matrix
 from reports.page.pooled import with_marks
 from reports.page.report import how_broken
 

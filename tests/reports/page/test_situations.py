@@ -15,12 +15,16 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
+from reports.page.error_cost import Clock
+from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
-from reports.page.page import situated, summaries
+from reports.page.page_tables import summaries
 from reports.page.pooled import scores
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
 from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of
+from reports.run.timing import noise_of
+from reports.run.timing_pass import COLUMNS as TIMED
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, write_small
@@ -302,6 +306,29 @@ def test_where_no_engine_is_within_a_radius_none_is_called_best(
         said.append("<b>none within 1 radius</b>" in page.read_text(encoding="utf-8"))
 
     assert said == [False, True]
+
+
+def test_without_times_to_trust_the_table_has_no_costs(
+    comparisons: list[Comparison], tmp_path: Path
+):
+    """A busy machine, and no timing: the reason stands where the cost is explained. The control: of
+    a quiet clock the table has the column."""
+    page = tmp_path / "report.html"
+    times = pd.DataFrame(
+        [
+            (r.scenario, r.engine, r.profile, r.dt, 1.0, 3, 9.0, 9.0, 9.0, 1.0, 2.0, 0.0, np.nan)
+            for r in comparisons[0].runs
+        ],
+        columns=TIMED,
+    )
+    said = []
+    for spread, asked in (([0.7, 1.0, 1.3], 12.0), ([1.0, 1.0, 1.0], 0.0), ([1.0, 1.0, 1.0], 12.0)):
+        clock = Clock(times, noise_of(spread), asked)
+        write_small(page, comparisons[:1], clock=clock)
+        text = page.read_text(encoding="utf-8")
+        said.append((f"No costs: {clock.fault}" in text, 'data-head="Cost"' in text))
+
+    assert said == [(True, False), (True, False), (False, True)]
 
 
 def test_your_solver_comes_before_the_engines(comparisons: list[Comparison], tmp_path: Path):

@@ -184,11 +184,11 @@ def test_times_of_a_busy_machine_are_not_compared(before: Path, after: Path):
     busy = difference(before, after)
     edit(after, rounds_of([2.0] * 9, again=1.05))
     edit(quiet := Path(shutil.copytree(before, after.parent / "quiet")), rounds_of([1.0] * 9))
-    calm = difference(quiet, after)
+    quieter = difference(quiet, after)
 
     assert busy.timings == []
     assert any("read 1.50" in warning for warning in busy.warnings)
-    assert {one.verdict for one in calm.timings} == {"worse"}
+    assert {one.verdict for one in quieter.timings} == {"worse"}
 
 
 @pytest.mark.parametrize(("machine", "verdicts"), [("same", {"worse"}), ("other", set())])

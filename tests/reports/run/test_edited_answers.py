@@ -77,7 +77,7 @@ def endless(path: Path) -> None:
 
 EDITS: dict[str, Callable[[Path], None]] = {
     "half as far": lambda path: with_arrays(path, halved),
-    "valid until soon": lambda path: with_arrays(path, numbers(horizon="soon")),
+    "a horizon in words": lambda path: with_arrays(path, numbers(horizon="soon")),
     "nothing remains": lambda path: with_arrays(path, numbers(remains=5)),
     "said otherwise": saying("timeout", "x", "soon"),
     "said in a list": saying("timeout", "x", 5.0),
@@ -117,12 +117,12 @@ def test_an_edited_answer_is_as_good_as_none(tmp_path: Path, edit: str):
     [pytest.param(name, marks=pytest.mark.long) if k else name for k, name in enumerate(EDITS)],
 )
 def test_an_edited_answer_is_computed_again_and_said(whole: Path, tmp_path: Path, edit: str):
-    """All numbers are as they were, though every share was deleted with it."""
+    """All numbers are as they were, though every scene table was deleted with it."""
     out = Path(shutil.copytree(whole, tmp_path / "out"))
     [path] = (out / "compared").glob("two-disks-*.npz")
     before = (out / "deviations.csv").read_bytes()
-    for share in (out / "compared").glob("*.csv"):
-        share.unlink()
+    for scene_table in (out / "compared").glob("*.csv"):
+        scene_table.unlink()
     EDITS[edit](path)
     done = crosscheck("report", "out", cwd=tmp_path)
 

@@ -14,21 +14,21 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from reports.run import cells, shares, tables
+from reports.run import cells, scene_tables, tables
 from reports.run.answers import answer_of, no_answer, put_answer, read_answer
 from reports.run.archive import Archive
 from reports.run.cells import ROOT, Cell
 from reports.run.journal import JOURNAL, Journal
-from reports.run.shares import (
+from reports.run.scene_tables import (
     ANSWER,
-    JUDGES,
-    Gathering,
-    Share,
+    JUDGE_SOURCE,
+    SceneTable,
+    SceneTasks,
     answer_file,
     answer_here,
     compared,
     name_of,
-    share_of,
+    scene_table_of,
 )
 from reports.run.suite import Means, RunPlan, carry_out
 from reports.run.tables import comparisons_of, make_tables
@@ -62,15 +62,15 @@ def silent(_: str) -> None:
 
 
 def test_all_is_compared_while_it_is_played(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """When the last cell has ended every share is there: the tables are put together, and no worker
-    is asked."""
-    monkeypatch.setattr(shares, "share_of", None)
-    monkeypatch.setattr(shares, "answer_here", None)
+    """When the last cell has ended every scene table is there: the tables are put together, and no
+    worker is asked."""
+    monkeypatch.setattr(scene_tables, "scene_table_of", None)
+    monkeypatch.setattr(scene_tables, "answer_here", None)
     archive = Archive.read(folder)
     made = make_tables(archive, silent)
 
-    assert {path.parent.name for path in made.shares.values()} == {"compared"}
-    assert len(list((folder / "compared").glob("*.csv"))) == len(made.shares) == 2
+    assert {path.parent.name for path in made.scene_tables.values()} == {"compared"}
+    assert len(list((folder / "compared").glob("*.csv"))) == len(made.scene_tables) == 2
     assert len(list((folder / "compared").glob("*.npz"))) == len(made.answers) == 2
 
 
@@ -114,12 +114,12 @@ def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     """`kill -9` once, after the judge has changed: all is compared anew, nothing is played, the
     bytes are the same."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
-    before = make_tables(Archive.read(copy), silent).shares
+    before = make_tables(Archive.read(copy), silent).scene_tables
     whole = (copy / "deviations.csv").read_bytes()
     journal = (copy / JOURNAL).read_bytes()
-    monkeypatch.setattr(shares, "judge", lambda: "another metric")
-    monkeypatch.setattr(shares, "share_of", partial(killed_once, tmp_path / "mark"))
-    after = make_tables(Archive.read(copy), silent).shares
+    monkeypatch.setattr(scene_tables, "judge_hash", lambda: "another metric")
+    monkeypatch.setattr(scene_tables, "scene_table_of", partial(killed_once, tmp_path / "mark"))
+    after = make_tables(Archive.read(copy), silent).scene_tables
 
     assert (tmp_path / "mark").exists()
     assert not {*before.values()} & {*after.values()}
@@ -127,12 +127,12 @@ def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     assert (copy / JOURNAL).read_bytes() == journal
 
 
-def killed_once(mark: Path, *given: Any) -> Share:
+def killed_once(mark: Path, *given: Any) -> SceneTable:
     """In the worker: what the system does that has no memory left, the first time only."""
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return share_of(*given)
+    return scene_table_of(*given)
 
 
 def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_before(
@@ -148,17 +148,17 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
     cells = [
         Cell(one["scene"], one["seed"], name_of(one), one["substeps"]) for one in archive.records
     ]
-    gathering = Gathering(replace(archive, records=[]), cells, 60.0, pytest.fail)
-    made = [(record["scene"], [*gathering.cell_ended(record)]) for record in archive.records]
+    scene_tasks = SceneTasks(replace(archive, records=[]), cells, 60.0, pytest.fail)
+    made = [(record["scene"], [*scene_tasks.cell_ended(record)]) for record in archive.records]
     last = {
         scene: max(k for k, (which, _) in enumerate(made) if which == scene) for scene, _ in made
     }
-    resumed = [path.name for path, _ in Gathering(archive, cells[:1], 60.0, pytest.fail).tasks()]
+    resumed = [path.name for path, _ in SceneTasks(archive, cells[:1], 60.0, pytest.fail).tasks()]
     first = [task for _, tasks in made for task in tasks]
-    assert gathering.asked == list(last)  # which the person who waits is shown
-    assert not gathering.playing
-    then = [task for path, work in first for task in gathering.task_ended(path, work())]
-    after = [task for path, work in then for task in gathering.task_ended(path, work())]
+    assert scene_tasks.asked == list(last)  # which the person who waits is shown
+    assert not scene_tasks.playing
+    then = [task for path, work in first for task in scene_tasks.task_ended(path, work())]
+    after = [task for path, work in then for task in scene_tasks.task_ended(path, work())]
 
     assert [k for k, (_, tasks) in enumerate(made) if tasks] == sorted(last.values())
     assert all(len(tasks) <= 1 for _, tasks in made)
@@ -166,7 +166,9 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended_and_not_
         scene for scene in last if scene != cells[0].scene
     ]
     assert [path.suffix for path, _ in (*first, *then)] == [ANSWER] * 2 + [".csv"] * 2
-    assert after == list(Gathering(archive, [], 60.0, pytest.fail).tasks()) == gathering.asked == []
+    assert (
+        after == list(SceneTasks(archive, [], 60.0, pytest.fail).tasks()) == scene_tasks.asked == []
+    )
     assert {path: path.read_bytes() for path in (copy / "compared").glob("*.csv")} == {
         path: text for path, text in whole.items() if path.suffix == ".csv"
     }
@@ -180,7 +182,7 @@ def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     for path in (copy / "compared").glob("slow_collision*.csv"):
         path.unlink()
-    monkeypatch.setattr(shares, "share_of", fails)
+    monkeypatch.setattr(scene_tables, "scene_table_of", fails)
     archive = Archive.read(copy)
     made = make_tables(archive, silent)
     table = pd.read_csv(copy / "deviations.csv")
@@ -254,13 +256,13 @@ def bits(one: Any) -> Any:
     return one.tobytes() if isinstance(one, np.ndarray) else one
 
 
-def fails(*_: object) -> Share:
+def fails(*_: object) -> SceneTable:
     """What a metric with a fault does."""
     raise ZeroDivisionError("of a metric")
 
 
 def test_a_file_that_is_gone_is_found_though_the_table_was_kept(folder: Path, tmp_path: Path):
-    """Its cell is an error now, and the share of its scene is made anew."""
+    """Its cell is an error now, and the scene table of its scene is made anew."""
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     make_tables(Archive.read(copy), silent)
     record = Archive.read(copy).records[0]
@@ -281,7 +283,7 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
         if isinstance(node, ast.ImportFrom)
     }
 
-    assert JUDGES[0].startswith("reports/compare/")
+    assert JUDGE_SOURCE[0].startswith("reports/compare/")
     assert {name for name in imported if name.startswith("reports")} <= {
         "reports.compare",
         *(f"reports.compare.{path.stem}" for path in folder.rglob("*.py")),
@@ -294,8 +296,8 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
         ("adapters/pymunk.py", cells.source_hash),
         ("adapters/own_solver/driver.js", cells.source_hash),
         ("reference_impl/ordered.py", cells.source_hash),
-        ("reports/compare/metrics.py", shares.judge),
-        ("scenarios/truth/oracle/events.py", shares.judge),
+        ("reports/compare/metrics.py", scene_tables.judge_hash),
+        ("scenarios/truth/oracle/events.py", scene_tables.judge_hash),
         (
             "scenarios/truth/oracle/events.py",
             lambda root: cache.source_hash(root / "scenarios" / "truth"),

@@ -19,7 +19,7 @@ from reports.run.timing_pass import (
     LONGEST,
     SCENES,
     TABLE,
-    Lap,
+    CellToTime,
     is_busy,
     noise_floor,
     timed_scenes,
@@ -114,7 +114,7 @@ def test_of_a_long_run_only_the_first_part_is_timed():
     """Halved until it takes `LONGEST`; a short one is whole."""
     scene = scenario("near_miss")
     whole, part = (
-        Lap("key", "a:b", ENGINES["pymunk:matched"], scene, 1, seconds).part
+        CellToTime("key", "a:b", ENGINES["pymunk:matched"], scene, 1, seconds).part
         for seconds in (LONGEST, 3 * LONGEST)
     )
 
@@ -125,14 +125,14 @@ def test_of_a_long_run_only_the_first_part_is_timed():
 def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
     """An empty step of 1, of 5 by itself: in free flight one call has 4 more, with a force every
     step has."""
-    free, pushed = scenario("near_miss"), scenario("body_frame_thrust")
+    free, thrusted = scenario("near_miss"), scenario("body_frame_thrust")
     steps = free.intervals * 2
-    on = sum(thrust.stop - thrust.start for thrust in pushed.thrusts) / pushed.dt(1)
+    on = sum(thrust.stop - thrust.start for thrust in thrusted.thrusts) / thrusted.dt(1)
 
     assert binding_of(1.0, 5.0, free, 2) * free.duration == pytest.approx(steps + 4)
-    found = binding_of(1.0, 5.0, pushed, 1) * pushed.duration
+    found = binding_of(1.0, 5.0, thrusted, 1) * thrusted.duration
     # besides, a call for each stretch without a force: two at most
-    assert pushed.intervals + 4 * on <= found + 1e-9 <= pushed.intervals + 4 * (on + 2) + 1e-6
+    assert thrusted.intervals + 4 * on <= found + 1e-9 <= thrusted.intervals + 4 * (on + 2) + 1e-6
 
 
 def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
@@ -152,7 +152,7 @@ def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
 
 def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest.MonkeyPatch):
     """An engine that takes no world in which nothing moves is timed all the same."""
-    refusing = timing_pass.Lap(
+    refusing = timing_pass.CellToTime(
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
     monkeypatch.setattr("reports.run.stepping.empty", partial(int, "no world"))

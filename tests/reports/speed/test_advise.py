@@ -41,14 +41,14 @@ attempt = partial(Attempt, "pymunk:matched", PLAIN)
 @given(st.lists(st.floats(0, 2) | st.sampled_from([inf, nan]), min_size=1, max_size=9))
 def test_the_advised_step_and_every_finer_one_keep_the_error(errors: list[float]):
     """And the next coarser one does not: luck at one step size does not count."""
-    rungs = [attempt(2**k, 0.1 / 2**k, error) for k, error in enumerate(errors)]
+    ladder = [attempt(2**k, 0.1 / 2**k, error) for k, error in enumerate(errors)]
 
-    kept = those_that_keep(rungs, 1.0)
+    kept = those_that_keep(ladder, 1.0)
 
-    first = rungs.index(kept[0]) if kept else len(rungs)
-    assert kept == rungs[first:]
-    assert all(one.error <= 1.0 for one in rungs[first:])
-    assert first == 0 or not rungs[first - 1].error <= 1.0
+    first = ladder.index(kept[0]) if kept else len(ladder)
+    assert kept == ladder[first:]
+    assert all(one.error <= 1.0 for one in ladder[first:])
+    assert first == 0 or not ladder[first - 1].error <= 1.0
 
 
 @pytest.mark.parametrize(

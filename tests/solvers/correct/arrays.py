@@ -6,7 +6,7 @@ from reference_impl.state import Disks, World
 
 
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
-    hits = []
+    collisions = []
     for k in range(count):
         moves = np.isfinite(disks.mass)
         acceleration = world.gravity + disks.force / disks.mass[:, None]
@@ -16,9 +16,9 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
         disks.angle[moves] += disks.angular_velocity[moves] * dt
         r = disks.position[:, None] - disks.position[None]
         near = np.triu((r**2).sum(axis=2) < 4 * disks.radius.max() ** 2 * 1.5, 1)
-        hits += [(k, i, j, J) for i, j in np.argwhere(near) if (J := collide(disks, world, i, j))]
+        collisions += [(k, i, j, J) for i, j in np.argwhere(near) if (J := collide(disks, world, i, j))]
         wrap(disks.position, world)
-    return hits
+    return collisions
 
 
 def collide(disks, world, i, j):

@@ -48,7 +48,7 @@ function sphereSphereCollisionHandling(a, b) {
   const n = new Float32Array([a.position.x - b.position.x, a.position.y - b.position.y]);
   const d = Math.hypot(n[0], n[1]), reach = a.size + b.size;
   if (d >= reach) return;
-  console.log("hit", d);
+  console.log("collision", d);
   const [x, y] = [n[0] / d, n[1] / d], half = (reach - d) * 0.5;
   a.position.x += x * half; a.position.y += y * half;
   b.position.x -= x * half; b.position.y -= y * half;

@@ -1,9 +1,9 @@
-"""A scene's share of deviations.csv, made in a worker as soon as the last cell of the scene has
-ended.
+"""The scene table, which is the part of deviations.csv for one scene: made in a worker as soon as
+the last cell of the scene has ended.
 
 It takes two tasks: the first computes the exact answer, within the time that a cell may take; the
 second compares all runs of the scene with it. Both results are kept in files. Where there is no
-answer in time, or none at all, the share says why, and the other scenes go on.
+answer in time, or none at all, the table says why, and the other scenes go on.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from reports.terminal.foreign_text import put_bytes
 from scenarios.model import Scenario
 from scenarios.regular import all_of
 
-# The source that decides the numbers of a share; the patterns reach into subfolders.
-JUDGES = ("reports/compare/**/*.py", "scenarios/**/*.py")
+# The source that decides the numbers of a scene table; the patterns reach into subfolders.
+JUDGE_SOURCE = ("reports/compare/**/*.py", "scenarios/**/*.py")
 ROOT = Path(__file__).parents[2]
 ANSWER = ".npz"  # the suffix of an answer's file
 NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which an empty field is NaN
@@ -46,12 +46,12 @@ Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order
 Task = tuple[Path, Callable[[], Any]]  # its result's file, and what a worker calls
 
 
-class Gathering:
-    """Collects the cells of a run, and gives out the two tasks of each scene whose cells have all
-    ended.
+class SceneTasks:
+    """The two tasks of each scene, its exact answer and its table, which are given out once all
+    cells of the scene have ended.
 
     Attributes:
-        unkept: scene -> its share, where the file of a trajectory is gone or torn: such a share is
+        unkept: scene -> its table, where the file of a trajectory is gone or torn: such a table is
             not kept, as another copy of the file would change it.
         failed: scene -> why it could not be compared.
     """
@@ -88,7 +88,7 @@ class Gathering:
         yield from self.next_task(record["scene"])
 
     def next_task(self, scene: str) -> Iterator[Task]:
-        """Once all cells of a scene have ended: its answer, then its share, each given out once."""
+        """Once all cells of a scene have ended: its answer, then its table, each given out once."""
         if self.missing[scene]:
             return
         records = in_order(self.records[scene].values(), self.engines)
@@ -99,9 +99,11 @@ class Gathering:
         if asked not in self.scenes and (answer is None or answer.worth_another_try(self.timeout)):
             self.scenes[asked] = scene
             yield asked, partial(answer_here, self.folder, records)
-        elif answer is not None and not is_kept(path := share_file(self.folder, records, answer)):
+        elif answer is not None and not is_kept(
+            path := scene_table_file(self.folder, records, answer)
+        ):
             self.scenes[path] = scene
-            yield path, partial(share_of, self.folder, records, asked)
+            yield path, partial(scene_table_of, self.folder, records, asked)
 
     @property
     def playing(self) -> bool:
@@ -133,12 +135,12 @@ class Gathering:
             self.unkept[scene] = result.csv
         else:
             delete_unless_file(path)
-            keep_share(path, result.csv)
+            keep_scene_table(path, result.csv)
 
 
 def delete_unless_file(path: Path) -> None:
-    """Delete a pipe or a link in the place of an answer or a share, so that nothing is written
-    into it."""
+    """Delete a pipe or a link in the place of an answer or a scene table, so that nothing is
+    written into it."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         path.unlink()
 
@@ -153,9 +155,9 @@ def name_of(record: dict[str, Any]) -> str:
     return f"{record['engine']}:{record['profile']}"
 
 
-class Share(NamedTuple):
+class SceneTable(NamedTuple):
     """A scene's part of deviations.csv; `damaged`: the file of a trajectory is gone or torn, and so
-    the share is not kept."""
+    the part is not kept."""
 
     csv: bytes
     damaged: bool
@@ -166,21 +168,21 @@ def answer_here(folder: Path, records: Records) -> Answer:
     return answer_of(scenario_of(folder, records))
 
 
-def share_of(folder: Path, records: Records, answered: Path) -> Share:
+def scene_table_of(folder: Path, records: Records, answered: Path) -> SceneTable:
     """Compare a scene with its answer, kept in the file `answered`; called in a worker."""
     allow(COMPARING)
     answer = read_answer(answered)
     assert answer is not None
     comparison = compared(folder, records, answer)
     table = comparison.table
-    if answer.lost and not (lost := not_judged(comparison.runs, answer.lost, TRUTH)).empty:
+    if answer.lost and not (lost := rows_not_judged(comparison.runs, answer.lost, TRUTH)).empty:
         table = pd.concat([table, lost])
     damaged = any(run.status != record["status"] for run, record in zip(comparison.runs, records))
-    return Share(csv_of(table), damaged)
+    return SceneTable(csv_of(table), damaged)
 
 
 def csv_of(table: pd.DataFrame, header: bool = True) -> bytes:
-    """A table as the text that `read_share` reads."""
+    """A table as the text that `read_scene_table` reads."""
     return table.to_csv(index=False, header=header).encode(errors=PATHS)
 
 
@@ -190,7 +192,7 @@ def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
     return compare(scenario, [run_of(folder, record) for record in records])
 
 
-def not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
+def rows_not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
     """A row that says `why` for each run that ended well and yet is not compared with
     `versus`."""
     says = f"{NOT_JUDGED}: {why}"
@@ -209,13 +211,13 @@ def scenario_of(folder: Path, records: Records) -> Scenario:
     return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
 
 
-def keep_share(path: Path, csv: bytes) -> None:
-    """Write a share whole or not at all, after a line with its digest."""
+def keep_scene_table(path: Path, csv: bytes) -> None:
+    """Write a scene table whole or not at all, after a line with its digest."""
     put_bytes(path, f"{digest(csv)}\n".encode() + csv)
 
 
-def kept_share(path: Path) -> bytes:
-    """What `keep_share` wrote; raises `OSError`, or `ValueError` if the digest is another."""
+def kept_scene_table(path: Path) -> bytes:
+    """What `keep_scene_table` wrote; raises `OSError`, or `ValueError` if the digest is another."""
     first, _, csv = all_of(path).partition(b"\n")
     if first != digest(csv).encode():
         raise ValueError(f"{path}: is not what was written; delete it, and it is made again")
@@ -223,15 +225,15 @@ def kept_share(path: Path) -> bytes:
 
 
 def is_kept(path: Path) -> bool:
-    """Whether the file of a share is there as it was written."""
+    """Whether the file of a scene table is there as it was written."""
     try:
-        return bool(kept_share(path))
+        return bool(kept_scene_table(path))
     except (OSError, ValueError):
         return False
 
 
-def read_share(csv: bytes) -> pd.DataFrame:
-    """The table of a share, bit for bit as it was written."""
+def read_scene_table(csv: bytes) -> pd.DataFrame:
+    """A scene table, bit for bit as it was written."""
     empty = {column: [""] for column in NUMBERS}
     return pd.read_csv(
         io.BytesIO(csv), keep_default_na=False, na_values=empty, encoding_errors=PATHS
@@ -240,18 +242,18 @@ def read_share(csv: bytes) -> pd.DataFrame:
 
 def answer_file(folder: Path, records: Records) -> Path:
     """The file of the answer to a scene; its name changes with the scene and the judge's source."""
-    return named_by(folder, records, (records[0]["scene_hash"], judge()), ANSWER)
+    return named_by(folder, records, (records[0]["scene_hash"], judge_hash()), ANSWER)
 
 
-def share_file(folder: Path, records: Records, answer: Answer) -> Path:
-    """The file of the share of a scene; its name changes with all that decides the share: runs,
+def scene_table_file(folder: Path, records: Records, answer: Answer) -> Path:
+    """The file of a scene table; its name changes with all that decides the table: runs,
     answer, judge."""
     found = [as_found(folder, record) for record in records]
     files = [
         tuple(record[name] for name in ("cell", "status", "reason", "file", "damage"))
         for record in found
     ]
-    return named_by(folder, records, (files, judge(), answer.lost), ".csv")
+    return named_by(folder, records, (files, judge_hash(), answer.lost), ".csv")
 
 
 def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str) -> Path:
@@ -261,9 +263,9 @@ def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str)
 
 
 @cache
-def judge(root: Path = ROOT) -> str:
-    """A hash of the source and the versions that compare runs: after a change of a metric, shares
-    are made again."""
-    files = sorted(path for pattern in JUDGES for path in root.glob(pattern))
+def judge_hash(root: Path = ROOT) -> str:
+    """A hash of the source and the versions that compare runs: after a change of a metric, scene
+    tables are made again."""
+    files = sorted(path for pattern in JUDGE_SOURCE for path in root.glob(pattern))
     source = b"".join(path.read_bytes() for path in files)
     return hashlib.sha256(source + repr((versions(), pd.__version__)).encode()).hexdigest()

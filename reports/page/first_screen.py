@@ -1,0 +1,123 @@
+"""What the report opens with: the first pictures, which engine for what, and the findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from reports.compare.comparison import Comparison
+from reports.page import error_cost, pooled, situations
+from reports.page.charts import Drawing, packed_charts
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Charts under one key, by which the script of the page finds their data."""
+
+    key: str
+    drawings: Mapping[str, Drawing]
+    charts: str  # the data of the drawings, packed
+
+
+@dataclass(frozen=True)
+class FirstScreen:
+    """What the report shows before its tables.
+
+    Attributes:
+        scenes: how many there are.
+        exact: how many of them have an exact answer.
+        steps: s, the smallest and the largest step size.
+        versions: engine -> its libraries and their versions.
+        said: a solver's file -> what `crosscheck check` says of it.
+        error_cost: error against cost, its sentences and its times; None without exact answers.
+        error_cost_charts: the pictures of `error_cost`.
+        no_times: why no time is shown, or "".
+        answers: the engines ranked, a row a situation.
+        whole: the row of all situations together.
+        far_off: radii beyond which a disk is not where it should be.
+        pooled: the pictures of all scenes at once.
+        charted: the engines with a mark in one of `pooled`.
+        findings: the sentences below.
+    """
+
+    scenes: int
+    exact: int
+    steps: tuple[float, float]
+    versions: Mapping[str, str]
+    said: Mapping[str, Sequence[str]]
+    error_cost: error_cost.ErrorCost | None
+    error_cost_charts: Pictures
+    no_times: str
+    answers: Sequence[situations.Answer]
+    whole: situations.Answer | None
+    far_off: float
+    pooled: Pictures
+    charted: Sequence[str]
+    findings: Sequence[str]
+
+
+def first_screen(
+    comparisons: Sequence[Comparison],
+    untrusted: Set[str],
+    clock: error_cost.Clock,
+    findings: Sequence[str],
+    said: Mapping[str, Sequence[str]],
+) -> FirstScreen:
+    """What the report of `comparisons` opens with; an engine in `untrusted` is not ranked.
+
+    Scenes with friction are ranked in a row of their own, and are not in the first picture.
+    """
+    without_friction, _ = situations.by_friction(comparisons)
+    scores = pooled.scores(comparisons)
+    answers = situations.answers(scores[scores.middle], situated(comparisons), untrusted)
+    drawings = pooled.drawings(scores, answers, untrusted)
+    first = error_cost.error_cost(pooled.scores(without_friction), clock, untrusted)
+    return FirstScreen(
+        scenes=len(comparisons),
+        exact=sum(comparison.truth is not None for comparison in comparisons),
+        steps=step_range(comparisons),
+        versions=versions_of(comparisons),
+        said=said,
+        error_cost=first,
+        error_cost_charts=pictures(error_cost.KEY, first.drawings if first else {}),
+        no_times=clock.fault,
+        answers=answers,
+        whole=situations.whole(answers),
+        far_off=situations.FAR_OFF,
+        pooled=pictures(pooled.KEY, drawings),
+        charted=pooled.with_marks(drawings),
+        findings=findings,
+    )
+
+
+def pictures(key: str, drawings: Mapping[str, Drawing]) -> Pictures:
+    """The drawings with their data, packed."""
+    return Pictures(key, drawings, packed_charts(drawings))
+
+
+def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:
+    """Scene -> what `situations.situations_of` says of it."""
+    return {
+        each.scenario.name: situations.situations_of(each.scenario, each.truth)
+        for each in comparisons
+    }
+
+
+def versions_of(comparisons: Sequence[Comparison]) -> dict[str, str]:
+    """engine -> its libraries and their versions, as its runs say."""
+    found: dict[str, dict[str, str]] = {}
+    for comparison in comparisons:
+        for run in comparison.runs:
+            found.setdefault(run.engine, {}).update(run.versions)
+    return {
+        engine: ", ".join(f"{library} {version[:16]}" for library, version in libraries.items())
+        for engine, libraries in found.items()
+    }
+
+
+def step_range(comparisons: Sequence[Comparison]) -> tuple[float, float]:
+    """s, the smallest and the largest step size of all runs."""
+    steps = [run.dt for comparison in comparisons for run in comparison.runs]
+    return (min(steps), max(steps)) if steps else (np.nan, np.nan)

@@ -1,0 +1,112 @@
+"""A section of the report for each scenario: its replay, its charts, its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from adapters.run import Run
+from adapters.thrust_grid import off_grid_note
+from reports.compare.comparison import Comparison
+from reports.page import overview, style
+from reports.page.charts import CHARTS, Drawing, packed_charts
+from reports.page.page_tables import by_name
+from reports.page.replay import frames, name_of, pack, played, ratio_of
+from scenarios.catalogue import family_of
+
+OWN = "Scenes of your own"
+
+
+@dataclass(frozen=True)
+class ScenarioSection:
+    """One scenario as the page shows it.
+
+    Attributes:
+        comparison: the runs of the scenario, and what was measured of them.
+        family: the heading that the section stands under.
+        truth: what is known of the right answer, in a sentence.
+        dt: s, the step size of `table`.
+        off_grid: at which step sizes a thrust starts or stops inside a step, or "".
+        failures: the engines that did not play it to its end.
+        layers: what the replay shows: name, and its run; None for the exact answer.
+        replay: the frames of `layers`, packed.
+        frames: how many.
+        ratio: width of the replay over its height.
+        drawings: key -> chart.
+        charts: the data of the drawings, packed.
+        table: metric, unit, which is better, a cell an engine.
+        pairs: engine -> its largest deviation from each engine before it.
+        settings: engine -> its (setting, asked, used) that differ from scenario to scenario.
+    """
+
+    comparison: Comparison
+    family: str
+    truth: str
+    dt: float
+    off_grid: str
+    failures: list[overview.Failure]
+    layers: list[tuple[str, Run | None]]
+    replay: str
+    frames: int
+    ratio: float
+    drawings: dict[str, Drawing]
+    charts: str
+    table: list[tuple[str, str, str, list[overview.OverviewCell]]]
+    pairs: dict[str, list[overview.OverviewCell]]
+    settings: dict[str, list[tuple[str, str, str]]]
+
+
+def sections_of(comparisons: Sequence[Comparison]) -> list[ScenarioSection]:
+    """A section for each comparison, in their order."""
+    names = overview.names_of(comparisons)
+    common = overview.common_settings(comparisons)
+    return [section_of(comparison, names, common) for comparison in comparisons]
+
+
+def section_of(
+    comparison: Comparison, names: Sequence[str], common: overview.Settings
+) -> ScenarioSection:
+    """The section of one scenario; of its settings those that are not `common`."""
+    scenario = comparison.scenario
+    own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
+    drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
+    layers = played(comparison)
+    return ScenarioSection(
+        comparison=comparison,
+        family=family_of(scenario.name) or OWN,
+        truth=truth_of(comparison),
+        dt=comparison.middle_dt,
+        off_grid=off_grid_note(scenario),
+        failures=overview.failures(comparison),
+        layers=[(name_of(run), run) for run, _ in layers],
+        replay=pack(comparison),
+        frames=len(frames(scenario, layers)) if layers else 0,
+        ratio=ratio_of(scenario, layers),
+        drawings=drawings,
+        charts=packed_charts(drawings),
+        table=overview.scenario_table(comparison, names),
+        pairs=overview.between_engines(comparison, names),
+        settings=by_name(own),
+    )
+
+
+def by_family(sections: Sequence[ScenarioSection]) -> dict[str, list[ScenarioSection]]:
+    """The sections under their headings, both in the order of appearance."""
+    families: dict[str, list[ScenarioSection]] = {}
+    for section in sections:
+        families.setdefault(section.family, []).append(section)
+    return families
+
+
+def truth_of(comparison: Comparison) -> str:
+    """What is known of the right answer, in a sentence."""
+    scenario, truth = comparison.scenario, comparison.truth
+    if truth is None:
+        return f"none: {scenario.without_truth or 'the scene comes without an exact answer'}"
+    ends = "at every sample"
+    if truth.horizon < scenario.duration:
+        ends = f"up to its horizon at {style.number(truth.horizon)} s, and no further"
+        ends += f": {truth.reason}" if truth.reason else ""
+    return f"exact {ends}" + (
+        f"; off by at most {style.number(truth.error_bound)} m" if truth.error_bound else ""
+    )
