@@ -92,6 +92,12 @@ def _event_driven() -> Engine:
     return EventDriven()
 
 
+def _javascript(name: str, profile: str, **settings: Any) -> Engine:
+    from adapters.javascript.engine import JavaScriptEngine
+
+    return JavaScriptEngine(name, FETCHED[f"{name}:{profile}"].package, profile, **settings)
+
+
 def _what_moves_is_a_bullet(engine: Any) -> None:
     """Of both Box2Ds: of the disks that move; a bullet sees no other bullet in 3.1."""
     for body, velocity in zip(engine.bodies, engine.scene.velocity):
@@ -243,6 +249,24 @@ ENGINES: dict[str, EngineRow] = {
     ),
 }
 
+# Engines of npm packages, which the extra `js` fetches once: they play where they are asked for.
+FETCHED: dict[str, EngineRow] = {
+    "planck:shipped": EngineRow(
+        partial(_javascript, "planck", "shipped"),
+        "planck 1.5 as it comes: Box2D 2.3 in JavaScript and float64",
+        1.0,
+        FLOAT64,
+        package="planck",
+    ),
+    "planck:matched": EngineRow(
+        partial(_javascript, "planck", "matched"),
+        "planck, matched: what box2d:matched chooses, without its float32",
+        1.0,
+        FLOAT64,
+        package="planck",
+    ),
+}
+
 # whose numbers differ from each other's in scenes without friction
 DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
 # who plays where no engine is asked for: those, and who differs from them where there is friction
@@ -255,12 +279,15 @@ _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were whe
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`, which is read once.
+    """The row of an engine: of `ENGINES`, of `FETCHED`, or of a solver's file as `PATH:own`, which
+    is read once.
 
     Raises:
         KeyError: it is neither.
         NotASolver: the file cannot be one.
     """
+    if name in FETCHED:
+        return FETCHED[name]
     if name in ENGINES or not name.endswith(OWN):
         return ENGINES[name]
     return _read.get(name) or read_row(name)

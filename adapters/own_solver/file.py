@@ -33,7 +33,8 @@ class SolverFailed(Exception):
     """A solver that cannot be loaded or did not come back from a call.
 
     Attributes:
-        kind: "error" (threw), "timeout", "memory" or "crashed".
+        kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
+            adapters/javascript.
         what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is
             escaped, and what goes on for more than `LONGEST` characters is cut.
         line, column: where in the solver's file, from 1; 0 where nobody can tell.

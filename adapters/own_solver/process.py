@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from adapters.engine import NotStarted
+from adapters.javascript.packages import Packaged
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
 from adapters.own_solver.worker import HERE
 from adapters.safe_path import path_of_this, python
@@ -31,13 +32,15 @@ Request = tuple[str, Any, float]
 
 
 class SolverProcess:
-    """A solver's text, loaded in a process of its own; use it in a `with`, or close it.
+    """A solver's text, or an engine's package, in a process of its own; use it in a `with`, or
+    close it.
 
     Attributes:
         functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it
             replaced.
-        kind: "javascript" or "python".
-        surface: "exercise" (functions on spheres) or "advance" (arrays, as in reference_impl).
+        kind: "javascript" or "python"; or "packaged", an engine of adapters/javascript.
+        surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl) or
+            "packaged".
         versions: library -> version.
 
     Raises:
@@ -45,10 +48,12 @@ class SolverProcess:
         NotStarted: its process cannot be had.
     """
 
-    def __init__(self, solver: SolverText, compiled: bool = False) -> None:
+    def __init__(self, solver: SolverText | Packaged, compiled: bool = False) -> None:
         self.kind = solver.kind
         kept = folder()
-        copies = kept_copies(solver, kept) if compiled and kept and self.kind == "python" else None
+        copies = None
+        if compiled and kept and isinstance(solver, SolverText) and self.kind == "python":
+            copies = kept_copies(solver, kept)
         # Plain Python gives the same bits as numba, and starts 20 s sooner.
         settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
         settings["PYTHONPATH"] = path_of_this()
@@ -172,7 +177,7 @@ class SolverProcess:
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         # V8's word for a full heap
-        ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)
+        ends_v8 = self.kind != "python" and -code in (signal.SIGTRAP, signal.SIGABRT)
         if ends_v8:
             return SolverFailed(
                 "memory", "wants more memory than it is given, and its process was ended"

@@ -18,6 +18,7 @@ from pathlib import Path
 from threading import Thread
 from typing import IO, Any
 
+from adapters.javascript.packages import Packaged
 from adapters.own_solver.file import SolverFailed, SolverText
 
 HERE = "here"  # what is said before anything of the solver is in this process
@@ -69,8 +70,10 @@ def end_with_parent(requests: IO[str]) -> None:
     os.killpg(os.getpid(), signal.SIGKILL)
 
 
-def load(solver: SolverText, copies: Path | None) -> Any:
+def load(solver: SolverText | Packaged, copies: Path | None) -> Any:
     """The solver by its kind, its texts kept in `copies`; raises `SolverFailed`."""
+    if isinstance(solver, Packaged):
+        return solver.load()
     if solver.kind == "javascript":
         from adapters.own_solver.javascript import JavaScriptSolver
 
