@@ -249,6 +249,9 @@ ENGINES: dict[str, EngineRow] = {
     ),
 }
 
+# Of the velocities of matter, which it keeps as the difference of two positions: 5 m hold it to
+# 1e-15 m, of a path in a step of some 1e-4 m.
+VERLET = 2.0**-36
 # Engines of npm packages, which the extra `js` fetches once: they play where they are asked for.
 FETCHED: dict[str, EngineRow] = {
     "planck:shipped": EngineRow(
@@ -264,6 +267,24 @@ FETCHED: dict[str, EngineRow] = {
         1.0,
         FLOAT64,
         package="planck",
+    ),
+    "matter:shipped": EngineRow(
+        partial(_javascript, "matter", "shipped"),
+        "matter-js 0.20 as it comes, 100 pixels a metre: circles are polygons, air brakes",
+        1.0,
+        VERLET,
+        departs=dict.fromkeys(
+            ("steps_obey_dt", "force_lasts_one_step", "same_instant"),
+            "friction of the air: 1 % of the speed in 1/60 s, its default",
+        ),
+        package="matter-js",
+    ),
+    "matter:matched": EngineRow(
+        partial(_javascript, "matter", "matched"),
+        "matter-js, matched: pixels that lift its thresholds, 200 sides, no air",
+        1.0,
+        VERLET,
+        package="matter-js",
     ),
 }
 
