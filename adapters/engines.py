@@ -286,6 +286,20 @@ FETCHED: dict[str, EngineRow] = {
         VERLET,
         package="matter-js",
     ),
+    "rapier2d:shipped": EngineRow(
+        partial(_javascript, "rapier2d", "shipped", float32=True),
+        "Rapier 0.21 (WebAssembly) as it comes: friction, sleep, length unit 1 m",
+        0.625,
+        FLOAT32,
+        package="@dimforge/rapier2d-compat",
+    ),
+    "rapier2d:matched": EngineRow(
+        partial(_javascript, "rapier2d", "matched", float32=True),
+        "Rapier, matched: length unit r / 2, no friction, no sleep",
+        0.625,
+        FLOAT32,
+        package="@dimforge/rapier2d-compat",
+    ),
 }
 
 # whose numbers differ from each other's in scenes without friction
