@@ -3,6 +3,7 @@ steps."""
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,10 @@ from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array, Scene, State
 
 STEP_LIMIT = 60.0  # s that one call for some steps may take
+
+# To start one takes half a second, which is longer than most scenes. By the process that started
+# it: a fork cannot talk to it. It ends when that one does.
+IDLE: dict[tuple[int, Packaged], SolverProcess] = {}
 
 
 class JavaScriptEngine:
@@ -36,12 +41,14 @@ class JavaScriptEngine:
         self.packaged, self.profile, self.changed = Packaged(name, package), profile, changed
         self.float32 = float32
         self.started: SolverProcess | None = None
-        self.inside = 0.0
+        self.inside, self.failed = 0.0, False
 
     @property
     def process(self) -> SolverProcess:
-        """The process, started when it is first needed; raises `Unsupported` if the engine cannot
-        be loaded."""
+        """The process, an idle one or a new one, when it is first needed; raises `Unsupported` if
+        the engine cannot be loaded."""
+        if self.started is None:
+            self.started = IDLE.pop((os.getpid(), self.packaged), None)
         if self.started is None:
             try:
                 self.started = SolverProcess(self.packaged)
@@ -57,6 +64,7 @@ class JavaScriptEngine:
         except SolverFailed as failure:
             if failure.kind == "refused":
                 raise Unsupported(failure.what) from None
+            self.failed = True
             raise
         self.seconds = float(answer["seconds"])
         return answer["done"]
@@ -137,10 +145,13 @@ class JavaScriptEngine:
         return self.process.versions
 
     def close(self) -> None:
-        """End the process."""
-        if self.started is not None:
-            self.started.close()
-            self.started = None
+        """Leave the process to the next engine of its kind, which loads a world of its own; end it
+        if something failed in it, or if one is idle already."""
+        process, self.started = self.started, None
+        if process is None:
+            return
+        if self.failed or IDLE.setdefault((os.getpid(), self.packaged), process) is not process:
+            process.close()
 
 
 def told(scene: Scene, dt: float) -> dict[str, Any]:
