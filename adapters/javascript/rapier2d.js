@@ -48,8 +48,17 @@
         throw new Refused(`a disk reaches a ${what} of ${caps[what].toPrecision(6)} ${unit}, where Rapier cuts it at this dt`);
       }
     }
-    // It keeps cos and sin: the angle is the one nearest to where the spin would have brought it.
-    const angles = [...scene.angle], pushed = new Set();
+    const pushed = new Set();
+    // It keeps cos and sin: the angle is the one nearest to where the mean spin since the last reading would have
+    // brought it.
+    const turned = scene.angle.map((angle, i) => ({ angle, spin: scene.spin[i], step: 0 }));
+    let steps = 0;
+    function angle(i) {
+      const before = turned[i], spin = bodies[i].angvel(), raw = bodies[i].rotation();
+      const expected = before.angle + (before.spin + spin) / 2 * (steps - before.step) * dt;
+      turned[i] = { angle: raw + 2 * Math.PI * Math.round((expected - raw) / (2 * Math.PI)), spin, step: steps };
+      return turned[i].angle;
+    }
     return {
       step() {
         space.step(queue);
@@ -63,10 +72,7 @@
           bodies[i].resetTorques(true);
         }
         pushed.clear();
-        bodies.forEach((body, i) => {
-          const expected = angles[i] + body.angvel() * dt, raw = body.rotation();
-          angles[i] = raw + 2 * Math.PI * Math.round((expected - raw) / (2 * Math.PI));
-        });
+        steps++;
       },
       force(i, x, y, torque) {
         bodies[i].addForce({ x, y }, true);
@@ -77,7 +83,7 @@
         const { x, y } = bodies[i].translation(), v = bodies[i].linvel();
         mustNotBeCut("speed", Math.hypot(v.x, v.y), "m/s");
         mustNotBeCut("spin", bodies[i].angvel(), "rad/s");
-        return [x, y, v.x, v.y, angles[i], bodies[i].angvel()];
+        return [x, y, v.x, v.y, angle(i), bodies[i].angvel()];
       },
       place: (i, x, y) => bodies[i].setTranslation({ x, y }, true),
       free() {
