@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.engine import ContactImpulse, Unsupported
 from adapters.float32 import must_fit, rounding
-from adapters.javascript.packages import Packaged
+from adapters.javascript.v8 import Packaged
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
 from scenarios.model import Array, Scene, State

@@ -15,7 +15,6 @@ import shutil
 import subprocess
 import tempfile
 from base64 import b64encode
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -38,22 +37,6 @@ FETCHING = 300  # s that npm may take; the three packages have 9 MB
 
 class NotInstalled(Unsupported):
     """The file of an engine's package is not there, or is not the one that is pinned."""
-
-
-@dataclass(frozen=True)
-class Packaged:
-    """What a process of own_solver/process.py is asked to play: the engine that `NAME.js` of this
-    folder makes of an npm package."""
-
-    name: str
-    package: str
-    kind = "packaged"
-
-    def load(self) -> Any:
-        """The engine in V8, in the process that calls this; raises `SolverFailed`."""
-        from adapters.javascript.v8 import PackagedEngine
-
-        return PackagedEngine(self)
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from time import monotonic, perf_counter, sleep
@@ -10,12 +11,26 @@ from typing import Any
 
 from py_mini_racer import JSEvalException, JSOOMException, JSTimeoutException, MiniRacer
 
-from adapters.javascript.packages import NotInstalled, Packaged, text_of, version_of
+from adapters.javascript.packages import NotInstalled, text_of, version_of
 from adapters.own_solver.file import SolverFailed
 
 HERE = Path(__file__).parent
 HEAP = 512 * 2**20  # bytes; Rapier's text and its WebAssembly take a tenth of it
 LOAD_LIMIT = 10.0  # s
+
+
+@dataclass(frozen=True)
+class Packaged:
+    """What a process of own_solver/process.py is asked to play: the engine that `NAME.js` of this
+    folder makes of an npm package."""
+
+    name: str
+    package: str
+    kind = "packaged"
+
+    def load(self) -> PackagedEngine:
+        """The engine in V8, in the process that calls this; raises `SolverFailed`."""
+        return PackagedEngine(self)
 
 
 class PackagedEngine:

@@ -16,8 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from adapters.engine import NotStarted
-from adapters.javascript.packages import Packaged
-from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
 from adapters.own_solver.worker import HERE
 from adapters.safe_path import path_of_this, python
 from scenarios.truth.cache import folder
@@ -48,7 +47,7 @@ class SolverProcess:
         NotStarted: its process cannot be had.
     """
 
-    def __init__(self, solver: SolverText | Packaged, compiled: bool = False) -> None:
+    def __init__(self, solver: SolverText | Loadable, compiled: bool = False) -> None:
         self.kind = solver.kind
         kept = folder()
         copies = None
