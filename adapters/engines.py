@@ -249,6 +249,11 @@ ENGINES: dict[str, EngineRow] = {
     ),
 }
 
+# whose numbers differ from each other's in scenes without friction
+DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
+# who plays where no engine is asked for: those, and who differs from them where there is friction
+UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row.adds_friction}
+
 # Of the velocities of matter, which it keeps as the difference of two positions: 5 m hold it to
 # 1e-15 m, of a path in a step of some 1e-4 m.
 VERLET = 2.0**-36
@@ -301,11 +306,6 @@ FETCHED: dict[str, EngineRow] = {
         package="@dimforge/rapier2d-compat",
     ),
 }
-
-# whose numbers differ from each other's in scenes without friction
-DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
-# who plays where no engine is asked for: those, and who differs from them where there is friction
-UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row.adds_friction}
 
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
