@@ -82,6 +82,10 @@ class EngineRow:
             asked for. "": of none.
         adds_friction: it plays scenes with friction, which that engine refuses; without friction it
             is never played beside that one.
+        departs: a probe of the protocol that it misses by its own physics, not by its adapter ->
+            the cause.
+        package: the npm package, pinned in adapters/javascript/package.json, that it plays by and
+            that is fetched once; "": it needs none.
         source: what distinguishes a solver's file that was saved from its earlier text; "" for an
             engine of this program.
     """
@@ -99,4 +103,6 @@ class EngineRow:
     searched: Callable[[], Searched] | None = None
     bits_of: str = ""
     adds_friction: bool = False
+    departs: Mapping[str, str] = field(default_factory=dict, hash=False)
+    package: str = ""
     source: str = ""

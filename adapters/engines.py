@@ -92,6 +92,12 @@ def _event_driven() -> Engine:
     return EventDriven()
 
 
+def _javascript(name: str, profile: str, **settings: Any) -> Engine:
+    from adapters.javascript.engine import JavaScriptEngine
+
+    return JavaScriptEngine(name, FETCHED[f"{name}:{profile}"].package, profile, **settings)
+
+
 def _what_moves_is_a_bullet(engine: Any) -> None:
     """Of both Box2Ds: of the disks that move; a bullet sees no other bullet in 3.1."""
     for body, velocity in zip(engine.bodies, engine.scene.velocity):
@@ -248,6 +254,59 @@ DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
 # who plays where no engine is asked for: those, and who differs from them where there is friction
 UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row.adds_friction}
 
+# Of the velocities of matter, which it keeps as the difference of two positions: 5 m hold it to
+# 1e-15 m, of a path in a step of some 1e-4 m.
+VERLET = 2.0**-36
+# Engines of npm packages, which the extra `js` fetches once: they play where they are asked for.
+FETCHED: dict[str, EngineRow] = {
+    "planck:shipped": EngineRow(
+        partial(_javascript, "planck", "shipped"),
+        "planck 1.5 as it comes: Box2D 2.3 in JavaScript and float64",
+        1.0,
+        FLOAT64,
+        package="planck",
+    ),
+    "planck:matched": EngineRow(
+        partial(_javascript, "planck", "matched"),
+        "planck, matched: what box2d:matched chooses, without its float32",
+        1.0,
+        FLOAT64,
+        package="planck",
+    ),
+    "matter:shipped": EngineRow(
+        partial(_javascript, "matter", "shipped"),
+        "matter-js 0.20 as it comes, 100 pixels a metre: circles are polygons, air brakes",
+        1.0,
+        VERLET,
+        departs=dict.fromkeys(
+            ("steps_obey_dt", "force_lasts_one_step", "same_instant"),
+            "friction of the air: 1 % of the speed in 1/60 s, its default",
+        ),
+        package="matter-js",
+    ),
+    "matter:matched": EngineRow(
+        partial(_javascript, "matter", "matched"),
+        "matter-js, matched: pixels that lift its thresholds, 200 sides, no air",
+        1.0,
+        VERLET,
+        package="matter-js",
+    ),
+    "rapier2d:shipped": EngineRow(
+        partial(_javascript, "rapier2d", "shipped", float32=True),
+        "Rapier 0.21 (WebAssembly) as it comes: friction, sleep, length unit 1 m",
+        0.625,
+        FLOAT32,
+        package="@dimforge/rapier2d-compat",
+    ),
+    "rapier2d:matched": EngineRow(
+        partial(_javascript, "rapier2d", "matched", float32=True),
+        "Rapier, matched: length unit r / 2, no friction, no sleep",
+        0.625,
+        FLOAT32,
+        package="@dimforge/rapier2d-compat",
+    ),
+}
+
 OWN = ":own"  # the profile of a solver's file, whose path is its engine
 
 
@@ -255,12 +314,15 @@ _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were whe
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: of `ENGINES`, or of a solver's file as `PATH:own`, which is read once.
+    """The row of an engine: of `ENGINES`, of `FETCHED`, or of a solver's file as `PATH:own`, which
+    is read once.
 
     Raises:
         KeyError: it is neither.
         NotASolver: the file cannot be one.
     """
+    if name in FETCHED:
+        return FETCHED[name]
     if name in ENGINES or not name.endswith(OWN):
         return ENGINES[name]
     return _read.get(name) or read_row(name)

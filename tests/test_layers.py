@@ -27,6 +27,7 @@ LAYERS = {
         "play",
         "reference pymunk box2d box2d_v3 event_driven",
         "own_solver",
+        "javascript",
         "engines",
         "mechanisms conformance",
     ],

@@ -77,13 +77,13 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     probe = PROBES[name]
     try:
         reading = probe.read(row)
-        verdict = "keeps" if reading.kept else missed(probe, row)
+        verdict = "keeps" if reading.kept else missed(name, row)
     except Unsupported as refusal:
         reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "not asked"
     except Exception as error:  # an engine may raise anything; the finding says what
         reading, verdict = (
             ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
-            missed(probe, row) if is_own(row) else "breaks",
+            missed(name, row) if is_own(row) else "breaks",
         )
     return Finding(
         engine,
@@ -98,9 +98,11 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     )
 
 
-def missed(probe: Probe, row: EngineRow) -> str:
+def missed(name: str, row: EngineRow) -> str:
     """The verdict on who misses a probe."""
-    return "departs" if probe.handed_on and is_own(row) else probe.failure
+    probe = PROBES[name]
+    own_physics = name in row.departs or (probe.handed_on and is_own(row))
+    return "departs" if own_physics else probe.failure
 
 
 def is_own(row: EngineRow) -> bool:

@@ -11,6 +11,7 @@ import hashlib
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol
 
 from adapters.own_solver.beside import modules_beside
 from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
@@ -33,7 +34,8 @@ class SolverFailed(Exception):
     """A solver that cannot be loaded or did not come back from a call.
 
     Attributes:
-        kind: "error" (threw), "timeout", "memory" or "crashed".
+        kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
+            adapters/javascript.
         what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is
             escaped, and what goes on for more than `LONGEST` characters is cut.
         line, column: where in the solver's file, from 1; 0 where nobody can tell.
@@ -59,6 +61,17 @@ def printable(text: str) -> str:
     """Somebody's text on one line, its control characters as they are written in code: they would
     act on a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+class Loadable(Protocol):
+    """What a process can load that is no solver's file; it is pickled on its way there."""
+
+    @property
+    def kind(self) -> str:
+        """It is `packaged`."""
+
+    def load(self) -> Any:
+        """What answers the commands, as a solver does, in that process; raises `SolverFailed`."""
 
 
 @dataclass(frozen=True)

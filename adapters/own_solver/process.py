@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from adapters.engine import NotStarted
-from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
 from adapters.own_solver.worker import HERE
 from adapters.safe_path import path_of_this, python
 from scenarios.truth.cache import folder
@@ -31,13 +31,15 @@ Request = tuple[str, Any, float]
 
 
 class SolverProcess:
-    """A process that has loaded a solver's file; use it in a `with`, or close it.
+    """A solver's text, or an engine's package, in a process of its own; use it in a `with`, or
+    close it.
 
     Attributes:
-        functions: which of integrate, collide, step, wrap and begin the file has, and which
-            built-ins it replaced.
-        kind: "javascript" or "python".
-        surface: "exercise" (functions on spheres) or "advance" (arrays, as in reference_impl).
+        functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it
+            replaced.
+        kind: "javascript" or "python"; or "packaged", an engine of adapters/javascript.
+        surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl) or
+            "packaged".
         versions: library -> version.
 
     Raises:
@@ -45,10 +47,12 @@ class SolverProcess:
         NotStarted: the process cannot be started.
     """
 
-    def __init__(self, solver: SolverText, compiled: bool = False) -> None:
+    def __init__(self, solver: SolverText | Loadable, compiled: bool = False) -> None:
         self.kind = solver.kind
         kept = folder()
-        copies = kept_copies(solver, kept) if compiled and kept and self.kind == "python" else None
+        copies = None
+        if compiled and kept and isinstance(solver, SolverText) and self.kind == "python":
+            copies = kept_copies(solver, kept)
         # Plain Python gives the same bits as numba, and starts 20 s sooner.
         settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
         settings["PYTHONPATH"] = path_of_this()
@@ -172,7 +176,7 @@ class SolverProcess:
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         # what V8 sends when its heap is full
-        ends_v8 = self.kind == "javascript" and -code in (signal.SIGTRAP, signal.SIGABRT)
+        ends_v8 = self.kind != "python" and -code in (signal.SIGTRAP, signal.SIGABRT)
         if ends_v8:
             return SolverFailed(
                 "memory", "wants more memory than it is given, and its process was ended"

@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import Thread
 from typing import IO, Any
 
-from adapters.own_solver.file import SolverFailed, SolverText
+from adapters.own_solver.file import SolverFailed
 
 HERE = "here"  # what is said before anything of the solver is in this process
 # bytes of data; V8 sets aside far more addresses than it uses, so that these cannot be bounded
@@ -69,8 +69,11 @@ def end_with_parent(requests: IO[str]) -> None:
     os.killpg(os.getpid(), signal.SIGKILL)
 
 
-def load(solver: SolverText, copies: Path | None) -> Any:
-    """The solver by its kind, its texts kept in `copies`; raises `SolverFailed`."""
+def load(solver: Any, copies: Path | None) -> Any:
+    """The solver by its kind, its texts kept in `copies`, or the engine of a package; raises
+    `SolverFailed`."""
+    if solver.kind == "packaged":
+        return solver.load()
     if solver.kind == "javascript":
         from adapters.own_solver.javascript import JavaScriptSolver
 

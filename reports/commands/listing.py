@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from adapters.engines import ENGINES
+from adapters.engine_row import EngineRow
+from adapters.engines import ENGINES, FETCHED
+from adapters.javascript.packages import missing
 from reports.compare.metrics import METRICS, Metric
 from reports.run.arguments import unknown
 from reports.terminal.console import Console
@@ -15,7 +17,7 @@ from scenarios.truth.exact import answered_by
 def explain(what: str) -> None:
     """A line for every engine, scenario and metric, or for one of the three kinds."""
     kinds = {
-        "engines": {name: row.summary for name, row in ENGINES.items()},
+        "engines": {name: _engine(row) for name, row in (ENGINES | FETCHED).items()},
         "scenarios": {name: _line(name) for name in SCENARIOS},
         "metrics": {_with_unit(name, row): row.summary for name, row in METRICS.items()},
     }
@@ -26,6 +28,11 @@ def explain(what: str) -> None:
         if what in ("", kind):
             print_texts(console, lines, f"{len(lines)} {kind}")
             console.print()
+
+
+def _engine(row: EngineRow) -> str:
+    reason = missing(row.package) if row.package else ""
+    return f"{row.summary} ({reason})" if reason else row.summary
 
 
 def _with_unit(name: str, row: Metric) -> str:

@@ -20,6 +20,7 @@ from reports.run.arguments import (
     checked_engines,
     checked_scenes,
     go_where_files_are,
+    of_main_job,
     opening,
     refusing,
 )
@@ -61,7 +62,7 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
     with opening(request.out):
         out, folder = place_of(request.out), os.getcwd()
     scenes = request.scenes or list(SCENARIOS)
-    rows = {name: row_of(name) for name in checked_engines(request.engines)}
+    rows = {name: row_of(name) for name in checked_engines(request.engines or of_main_job())}
     plan = RunPlan(
         scenes=checked_scenes(scenes, request.dts, request.full, request.seed),
         engines=rows,

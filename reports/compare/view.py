@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.engine_row import FLOAT64
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, FETCHED
 from adapters.run import Run
 from reports.compare import laws
 from reports.compare.collisions import Matched, match
@@ -232,8 +232,9 @@ class View:
 def beside(scenario: Scenario, run: Run, other: Trajectory | None, jumps: Jumps | None) -> View:
     """What a run played beside `other`, over the samples both have."""
     assert run.trajectory is not None
+    known = ENGINES | FETCHED
     # a solver's file keeps float64
-    rounding = ENGINES[run.name].rounding if run.name in ENGINES else FLOAT64
+    rounding = known[run.name].rounding if run.name in known else FLOAT64
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
     other = None if other is None else cut(other, k)
     return View(scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding)

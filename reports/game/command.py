@@ -11,7 +11,7 @@ from typing import cast
 
 from adapters.engine import Engine
 from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, OWN
+from adapters.engines import ENGINES, FETCHED, OWN
 from adapters.own_solver.engine import Student, engine_file
 from adapters.own_solver.file import KINDS
 from adapters.own_solver.restitution import EXERCISE
@@ -44,7 +44,7 @@ def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
     # A solver's file is a row like any other while it flies; one that cannot fly at all is reported
     # before.
     rows, restitution = own_rows(own)
-    ENGINES.update(rows)
+    ENGINES.update(rows | {name: FETCHED[name] for name in chosen if name in FETCHED})
     beside = others or BESIDE[: MOST_ENGINES - len(own)]
     return Game([*own, *beside], file, restitution)
 

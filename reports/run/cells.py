@@ -15,7 +15,7 @@ from adapters.engines import ENGINES
 from scenarios.model import Scenario
 
 # wherever in these folders a file lies
-SOURCES = ("adapters/**/*.py", "adapters/**/*.js", "reference_impl/**/*.py")
+SOURCES = ("adapters/**/*.py", "adapters/**/*.js*", "reference_impl/**/*.py")
 ROOT = Path(__file__).parents[2]
 # besides the distributions of the engines
 DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import pandas as pd
 
-from adapters.engines import ENGINES, OWN
+from adapters.engines import ENGINES, FETCHED, OWN
 from reports.page.style import number
 from reports.run.arguments import checked_engines, opening, unknown
 from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
@@ -81,6 +81,9 @@ def find_limits(
     cases, maps, touching = checked(names, vary)
     form = "full" if full else "quick"
     chosen = checked_engines(engines)
+    if packaged := [name for name in chosen if name in FETCHED]:
+        how = "is not driven to its limits; crosscheck run and crosscheck speed play it"
+        refuse([f"--engine {name}: {how}" for name in packaged])
     if files := [name.removesuffix(OWN) for name in chosen if name not in ENGINES]:
         how = (
             "a file is not driven to its limits: crosscheck check judges it, crosscheck run"

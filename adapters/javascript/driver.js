@@ -1,0 +1,113 @@
+"use strict";
+// Plays a JavaScript engine for adapters/javascript/v8.py: many steps in a call, arrays back, in JSON. An engine's file
+// gives `play({ shipped, matched, world })`; its `world(scene, chosen, hear)` builds a world and returns
+//   step()                       one step of scene.dt
+//   force(i, x, y, torque)       N, N m, on disk i during the next step
+//   read(i)                      [x, y, u, v, angle, spin] of disk i, SI
+//   place(i, x, y)               sets its centre
+//   settings()                   [name, asked for or null, resolved] rows
+// and calls hear(i, j, impulse) for every collision: disks from 0, wall w as -1 - w, N s or NaN.
+globalThis.window = globalThis.self = globalThis;
+// The package's file, which is evaluated next, exports to it, and the engine's own file takes it from there.
+globalThis.module = { exports: {} };
+globalThis.exports = module.exports;
+if (typeof console === "undefined") {
+  globalThis.console = Object.fromEntries(["log", "info", "warn", "error", "debug"].map((name) => [name, () => {}]));
+}
+// Rapier asks for the time of its own counters.
+if (typeof performance === "undefined") globalThis.performance = { now: () => 0 };
+// What Rapier needs to read the WebAssembly in its own text.
+if (typeof TextDecoder === "undefined") {
+  globalThis.TextDecoder = class {
+    decode(bytes) {
+      let text = "";
+      for (const byte of bytes || []) text += String.fromCharCode(byte);
+      return decodeURIComponent(escape(text));
+    }
+  };
+  globalThis.TextEncoder = class {
+    encode(text) { return Uint8Array.from(unescape(encodeURIComponent(text)), (c) => c.charCodeAt(0)); }
+    encodeInto(text, into) { const bytes = this.encode(text); into.set(bytes); return { read: text.length, written: bytes.length }; }
+  };
+}
+if (typeof atob === "undefined") {
+  const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const value = new Uint8Array(128);
+  for (let k = 0; k < 64; k++) value[digits.charCodeAt(k)] = k;
+  globalThis.atob = (text) => {
+    const parts = [];
+    let bits = 0, held = 0, part = "";
+    for (let k = 0; k < text.length && text[k] !== "="; k++) {
+      bits = (bits << 6) | value[text.charCodeAt(k)];
+      held += 6;
+      if (held >= 8) { held -= 8; part += String.fromCharCode((bits >> held) & 255); }
+      if (part.length > 8191) { parts.push(part); part = ""; }
+    }
+    return parts.join("") + part;
+  };
+}
+
+// What a world throws that cannot play the scene as it is.
+class Refused extends Error {}
+
+const crosscheck = (() => {
+  let engine, world, scene, steps, log;
+
+  function load(given) {
+    if (world && world.free) world.free();
+    scene = given.scene;
+    steps = 0;
+    log = [];
+    const chosen = { ...engine[given.profile], ...given.changed };
+    const hear = given.listening ? (i, j, impulse) => { log.push([steps, i, j, isNaN(impulse) ? null : impulse]); } : null;
+    world = engine.world(scene, chosen, hear);
+    return { settings: world.settings(), rows: rows() };
+  }
+
+  function rows() {
+    const all = [];
+    for (let i = 0; i < scene.n; i++) all.push(world.read(i));
+    return all;
+  }
+
+  function step({ count, forces }) {
+    for (const [i, x, y, torque] of forces) world.force(i, x, y, torque);
+    for (let k = 0; k < count; k++) {
+      world.step();
+      steps++;
+      if (scene.wrap) wrap();
+    }
+    return null;
+  }
+
+  // As the exercise's projectObjects: beyond an edge of the box, onto the opposite one.
+  function wrap() {
+    const [[left, bottom], [right, top]] = scene.wrap;
+    for (let i = 0; i < scene.n; i++) {
+      const [x, y] = world.read(i);
+      if (x >= left && x <= right && y >= bottom && y <= top) continue;
+      world.place(i, x < left ? right : x > right ? left : x, y < bottom ? top : y > top ? bottom : y);
+    }
+  }
+
+  // Where everything is, and the collisions since the last time.
+  function look() {
+    const heard = log;
+    log = [];
+    return { rows: rows(), collisions: heard };
+  }
+
+  const commands = { load, step, look };
+  return {
+    play: (given) => { engine = given; },
+    do: (name, argument) => {
+      try { return JSON.stringify({ done: commands[name](argument) }); }
+      catch (error) {
+        if (error instanceof Refused) return JSON.stringify({ refused: error.message });
+        return JSON.stringify({ failed: `${error && error.message !== undefined ? `${error.name}: ${error.message}` : error}` });
+      }
+    },
+    ready: () => engine !== undefined,
+  };
+})();
+const play = crosscheck.play;

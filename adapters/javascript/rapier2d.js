@@ -1,0 +1,113 @@
+"use strict";
+// Rapier 0.21 for JavaScript, float32, from Rust through WebAssembly: four substeps, contacts foreseen within a margin.
+{
+  const RAPIER = module.exports.default || module.exports;
+  const shipped = { matched: false, friction: null, turning: true, sleeping: true, iterations: null, continuous: false };
+  // The length unit is that of Box2D 3.1, matched, whose slop and margin are the same shares of theirs.
+  const matched = {
+    matched: true, friction: null, turning: true, sleeping: false, iterations: 4, continuous: false, length_unit: 0.5,
+  };
+
+  function world(scene, chosen, hear) {
+    const { dt, restitution } = scene;
+    const space = new RAPIER.World(vector(scene.gravity));
+    space.timestep = dt;
+    if (chosen.matched) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
+    if (chosen.iterations !== null) space.numSolverIterations = chosen.iterations;
+    const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
+    const friction = chosen.friction === null ? stated : chosen.friction;
+    const index = new Map();
+    const add = (shape, body, i) => {
+      shape.setRestitution(restitution).setDensity(0);
+      if (friction !== null) shape.setFriction(friction);
+      if (hear) shape.setActiveEvents(RAPIER.ActiveEvents.CONTACT_FORCE_EVENTS).setContactForceEventThreshold(0);
+      const collider = space.createCollider(shape, body);
+      index.set(collider.handle, i);
+      return collider;
+    };
+    const bodies = scene.position.map(([x, y], i) => {
+      const kind = scene.fixed[i] ? RAPIER.RigidBodyDesc.fixed() : RAPIER.RigidBodyDesc.dynamic();
+      kind.setTranslation(x, y).setRotation(scene.angle[i]).setCanSleep(chosen.sleeping).setCcdEnabled(chosen.continuous);
+      if (!scene.fixed[i]) {
+        kind.setLinvel(...scene.velocity[i]).setAngvel(scene.spin[i]);
+        kind.setAdditionalMassProperties(scene.mass[i], { x: 0, y: 0 }, chosen.turning ? scene.inertia[i] : 0);
+      }
+      return space.createRigidBody(kind);
+    });
+    const colliders = bodies.map((body, i) => add(RAPIER.ColliderDesc.ball(scene.radius[i]), body, i));
+    scene.walls.forEach(([start, end], w) => {
+      const body = space.createRigidBody(RAPIER.RigidBodyDesc.fixed());
+      add(RAPIER.ColliderDesc.segment(vector(start), vector(end)), body, -1 - w);
+    });
+    const queue = hear ? new RAPIER.EventQueue(true) : undefined;
+    // What it cuts speeds and spins at, found by the probes: 400 length units a second, an eighth of a turn a step.
+    const caps = { speed: 400 * space.lengthUnit, spin: Math.PI / 4 / dt };
+    function mustNotBeCut(what, value, unit) {
+      // float32 leaves what was cut a little below the cap
+      if (chosen.matched && Math.abs(value) > caps[what] * (1 - 1e-5)) {
+        throw new Refused(`a disk reaches a ${what} of ${caps[what].toPrecision(6)} ${unit}, where Rapier cuts it at this dt`);
+      }
+    }
+    const pushed = new Set();
+    // It keeps cos and sin: the angle is the one nearest to where the mean spin since the last reading would have
+    // brought it.
+    const turned = scene.angle.map((angle, i) => ({ angle, spin: scene.spin[i], step: 0 }));
+    let steps = 0;
+    function angle(i) {
+      const before = turned[i], spin = bodies[i].angvel(), raw = bodies[i].rotation();
+      const expected = before.angle + (before.spin + spin) / 2 * (steps - before.step) * dt;
+      turned[i] = { angle: raw + 2 * Math.PI * Math.round((expected - raw) / (2 * Math.PI)), spin, step: steps };
+      return turned[i].angle;
+    }
+    return {
+      step() {
+        space.step(queue);
+        if (hear) {
+          queue.drainContactForceEvents((event) => {
+            hear(index.get(event.collider1()), index.get(event.collider2()), event.totalForceMagnitude() * dt);
+          });
+        }
+        for (const i of pushed) {
+          bodies[i].resetForces(true);
+          bodies[i].resetTorques(true);
+        }
+        pushed.clear();
+        steps++;
+      },
+      force(i, x, y, torque) {
+        bodies[i].addForce({ x, y }, true);
+        bodies[i].addTorque(torque, true);
+        pushed.add(i);
+      },
+      read(i) {
+        const { x, y } = bodies[i].translation(), v = bodies[i].linvel();
+        mustNotBeCut("speed", Math.hypot(v.x, v.y), "m/s");
+        mustNotBeCut("spin", bodies[i].angvel(), "rad/s");
+        return [x, y, v.x, v.y, angle(i), bodies[i].angvel()];
+      },
+      place: (i, x, y) => bodies[i].setTranslation({ x, y }, true),
+      free() {
+        if (queue) queue.free();
+        space.free();
+      },
+      settings: () => {
+        const p = space.integrationParameters;
+        return [
+          ["length unit in m", chosen.matched ? p.lengthUnit : null, p.lengthUnit],
+          ["allowed linear error in m", null, p.normalizedAllowedLinearError * p.lengthUnit],
+          ["prediction distance in m", null, p.normalizedPredictionDistance * p.lengthUnit],
+          ["speed cap in m/s", null, caps.speed],
+          ["spin cap in rad/s", null, caps.spin],
+          ["solver iterations", chosen.iterations, p.numSolverIterations],
+          ["friction", friction, colliders[0].friction()],
+          ["restitution", restitution, colliders[0].restitution()],
+          ["sleeping", chosen.matched ? chosen.sleeping : null, "not readable"],
+          ["continuous collision", chosen.matched ? chosen.continuous : null, bodies.some((body) => body.isCcdEnabled())],
+        ];
+      },
+    };
+  }
+
+  const vector = ([x, y]) => ({ x, y });
+  RAPIER.init().then(() => play({ shipped, matched, world }));
+}

