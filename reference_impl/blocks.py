@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from reference_impl import coulomb, exercise, lesson, neighbours, ordered
-from reference_impl.compiled import compiled, pasted
+from reference_impl.compiled import compiled, inlined
 from reference_impl.state import Disks, World
 
 
@@ -27,7 +27,7 @@ def world_block(world: World, dt: float) -> np.ndarray:
     return np.concatenate([free, world.gravity, world.low, world.high, world.walls.reshape(-1)])
 
 
-@pasted
+@inlined
 def disks_of(block) -> Disks:  # type: ignore[no-untyped-def]
     """The disks of a block, as views: writing to them writes to the block."""
     n = len(block) // 14
@@ -45,7 +45,7 @@ def disks_of(block) -> Disks:  # type: ignore[no-untyped-def]
     )
 
 
-@pasted
+@inlined
 def world_of(block) -> World:  # type: ignore[no-untyped-def]
     """The world that a block holds."""
     return World(

@@ -7,11 +7,11 @@ source runs as plain Python and gives the same bits.
 
 from math import inf, sqrt
 
-from reference_impl.compiled import compiled, kernel, pasted
+from reference_impl.compiled import compiled, inlined, kernel
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 
-@pasted
+@inlined
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_impl import exercise
-from reference_impl.compiled import compiled, kernel, merged, pasted
+from reference_impl.compiled import compiled, inlined, kernel, pasted
 from reference_impl.exercise import (
     collide,
     collide_wall,
@@ -51,7 +51,7 @@ class Kicks(NamedTuple):
     strongest: float  # m: no disk moves by more in a step than it did in the one before
 
 
-@merged
+@pasted
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """As `exercise.advance`, to the bit."""
     if len(disks.radius) * count < WORTH:
@@ -61,7 +61,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return collisions
 
 
-@merged
+@pasted
 def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions: list) -> None:
     """Advance by near pairs, however few the disks and steps are."""
     kicks, k = kicks_of(disks, world, dt), 0
@@ -177,7 +177,7 @@ def turn(disks: Disks, kicks: Kicks, dt: float, count: int) -> None:
                 angle[i] += spin[i] * dt
 
 
-@pasted
+@inlined
 def collide_near(
     disks: Disks,
     world: World,
@@ -258,7 +258,7 @@ def collide_from(disks: Disks, world: World, k: int, collisions: list, i: int, j
                 collisions.append((k, a, b, impulse))
 
 
-@pasted
+@inlined
 def collide_near_walls(
     disks: Disks, world: World, dt: float, near: NeighbourList, k: int, collisions: list
 ) -> None:
@@ -291,7 +291,7 @@ def next_touching_wall(disks: Disks, world: World, near: NeighbourList, b: int) 
     return b
 
 
-@pasted
+@inlined
 def wrap_near(disks: Disks, world: World, near: NeighbourList) -> None:
     """Wrap the disks that are near an edge; all, where the list does not hold, as it does not with
     a disk that was set onto the opposite edge."""

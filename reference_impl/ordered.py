@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled, kernel, merged, pasted
+from reference_impl.compiled import compiled, inlined, kernel, pasted
 from reference_impl.neighbour_list import (
     EDGES,
     PAIRS,
@@ -51,7 +51,7 @@ class Accelerations(NamedTuple):
     strongest: float  # m/s2, of the steady ones
 
 
-@merged
+@pasted
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
@@ -151,7 +151,7 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
                 spin[i] += turning[i] * dt
 
 
-@pasted
+@inlined
 def resolve(  # type: ignore[no-untyped-def]
     disks: Disks,
     world: World,

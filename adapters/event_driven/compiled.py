@@ -1,16 +1,17 @@
 """How the event engine's kernels are compiled: by numba, cached on disk; plain Python with
-NUMBA_DISABLE_JIT=1.
-
-The cache of a file does not see that a file it imports has changed: after editing a kernel, remove
-`__pycache__`.
-"""
+NUMBA_DISABLE_JIT=1."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from numba import njit
+
+from reference_impl.compiled import forget_stale
+
+forget_stale(Path(__file__).parent)
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 

@@ -26,7 +26,7 @@ from adapters.mechanisms.contacts import (
     rub,
     turn,
 )
-from reference_impl.compiled import compiled, merged
+from reference_impl.compiled import compiled, pasted
 from reference_impl.coulomb import collide, collide_wall
 from reference_impl.exercise import touching, touching_wall, wrap
 from reference_impl.state import Disks, World
@@ -117,7 +117,7 @@ def advance(
     return collisions
 
 
-@merged
+@pasted
 def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of functions
     stage: int,
     disks: Disks,

@@ -6,13 +6,17 @@ that of the moment it was found. Compiled by numba, as `exercise` is.
 """
 
 from math import cos, inf
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled
+from reference_impl import compiled as compiling
+from reference_impl.compiled import compiled, forget_stale
 from reference_impl.exercise import direction, move, nearest_point
 from reference_impl.state import Disks, World
+
+forget_stale(Path(__file__).parent, Path(compiling.__file__).parent)
 
 CONTACT = np.dtype(
     [

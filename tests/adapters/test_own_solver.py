@@ -224,13 +224,17 @@ BREAKING = {
     "state_in_integrate.js": "load_forgets",
     "typo_in_c.py": "stays_finite",  # it throws where two collide
 }
+IN_THE_GATE = ("dt_squared.js", "state_in_a_list.py")  # one of each kind
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "mutant",
-    [m for m in MUTANTS if m.name in (*WRONG_PHYSICS, *BREAKING)],
-    ids=lambda mutant: mutant.name,
+    [
+        pytest.param(m, marks=[] if m.name in IN_THE_GATE else [pytest.mark.long], id=m.name)
+        for m in MUTANTS
+        if m.name in (*WRONG_PHYSICS, *BREAKING)
+    ],
 )
 def test_only_a_file_that_breaks_the_protocol_is_not_scored(tmp_path: Path, mutant: Mutant):
     """By all probes: wrong physics misses some of them and is scored."""

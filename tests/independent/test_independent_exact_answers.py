@@ -94,8 +94,8 @@ def compared(scenario: Scenario, motion: Motion, record: TruthRecord) -> Compare
 
 @pytest.mark.parametrize(
     "seeds",
-    [range(0, SCENES, 4), pytest.param(range(SCENES), marks=pytest.mark.long)],
-    ids=["a fourth", "all"],
+    [range(0, SCENES, 8), pytest.param(range(SCENES), marks=pytest.mark.long)],
+    ids=["an eighth", "all"],
 )
 def test_the_oracle_gives_the_events_and_positions_of_a_motion_that_asks_all_pairs(
     record_property: Record, seeds: range

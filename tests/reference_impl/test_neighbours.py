@@ -3,6 +3,8 @@ the scene."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import event, given, settings
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from reference_impl import exercise, neighbours
+from reference_impl.compiled import forget_stale
 from reference_impl.neighbour_list import (
     FEW,
     HALF_SKIN,
@@ -23,6 +26,8 @@ from reference_impl.neighbour_list import (
 )
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from tests.adapters.event_driven.gases import boxed_gas
+
+forget_stale(Path(__file__).parent, Path(neighbours.__file__).parent)
 
 steady = settings(derandomize=True)
 DT = 1 / 60

@@ -71,9 +71,9 @@ def name_of(row: Kept) -> str:
 
 
 def some_of(rows: list[Kept]) -> list[Any]:
-    """Every tenth is for the gate, the others are for the long run."""
+    """Every twentieth is for the gate, the others are for the long run."""
     return [
-        pytest.param(row, marks=[pytest.mark.long] if k % 10 else []) for k, row in enumerate(rows)
+        pytest.param(row, marks=[pytest.mark.long] if k % 20 else []) for k, row in enumerate(rows)
     ]
 
 
