@@ -305,6 +305,7 @@ def test_an_engine_is_named_in_its_files_and_its_row_and_else_only_in_texts_abou
     """The youngest engine, for all: what holds for it holds for the next one."""
     # which engines a lesson shows
     about_it = {"reports/lessons/mechanisms/substeps.py", "reports/lessons/thrust.py"}
+    about_it |= {f"reports/lessons/friction/{name}.py" for name in ("bounce", "cone", "rolling")}
     about_it |= {
         "reports/stability/reasons.py",
         "reports/stability/ablations.py",

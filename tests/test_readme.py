@@ -43,7 +43,7 @@ LINES = list(
 )
 CLUSTER = [line for line in LINES if "--extra cluster" in line]
 MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
-# ten seconds each, or pytest in a process of its own
+# seconds each, ten for the long ones
 MARKS = {
     " advise ": pytest.mark.long,
     " stability my_scene.toml ": pytest.mark.long,
@@ -51,7 +51,8 @@ MARKS = {
     " stability ": pytest.mark.slow,
     " speed ": pytest.mark.slow,
     " --solver ": pytest.mark.slow,
-    " run head_on_equal_e09 --engine Exercise.js ": pytest.mark.slow,
+    " run ": pytest.mark.slow,
+    " check ": pytest.mark.slow,
 }
 COMMANDS = [
     pytest.param(line, marks=[mark for words, mark in MARKS.items() if words in line][:1])

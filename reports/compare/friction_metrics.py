@@ -52,7 +52,7 @@ def tangential_velocity_error(view: View) -> Value | None:
 
 def slip_at_rest(view: View) -> Value | None:
     """Largest speed with which surfaces slide on each other where in the exact answer a disk rolls
-    or stands on a wall, from three steps after it began to."""
+    or stands on a wall, from three steps after it began to; there it is none but for rounding."""
     scenario, truth = view.scenario, view.other
     if not scenario.scene.friction or truth is None or view.jumps is None:
         return None
@@ -62,7 +62,10 @@ def slip_at_rest(view: View) -> Value | None:
         for wall in range(len(scenario.scene.walls)):
             rests = rolling(truth, scenario.scene, int(disk), wall)
             held = rests & np.append(np.zeros(late, bool), rests)[: len(rests)]
-            slip = np.where(held, np.abs(slip_of(view.played, scenario.scene, int(disk), wall)), 0)
+            played, exact = (
+                slip_of(motion, scenario.scene, int(disk), wall) for motion in (view.played, truth)
+            )
+            slip = np.where(held, np.abs(played - exact), 0)
             k = int(np.argmax(slip))
             found |= bool(held.any())
             if slip[k] > worst.value:

@@ -84,7 +84,9 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
         "ticktext": [answer.title.replace(" ", "<br>") for answer in answers],
         "range": [-0.5, len(answers) - 0.5],
     }
-    figure = figure_of(lines, axis, "error (radii)", mode="markers", height=340)
+    figure = figure_of(
+        lines, axis, "error (radii)", markers=len(answers), mode="markers", height=340
+    )
     return Drawing(
         "Error by situation",
         "A mark is an engine: the median over the scenes of its largest position error at the"

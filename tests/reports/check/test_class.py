@@ -15,6 +15,8 @@ from reports.check.verdict import check_file, named
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
 
+pytestmark = pytest.mark.slow  # each checks a class of files
+
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
 

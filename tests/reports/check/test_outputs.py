@@ -27,6 +27,8 @@ from tests.reports.page.browsing import opened, overhang
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, on_terminal, process
 from tests.solvers.mutants import CORRECT, MUTANTS
 
+pytestmark = pytest.mark.slow  # each checks whole files
+
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 WRONG = next(mutant for mutant in MUTANTS if mutant.name == "mass_sum.js")
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from reports.run.shares import read_share
 
 from adapters.engines import ENGINES
 from adapters.play import play
@@ -21,6 +20,7 @@ from reports.page import overview
 from reports.page.charts import CHARTS
 from reports.page.findings import findings
 from reports.run.diff import changed_numbers
+from reports.run.scene_tables import read_scene_table
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
@@ -205,7 +205,7 @@ def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp
     tables = []
     for each in (whole, lost(whole, NAMES[0], "velocity_rms")):
         each.table.to_csv(tmp_path / "share.csv", index=False)
-        read_share((tmp_path / "share.csv").read_bytes())
+        read_scene_table((tmp_path / "share.csv").read_bytes())
         tables.append(pd.read_csv(tmp_path / "share.csv", dtype=str, keep_default_na=False))
     changes, _ = changed_numbers(*tables, set())
     back, _ = changed_numbers(*tables[::-1], set())

@@ -34,6 +34,8 @@ from tests.reports.page.browsing import opened, served
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 from tests.solvers.mutants import MUTANTS
 
+pytestmark = pytest.mark.slow  # each starts solvers that fail
+
 SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.js"
 # Appended to a right solver: from the given call of `integrate` on it does this. A frame of 21
 # disks has 336 calls.

@@ -19,6 +19,8 @@ from reports.run.timing_pass import COLUMNS
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.small import write_small
 
+pytestmark = pytest.mark.slow  # pages of their own in Chromium
+
 QUIET, LOUD = noise_of([0.97, 1.0, 1.02]), noise_of([0.7, 1.0, 1.3])
 STEPS = (0.02, 0.01, 0.005)
 FAST, NEAR, STUCK = "reference:exercise", "pymunk:matched", "box2d:shipped"

@@ -19,6 +19,8 @@ from tests.reports.page.browsing import opened
 from tests.reports.page.small import HEAD_ON, ORBIT, PLAYED, write_small
 from tests.reports.terminal.command_line import crosscheck
 
+pytestmark = pytest.mark.slow  # pages of their own in Chromium
+
 A4 = {"width": 703, "height": 1032}  # px within margins of 12 mm, at 96 px an inch
 UNPRINTED = "removeEventListener('beforeprint', drawPaper)"
 
@@ -243,5 +245,5 @@ def test_scenes_on_paper_are_asked_for_after_print(tmp_path: Path):
     assert one.count('class="scenario half-page"') == 1
     assert [each.returncode for each in refused] == [2, 2, 2]
     assert "--print no_such: not in out, which has free_fall, near_miss" in refused[0].stderr
-    assert "named after --print" in refused[1].stderr
+    assert "after --print" in refused[1].stderr
     assert "name the scenes" in refused[2].stderr

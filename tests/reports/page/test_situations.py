@@ -20,7 +20,7 @@ from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
 from reports.page.page_tables import summaries
-from reports.page.pooled import scores
+from reports.page.pooled import by_situation, scores
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
 from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of
 from reports.run.timing import noise_of
@@ -180,6 +180,30 @@ def test_findings_and_summary_have_one_median(comparisons: list[Comparison]):
 
     assert {name: rows[name][0].value for name in names} == off.median().to_dict()
     assert rows["box2d_v3:shipped"][0].worst == "no result"
+
+
+@pytest.mark.slow
+def test_no_mark_is_left_out_however_many_situations_there_are(
+    comparisons: list[Comparison], browser: Browser
+):
+    """Every number is drawn, also of more situations than the marks that `figure_of` puts on a line
+    unless told otherwise. The control: with that many, plotly leaves out marks."""
+    found = scores(comparisons)
+    rows = situations.answers(found[found.middle], situated(comparisons), set())
+    figure = by_situation(found, [rows[-1]] * 8).figure
+    assert figure is not None
+    numbers = int(sum(np.isfinite(np.array(trace.y, float)).sum() for trace in figure.data))
+
+    def drawn() -> int:
+        page = browser.new_page()
+        page.set_content(figure.to_html(include_plotlyjs=True))
+        count = page.locator(".scatterlayer .point").count()
+        page.close()
+        return count
+
+    assert drawn() == numbers
+    figure.update_traces(marker_maxdisplayed=7)
+    assert drawn() < numbers
 
 
 MARKS = {name: look(*name.split(":")) for name in (*ENGINES, "reference:neighbours")}

@@ -22,6 +22,8 @@ from scenarios.truth.cache import is_said
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
+pytestmark = pytest.mark.slow  # each plays a run twice
+
 
 def with_arrays(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
     """The file with other arrays, all else as it is: its own sums fit."""

@@ -38,6 +38,8 @@ from tests.reports.run.sweeps import SMALL, lines, undisturbed
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
+pytestmark = pytest.mark.slow  # each plays a run with processes of its own
+
 RIGHT = next(path for path in CORRECT if path.name == "plain.py")
 SCENE = "head_on_equal_e09"
 

@@ -12,6 +12,8 @@ from reports.run.journal import Journal
 from tests.reports.run.sweeps import SMALL, assert_nothing_lost, broken_off, lines, undisturbed
 from tests.reports.terminal.command_line import crosscheck
 
+pytestmark = pytest.mark.slow  # each plays a run twice
+
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:

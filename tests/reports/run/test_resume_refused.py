@@ -12,6 +12,8 @@ import pytest
 from tests.reports.terminal.command_line import crosscheck
 from tests.reports.terminal.test_strangers import all_of
 
+pytestmark = pytest.mark.slow  # each goes on with a run of its own
+
 SCENE = (Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml").read_text()
 SOLVER = Path(__file__).parents[3] / "tests" / "solvers" / "correct" / "plain.py"
 PLAYED = (

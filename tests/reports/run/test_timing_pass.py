@@ -27,6 +27,8 @@ from reports.run.timing_pass import (
 from scenarios.catalogue import SCENARIOS, scenario
 from tests.reports.terminal.command_line import crosscheck
 
+pytestmark = pytest.mark.slow  # each times a run
+
 RUN = ("near_miss", "--engine", "pymunk", "--out", "out", "--workers", "1")
 
 

@@ -62,7 +62,7 @@ def test_the_number_of_phases_behind_a_limit_is_said():
     page = (Path(__file__).parents[3] / "reports/stability/stability.html.j2").read_text("utf-8")
     limit = FOUND["tunnelling_head_on", "box2d_v3:matched"]
 
-    assert f"It is true of the phases that were played, {most} at most" in TEXT
+    assert f"It holds for the phases that were played, {most} at most" in TEXT
     assert most == CASES["tunnelling_head_on"].runs == CASES["near_miss"].runs
     assert "in fewer than one of %d may not have been seen' % (case.runs, case.runs)" in page
     assert f"a step displacement of {limit.works_at:.4g} radii" in " ".join(TEXT.split())

@@ -29,7 +29,10 @@ from tests.reports.terminal.command_line import CROSSCHECK
 from tests.solvers.mutants import CORRECT
 
 # what they import as they start is asked here
-pytestmark = pytest.mark.usefixtures("fresh_workers")
+pytestmark = [
+    pytest.mark.usefixtures("fresh_workers"),
+    pytest.mark.slow,  # each starts programs of its own
+]
 ROOT = Path(__file__).parents[3]
 OURS = ("adapters", "reference_impl", "reports", "scenarios", "tests")
 LIBRARIES = (

@@ -25,7 +25,10 @@ from tests.reports.run.test_kills import alive
 from tests.reports.terminal.command_line import crosscheck, wait_for
 from tests.reports.terminal.stopping import AT_MOST, Command, assert_ended, busyness
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for what is left in /proc")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="looks for what is left in /proc"),
+    pytest.mark.slow,  # each waits for a program to end
+]
 
 SOLVERS = Path(__file__).parents[3] / "tests" / "solvers" / "correct"
 TRUTH, ANSWER = "scenarios.truth.exact:OracleTruth.record", "scenarios.truth.exact:computed"

@@ -31,6 +31,8 @@ from reports.terminal.exits import FolderTaken
 from reports.terminal.foreign_text import put_text, whole
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
+pytestmark = pytest.mark.slow  # each is a command with a folder of its own
+
 SCENE = (Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml").read_text()
 ONE = ("--engine", "reference:exercise", "--dt", "0.02")
 AGAIN = ("run", "my.toml", *ONE, "--out", "out")
