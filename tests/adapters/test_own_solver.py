@@ -107,6 +107,7 @@ IDLE = {
 UNCLOSED = {"projectObjects();\n}": "projectObjects();"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "scene", "status", "reason"),
     [
@@ -152,6 +153,7 @@ WATCHED = (  # a mutant, and what its collisions would be taken for if they told
 LACKING = {"integrate_missing.js", "integrate_missing.py"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mutant",
     [
@@ -196,6 +198,7 @@ def changed(folder: Path, changes: dict[str, str]) -> Path:
     return folder / "Exercise.js"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "probe", "verdict", "note"),
     [

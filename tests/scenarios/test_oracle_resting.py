@@ -188,6 +188,7 @@ def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
     assert errors[1] <= errors[0] + 1e-3
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10**6), restitution=st.sampled_from([0.3, 0.5, 0.7]))
 @settings(max_examples=8, deadline=None)
 def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(

@@ -151,6 +151,7 @@ def compare_all(seeds):
         compare(seed)
 
 
+@pytest.mark.slow
 @settings(derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_a_brute_force_algorithm_finds_the_same_collisions(seed):

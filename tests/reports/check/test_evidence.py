@@ -49,6 +49,7 @@ def begin_with(one: FileCheck) -> CheckRow:
     return one.findings[0]
 
 
+@pytest.mark.slow
 def test_collisions_before_integration_are_a_fault_of_the_step(checks: dict[str, FileCheck]):
     """The template integrates first; with it the same pair collides in that step."""
     row = begin_with(checks["collisions_first.js"])
@@ -261,6 +262,7 @@ def consequences(tmp_path_factory: pytest.TempPathFactory) -> dict[str, FileChec
     return {path.name: one for path, one in judged(paths).items()}
 
 
+@pytest.mark.slow
 def test_what_depends_on_who_is_a_is_a_fault_of_the_part_that_makes_it_so(
     consequences: dict[str, FileCheck],
 ):

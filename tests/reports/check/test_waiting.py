@@ -54,6 +54,7 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
             assert solver.evaluated("code", 0.2, may_repeat) == answer
 
 
+@pytest.mark.slow
 def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Path):
     """V8 stops the loop after its limit; nobody is there to hear it, and no process is left
     behind."""

@@ -92,6 +92,7 @@ def median_moved(errors: dict[tuple[str, int], Array]) -> float:
 STEPPING = ("reference:exercise", "pymunk:shipped", "box2d_v3:shipped")
 
 
+@pytest.mark.slow
 def test_no_one_scene_is_the_pooled_curve():
     """Of three engines, the shipped ones being those whose errors are the farthest apart."""
     errors = errors_of(QUICK.scenes, STEPPING)

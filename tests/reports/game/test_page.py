@@ -94,6 +94,7 @@ def saved(page: Page, folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_keys_held_and_released_move_the_ship(page: Page):
     """W held for 64 frames, then a turn by A: x = a t2 / 2 + v t, angle = t2 / 2 (0.25 m/s2, 1
     rad/s2)."""

@@ -76,6 +76,7 @@ def exit_of(before: Path, after: Path) -> object:
     return left.value.code
 
 
+@pytest.mark.slow
 def test_the_numbers_do_not_depend_on_workers_or_order(
     before: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -41,6 +41,7 @@ def test_a_full_disk_is_one_clear_message_and_the_run_goes_on_when_there_is_room
         assert_nothing_lost(disk / "out", small)
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_one_clear_message(small: Path, tmp_path: Path):
     """A tmpfs that is mounted read-only: exit 2, also for a report there."""
     with mounted(tmp_path / "disk", "size=40m") as disk:

@@ -41,6 +41,7 @@ def journal_of(made: Path, to: Path) -> Path:
     return to / "out.part" / JOURNAL
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("had", "asked", "resume"),
     [

@@ -61,6 +61,7 @@ def silent(_: str) -> None:
     """Nobody listens."""
 
 
+@pytest.mark.slow
 def test_all_is_compared_while_it_is_played(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """When the last cell has ended every scene table is there: the tables are put together, and no
     worker is asked."""

@@ -72,6 +72,7 @@ ONE_TEAR = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tear", TEARS)
 def test_a_torn_trajectory_is_worse_for_diff_and_named(whole: Path, torn: Path, tear: str):
     """Exit 1 with the file's name, whichever of the two folders it is in; the run as it was

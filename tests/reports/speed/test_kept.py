@@ -113,6 +113,7 @@ def test_a_log_gets_a_line_now_and_then(
     assert capsys.readouterr().err.count(" of 2, ") == lines
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

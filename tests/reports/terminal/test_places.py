@@ -40,6 +40,7 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
         assert (kept.write(b"four"), kept.fault) == (4, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "code", "said"),
     [
