@@ -180,7 +180,10 @@ def what_is_kept(out: Path) -> str:
     part = part_of(out)
     if not part.exists() and (out / JOURNAL).exists():
         return f"All is done: {out}"
-    ended = len(Archive.read(part).records) if (part / JOURNAL).exists() else 0
+    journal = part / JOURNAL
+    # it is empty until the copies of the scenes are written
+    begun = journal.exists() and journal.stat().st_size > 0
+    ended = len(Archive.read(part).records) if begun else 0
     if not ended:
         return "Nothing was played yet."
     return (

@@ -25,7 +25,9 @@ def game_page(
     `file`: the flight it shows again; `mark`: its server's; `said`: engine -> what `check` says of
     its file.
     """
-    rows = {name: ENGINES[name] for name in dict.fromkeys([*engines, *ENGINES])}
+    # in space there is no friction, and who adds it gives the bits of another engine
+    offered = [name for name, row in ENGINES.items() if not row.adds_friction]
+    rows = {name: ENGINES[name] for name in dict.fromkeys([*engines, *offered])}
     return render(
         "game/game.html.j2",
         generator="crosscheck play",

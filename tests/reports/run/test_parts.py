@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.folders import RUN, begun
+from reports.commands.run import what_is_kept
+from reports.run.folders import RUN, begun, part_of
 from reports.run.journal import JOURNAL
 from tests.reports.terminal.command_line import crosscheck
 
@@ -145,3 +146,16 @@ def test_a_header_without_what_it_should_have_is_reported(parts: dict[str, Path]
 
     assert done.returncode == 2
     assert "line 1: header.versions: missing" in done.stderr
+
+
+def test_a_run_that_ends_before_its_header_is_written_has_played_nothing(tmp_path: Path):
+    """Its journal is there, and empty; with a line that is none it is not taken for empty."""
+    part = part_of(tmp_path / "out")
+    part.mkdir()
+    (part / JOURNAL).touch()
+
+    assert what_is_kept(tmp_path / "out") == "Nothing was played yet."
+
+    (part / JOURNAL).write_text("none\n")
+    with pytest.raises(ValueError, match="line 1"):
+        what_is_kept(tmp_path / "out")

@@ -128,7 +128,7 @@ def test_advice_names_those_that_keep_the_error_and_those_that_do_not(tmp_path: 
     assert [one["engine"] for one in advice["cheapest_first"]] == ["reference:ordered"]
     assert all(one["error"] <= 0.001 for one in advice["cheapest_first"])
     short = {one["engine"]: one for one in advice["not_within"]}
-    hand_written = {f"reference:{name}" for name in ("exercise", "neighbours", "lesson")}
+    hand_written = {f"reference:{name}" for name in ("exercise", "neighbours", "lesson", "coulomb")}
     assert set(short) == {*hand_written, "pymunk:shipped"}
     assert all(one["error"] > 0.001 and one["why"] for one in short.values())
 
