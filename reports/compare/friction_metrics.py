@@ -15,7 +15,7 @@ from reports.compare import laws, scales, violations
 from reports.compare.delays import WINDOW, collision_free
 from reports.compare.faces import SAME, interval
 from reports.compare.view import Value, View, not_judged
-from scenarios.model import Array, Scene, Trajectory
+from scenarios.model import Array, Scenario, Scene, Trajectory
 
 ROLLS = 1e-9  # radii, and m/s over the largest speed: the bound of the exact answers
 # of the slip at first: less is rolling, also of an engine whose lever arm is off by 2 %
@@ -29,14 +29,13 @@ def tangential_velocity_error(view: View) -> Value | None:
     scenario, truth = view.scenario, view.other
     if truth is None or not rubs(view):
         return None
-    assert scenario.truth is not None
     free = collision_free(truth, view.dt)
     worst, carried = Value(0.0), 0
     met = truth.collisions
-    for t, i, j, impulse in zip(met.t, met.i, met.j, met.impulse):
+    along = tangents(truth, scenario)
+    for t, i, j, impulse, tangent in zip(met.t, met.i, met.j, met.impulse, along):
         if not impulse:  # a contact that lasts
             continue
-        tangent = tangent_at(scenario.truth(np.array([t])), scenario.scene, int(i), int(j))
         k = int(np.searchsorted(truth.t, t + WINDOW * view.dt, "right"))
         for disk in (int(i), int(j)):
             if disk < 0 or scenario.scene.static[disk] or k >= len(truth) or not free[k, disk]:
@@ -95,13 +94,23 @@ class Apart(NamedTuple):
     after: int
 
 
-def apart(view: View) -> list[Apart]:
+@laws.once
+def tangents(truth: Trajectory, scenario: Scenario) -> Array:
+    """(m, 2) of length 1: the direction along the surfaces in each collision of the truth."""
+    assert scenario.truth is not None
+    met = truth.collisions
+    found = [
+        tangent_at(scenario.truth(np.array([t])), scenario.scene, int(i), int(j))
+        for t, i, j in zip(met.t, met.i, met.j)
+    ]
+    return np.array(found).reshape(-1, 2)
+
+
+@laws.once
+def apart(truth: Trajectory, scenario: Scenario, dt: float) -> list[Apart]:
     """The collisions whose effect two samples show, in order of time; none of a disk that lies on
     something, on which friction acts between collisions as well."""
-    scenario, truth = view.scenario, view.other
-    assert truth is not None
-    assert scenario.truth is not None
-    met, free = truth.collisions, collision_free(truth, view.dt)
+    met, free, along = truth.collisions, collision_free(truth, dt), tangents(truth, scenario)
     found: list[Apart] = []
     for row, (t, i, j) in enumerate(zip(met.t, met.i, met.j)):
         disks = [int(disk) for disk in (i, j) if disk >= 0 and not scenario.scene.static[disk]]
@@ -116,15 +125,10 @@ def apart(view: View) -> list[Apart]:
         lies = theirs & (met.impulse == 0) & (met.t < truth.t[after])
         if lies.any() or np.flatnonzero(between)[0] < row:
             continue
-        contact = scenario.truth(np.array([t]))
-        tangents = [
-            tangent_at(contact, scenario.scene, int(met.i[k]), int(met.j[k]))
-            for k in np.flatnonzero(between)
-        ]
         # a wall that is there twice, or in two pieces, is one
         together = (np.abs(met.t[between] - t) <= SAME * interval(truth)).all()
-        if together and all(abs(laws.cross(tangents[0], other)) < ROLLS for other in tangents):
-            found.append(Apart(disks, tangents[0], before, after))
+        if together and (abs(laws.cross(along[row], along[between])) < ROLLS).all():
+            found.append(Apart(disks, along[row], before, after))
     return found
 
 
@@ -136,7 +140,7 @@ def friction_impulse_error(view: View) -> Value | None:
         return None
     worst, judged = Value(0.0), 0
     weight = laws.moving_inertia(scene) / scene.radius
-    for disks, _, before, after in apart(view):
+    for disks, _, before, after in apart(truth, view.scenario, view.dt):
         for disk in disks:
             turned, ought = (
                 one.angular_velocity[after, disk] - one.angular_velocity[before, disk]
@@ -176,7 +180,7 @@ def loss_error(view: View, of_friction: bool) -> Value | None:
     losses = np.array(
         [
             [lost(one, scenario.scene, each, of_friction) for one in (view.played, truth)]
-            for each in apart(view)
+            for each in apart(truth, scenario, view.dt)
         ]
     ).reshape(-1, 2)
     if not len(losses):

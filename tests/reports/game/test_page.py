@@ -311,7 +311,7 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
 
 
 def test_the_table_is_on_the_first_screen(first_frame: Page):
-    """All ten engines at 1280 x 900."""
+    """All engines at 1280 x 900."""
     bottom = first_frame.evaluate(
         "document.querySelector('.engines').getBoundingClientRect().bottom"
     )
