@@ -16,6 +16,8 @@ from scenarios.model import Array, Scene, Trajectory
 
 Law = TypeVar("Law", bound=Callable[..., Any])
 
+ON_THE_WALL = 1e-9  # radii: more than rounding, in the coordinates of any scene that is measured
+
 
 def once(law: Law) -> Law:
     """The law, worked out once for the same arguments and forgotten with the first of them.
@@ -137,14 +139,18 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
 
 
 def through_walls(trajectory: Trajectory, scene: Scene) -> np.ndarray:
-    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight
-    line."""
+    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line;
+    a sample on the wall itself tells no side, and the one before it counts."""
     through = np.zeros(scene.n, dtype=bool)
-    start, end = trajectory.position[:-1], trajectory.position[1:]
+    x, number = trajectory.position, np.arange(len(trajectory))[:, None]
     for a, b in scene.walls:
-        sides = cross(start - a, b - a) * cross(end - a, b - a)
+        side = cross(x - a, b - a)
+        tells = np.abs(side) > ON_THE_WALL * scene.radius * lengths(b - a)
+        last = np.maximum.accumulate(np.where(tells, number, 0), axis=0)[:-1]
+        start, end = np.take_along_axis(x, last[..., None], axis=0), x[1:]
+        sides = np.take_along_axis(side, last, axis=0) * side[1:]
         ends = cross(a - start, end - start) * cross(b - start, end - start)
-        through |= ((sides < 0) & (ends < 0)).any(axis=0)
+        through |= ((sides < 0) & tells[1:] & (ends <= 0)).any(axis=0)
     return through
 
 

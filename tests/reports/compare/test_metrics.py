@@ -8,6 +8,7 @@ import pytest
 from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.run import Run
+from reports.compare import laws
 from reports.compare.comparison import compare
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
@@ -15,7 +16,7 @@ from reports.compare.table import COLUMNS
 from reports.compare.view import NOT_JUDGED, View, cut
 from reports.page.findings import findings
 from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scenario, Scene, Thrust
+from scenarios.model import Scenario, Scene, Thrust, Trajectory
 from scenarios.truth.exact import with_oracle
 from tests.adapters.broken_engines import NanAtStep7
 from tests.reports.compare.answers import beside_truth, truth_of
@@ -235,6 +236,38 @@ def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
 
     assert value("disks_through_walls", View(one, one.dt(1), truth)) == 0
     assert value("disks_through_walls", View(one, one.dt(1), away)) == 1
+
+
+@pytest.mark.parametrize(
+    ("heights", "through"),
+    [
+        ([0.3, 0.0, -0.3], True),
+        ([0.3, 1e-17, -0.3], True),
+        ([0.3, -1e-17, 0.0, -0.3], True),
+        ([0.3, 0.0, 0.3], False),
+        ([0.3, -1e-17, 0.3], False),
+        ([0.0, 0.3, 0.4], False),
+    ],
+)
+@pytest.mark.parametrize("x", [0.5, 1.0], ids=["over a piece", "over a joint"])
+def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
+    heights: list[float], through: bool, x: float
+):
+    """A wall in two pieces: rounding decides on which side such a sample is, and of which piece."""
+    wall = [[[-1.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [3.0, 0.0]]]
+    scene = Scene(
+        position=[[x, heights[0]]],
+        velocity=[[0.0, 0.0]],
+        radius=[0.1],
+        mass=[1.0],
+        walls=wall,
+        restitution=1.0,
+    )
+    position = np.array([[[x, height]] for height in heights])
+    still = np.zeros((len(heights), 1))
+    moved = Trajectory(np.arange(len(heights)), position, 0 * position, still, still)
+
+    assert laws.through_walls(moved, scene).tolist() == [through]
 
 
 def test_an_explosion_does_not_make_itself_small():
