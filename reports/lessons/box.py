@@ -48,7 +48,10 @@ def show_box(settings: Settings) -> Shown:
         return np.asarray(moving - each.position @ scene.gravity @ scene.mass)
 
     facts = [
-        ("collisions of " + run.name, str(len(run.trajectory.collisions)))
+        (
+            f"contact impulses of {run.name}, step by step, in {number(scenario.duration)} s",
+            str(len(run.trajectory.collisions)),
+        )
         for run in shown.runs
         if run.trajectory
     ]

@@ -2,6 +2,7 @@
 // Line charts as SVG: two axes, a grid, and the curves of the engines in their colours.
 
 const SIZE = { width: 520, height: 290, left: 62, right: 12, top: 10, bottom: 42 };
+const LETTER = 7.4;  // of an axis, at most
 const EMPTY = 1e-16;  // what is 0 stands at the foot of a logarithmic axis
 const svg = (name, attributes, text) => {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -17,6 +18,7 @@ class Axis {
     let low = Math.min(...finite), high = Math.max(...finite);
     if (!finite.length) [low, high] = log ? [EMPTY, 1] : [0, 1];
     if (log) [low, high] = [Math.log10(low), Math.log10(high)];
+    this.counts = !log && finite.every(Number.isInteger);
     if (high - low < 1e-12 * Math.max(Math.abs(high), 1)) [low, high] = [low - 0.5, high + 0.5];
     const room = log ? 0.05 * (high - low) : 0.06 * (high - low);
     Object.assign(this, { low: low - room, high: high + room });
@@ -30,7 +32,7 @@ class Axis {
 
   ticks() {
     const span = this.high - this.low;
-    const step = this.log ? Math.max(1, Math.ceil(span / 6)) : niceStep(span / 5);
+    const step = this.log ? Math.max(1, Math.ceil(span / 6)) : Math.max(niceStep(span / 5), this.counts ? 1 : 0);
     const first = Math.ceil(this.low / step - 1e-9) * step;
     const found = [];
     for (let v = first; v <= this.high + 1e-9 * span; v += step) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
@@ -83,12 +85,17 @@ function drawAxes(picture, chart, x, y) {
     picture.append(svg("line", { class: "grid", x1: x.place(value), x2: x.place(value), y1: top, y2: height - bottom }));
     picture.append(svg("text", { class: "axis", x: x.place(value), y: height - bottom + 16, "text-anchor": "middle" }, text));
   }
-  for (const [value, text] of y.ticks()) {
+  const numbers = y.ticks();
+  for (const [value, text] of numbers) {
     picture.append(svg("line", { class: "grid", x1: left, x2: width - right, y1: y.place(value), y2: y.place(value) }));
     picture.append(svg("text", { class: "axis", x: left - 7, y: y.place(value) + 4, "text-anchor": "end" }, text));
   }
   picture.append(svg("text", { class: "axis", x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, chart.x));
-  picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: 13, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
+  // long numbers push the title out to the left, and the picture is as much wider
+  const longest = Math.max(...numbers.map(([, text]) => text.length));
+  const title = Math.min(13, left - 7 - LETTER * longest - 7);
+  picture.setAttribute("viewBox", `${title - 13} 0 ${width + 13 - title} ${height}`);
+  picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: title, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
 }
 
 // A line across.

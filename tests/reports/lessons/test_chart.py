@@ -60,3 +60,36 @@ def test_texts_of_guides_are_apart_and_over_every_line(page: Page):
     for one, other in combinations(boxes, 2):
         assert one[1] <= other[0] or other[1] <= one[0] or one[3] <= other[2] or other[3] <= one[2]
     assert painted == [["stroke", True, True]] * 2
+
+
+@pytest.mark.parametrize(
+    ("values", "whole"), [([0, 1, 2], True), ([1, 2, 3, 4], True), ([0.0, 0.5, 2.0], False)]
+)
+def test_an_axis_of_counts_has_ticks_at_whole_numbers(page: Page, values: list[float], whole: bool):
+    """One of lengths may have halves."""
+    ticks = page.evaluate(f"new Axis({values}, false, 0, 400).ticks().map(([v]) => v)")
+
+    assert all(tick == int(tick) for tick in ticks) is whole
+
+
+@pytest.mark.parametrize("largest", [1.0, 0.00123, 0.0000251, 12345.0])
+def test_the_title_of_an_axis_touches_none_of_its_numbers(page: Page, largest: float):
+    """However long these are; and it stays in the picture."""
+    page.evaluate(
+        "high => document.querySelector('.curves').append(drawChart({title: 'long numbers',"
+        " x: 'time in s', y: 'm', log: '', guides: [],"
+        " curves: [{name: 'truth', x: [0, 1], y: [0, high]}]}))",
+        largest,
+    )
+    picture, title, number = page.evaluate(
+        """() => {
+          const picture = [...document.querySelectorAll('figure svg')].at(-1);
+          const left = (one) => one.getBoundingClientRect().left;
+          const title = [...picture.querySelectorAll('text[transform]')].at(-1);
+          const numbers = [...picture.querySelectorAll('text[text-anchor=end]')];
+          return [left(picture), title.getBoundingClientRect(), Math.min(...numbers.map(left))];
+        }"""
+    )
+
+    assert picture <= title["left"]
+    assert title["right"] < number
