@@ -89,7 +89,7 @@ def test_a_right_solver_flies_as_the_reference_does(
     assert reported[0] == ["", 0.0]
     assert reported[1][0] == ""
     assert reported[1][1] < 1e-9
-    assert who == "Exercise.js:own"
+    assert who == "Exercise.js"
     assert wide <= 0
 
 
