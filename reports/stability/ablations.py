@@ -1,10 +1,10 @@
-"""Which mechanisms of an engine suffice for its limit: the reference with these alone works and
-fails where the engine does.
+"""Which mechanisms of an engine are enough to produce its limit: the reference with only these
+works and fails at the same values as the engine.
 
-What an engine does otherwise than exact flight with end-of-step detection is a table of mechanisms
-(`adapters.mechanisms.table`), each of them to be enabled in
-`adapters.mechanisms.ablated_reference`. An ablation is the reference with some; one that has the
-engine's limit shows the cause.
+`adapters.mechanisms.table` lists what an engine does differently from exact flight with
+end-of-step detection, and `adapters.mechanisms.ablated_reference` can enable each of these
+mechanisms. An ablation is the reference with some of them enabled. An ablation that has the
+engine's limit shows its cause.
 """
 
 from __future__ import annotations
@@ -79,11 +79,11 @@ SENTENCES = (
 
 
 def sufficient_mechanisms(search: Search, limit: Limit) -> str:
-    """The fewest mechanisms with which the reference has the limit, as text; `END_OF_STEP` for none
-    of them; "" if there are none, or no ablation can be played.
+    """The smallest set of mechanisms with which the reference has the limit, as text;
+    `END_OF_STEP` if it needs none, "" if no set has the limit or no ablation can be played.
 
-    First end-of-step detection alone, then every mechanism by itself (with those it acts on), then
-    all less what is not needed.
+    Tried in this order: end-of-step detection alone; each mechanism alone (with those it acts
+    on); all mechanisms, from which those that are not needed are then removed.
     """
     ablations = Ablations.of(search, limit)
     if ablations is None:
@@ -114,7 +114,7 @@ class Ablations:
 
     @staticmethod
     def of(search: Search, limit: Limit) -> Ablations | None:
-        """None where nothing failed or was played at all, or nothing is known of the engine."""
+        """None if nothing failed, nothing was played, or the engine has no known mechanisms."""
         seen, failing, (name, *changed) = (
             search.failure(limit),
             limit.failing,
@@ -137,14 +137,14 @@ class Ablations:
         )
 
     def simple(self) -> Iterator[list[Mechanism]]:
-        """None, then each with those it acts on."""
+        """No mechanism, then each one with those it acts on."""
         yield []
         for mechanism in self.mechanisms:
             yield [*(each for each in self.mechanisms if each.name in mechanism.on_top), mechanism]
 
     def needed(self) -> Sequence[Mechanism]:
-        """All mechanisms less those without which, one after the other, the ablation still has the
-        limit."""
+        """The mechanisms that remain after removing, one after the other, each one without which
+        the ablation still has the limit."""
         left = list(self.mechanisms)
         for mechanism in self.mechanisms:
             fewer = [
@@ -155,7 +155,7 @@ class Ablations:
         return left
 
     def alike(self, mechanisms: Sequence[Mechanism]) -> bool:
-        """Whether the ablation breaks what the engine breaks where that fails, and works where it
+        """Whether the ablation fails as the engine does at the limit, and works where the engine
         works."""
         reading = self.read(self.bad, mechanisms)
         if not reading.failed or reading.broken != self.reading.broken:
@@ -166,7 +166,7 @@ class Ablations:
         return 1 / NEAR <= reading.value / self.reading.value <= NEAR
 
     def read(self, scenario: Scenario, mechanisms: Sequence[Mechanism]) -> Reading:
-        """What the predicate reads off the ablation's run, or runs."""
+        """The readings of the predicate in the ablation's run or runs."""
         ablation = Variant("reference:ablation", partial(with_mechanisms, mechanisms))
         return judge(self.case.predicate, *self.case.play(ablation, scenario))
 

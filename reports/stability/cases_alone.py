@@ -33,12 +33,13 @@ OSCILLATION = 400  # steps
 
 
 def ball(x: float, run: int) -> Scenario:
-    """A ball at e = 1 dropped over a floor, seen some two dozen times a flight; x = dt over the
-    time of the fall.
+    """A ball with e = 1 is dropped onto a floor and sampled about 24 times in each flight; x =
+    dt over the time of the fall.
 
-    The runs differ in height, which decides how a step is rounded, and in the phase of the first
-    collision in its step: where a fall lasts a whole number of steps, some methods are flattered.
-    Their dt over the time of the fall is x, or less by up to a step of the fall.
+    The runs differ in height, which changes the rounding of a step, and in the phase of the
+    first collision within its step: some methods do better than usual where a fall takes a whole
+    number of steps. Their dt over the time of the fall is x, or less by up to one step of the
+    fall.
     """
     height = HEIGHT * (1 + 0.01 * sampled(seed=1)[run])
     fall = sqrt(2 * height / G)
@@ -75,8 +76,8 @@ def ball(x: float, run: int) -> Scenario:
 
 
 def scaled(x: float, _run: int) -> Scenario:
-    """Two disks of x / 2 m meet head-on at 4 x m/s, e = 1: at x = 1 they close at 4 m/s, in 1/60 s
-    by 0.13 radii."""
+    """Two disks of x / 2 m meet head-on at 4 x m/s with e = 1: at x = 1 they approach by 0.13
+    radii in 1/60 s."""
     radius, speed = 0.5 * x, 4.0 * x
     scene = lay_out(
         position=[[-2.2 * x, 0], [0, 0]],
@@ -97,7 +98,7 @@ def scaled(x: float, _run: int) -> Scenario:
 
 
 def far(x: float, _run: int) -> Scenario:
-    """A disk flies x m from the origin at 1 m/s, for 1 s in steps of 1/240 s."""
+    """A disk starts x m from the origin and flies at 1 m/s for 1 s in steps of 1/240 s."""
     scene = lay_out(
         position=[[x, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0
     )
@@ -109,7 +110,7 @@ def far(x: float, _run: int) -> Scenario:
 
 
 def spinning(x: float, _run: int) -> Scenario:
-    """A disk turns by x rad a step."""
+    """A disk turns by x rad in each step."""
     dt = 1 / 64
     scene = lay_out(
         position=[[0, 0]],
@@ -152,8 +153,8 @@ def oscillator(x: float, _run: int) -> Scenario:
 
 
 def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
-    """Play a disk whose force -x N is read off its position before every step, as a user of an
-    engine writes it."""
+    """Play a disk with the force -x N, read from its position before every step, as a user of an
+    engine would write it."""
     states: list[State] = []
     status, reason, settings = "ok", "", {}
     with closing(variant.make()) as engine:

@@ -43,8 +43,8 @@ def flyby(
     radius: float = RADIUS,
     dt: float = DT,
 ) -> Scenario:
-    """Disk 0 flies at disk 1, which rests at the origin, and is there after `LEAD` steps; offset
-    over the reach."""
+    """Disk 0 flies towards disk 1, which rests at the origin, and reaches it after `LEAD` steps;
+    `offset` is in units of the sum of the radii."""
     reach = radius + RADIUS
     touch = -reach * np.sqrt(max(0.0, 1 - offset**2))
     start = touch - speed * dt * (LEAD + phase(run))
@@ -90,7 +90,7 @@ def wall_collision(speed: float, run: int) -> Scenario:
 def stepped(
     name: str, asks: str, scene: Scene, dt: float, truth: Callable[[Array], Trajectory]
 ) -> Scenario:
-    """A scenario of a few steps, seen at every one."""
+    """A scenario of a few steps, sampled at each of them."""
     steps = LEAD + 1 + AFTER
     return Scenario(name, asks, SOURCE, scene, steps * dt, dt, (1,), truth=truth)
 
@@ -126,7 +126,7 @@ def slow(x: float, run: int) -> Scenario:
 
 
 def unequal(x: float, run: int) -> Scenario:
-    """A disk of mass 1 collisions one of mass x that rests, at v dt / R = 0.1."""
+    """A disk of mass 1 hits a disk of mass x at rest, at v dt / R = 0.1."""
     return flyby(0.1 * RADIUS / DT, run, mass=x)
 
 
@@ -151,7 +151,8 @@ COLLISIONS = (
     Case(
         "tunnelling_offset",
         FAMILY,
-        "And off centre, by 0.7 of the sum of the radii?",
+        "How far may a disk fly in a step without missing a disk off centre, by 0.7 of the sum of"
+        " the radii?",
         "v dt / R",
         "1",
         FAST,
@@ -175,7 +176,7 @@ COLLISIONS = (
     Case(
         "tunnelling_thick_wall",
         FAMILY,
-        "And if the wall is ten radii thick, a static disk?",
+        "How far may a disk fly in a step without missing a static disk of ten radii?",
         "v dt / R",
         "1",
         FAST,
@@ -199,7 +200,7 @@ COLLISIONS = (
     Case(
         "near_miss",
         FAMILY,
-        "How near may a disk pass at v dt / R = 0.2 without being collision?",
+        "How near may a disk pass at v dt / R = 0.2 without being hit?",
         "b / 2R - 1",
         "1",
         (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),

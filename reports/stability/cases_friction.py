@@ -82,7 +82,7 @@ def spinning_into(x: float, run: int) -> Scenario:
 
 
 def stepped(name: str, asks: str, scene: Scene, truth: Callable[[Array], Trajectory]) -> Scenario:
-    """A scenario of a few steps, seen at every one."""
+    """A scenario of a few steps, sampled at each of them."""
     return Scenario(name, asks, IMPACT, scene, (LEAD + 1 + AFTER) * DT, DT, (1,), truth=truth)
 
 
@@ -117,7 +117,7 @@ def on_floor(
 
 
 def cone(x: float, run: int) -> Scenario:
-    """x = e; friction 0.1, the rim slips all along."""
+    """x = e; friction 0.1, so that the rim slips during the whole collision."""
     return rough_bounce(5.0, run, e=x)
 
 
@@ -132,8 +132,8 @@ def whirling(x: float, run: int) -> Scenario:
 
 
 def sliding(x: float, run: int) -> Scenario:
-    """x = v dt / R; friction 0.5. The runs differ in the step in which the slide ends, by a step of
-    its friction."""
+    """x = v dt / R; friction 0.5. The runs differ in where within its step the slide ends, by up
+    to one step."""
     friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / REST_DT
     slides = speed / (3 * friction * G)
     steps = ceil(1.5 * slides / REST_DT) + AFTER
@@ -174,7 +174,7 @@ FRICTION = (
     Case(
         "friction_in_bounce",
         FAMILY,
-        "How elastic may a bounce be, and friction be Coulomb's?",
+        "Up to which e does friction in a bounce follow Coulomb's law?",
         "e",
         "1",
         (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0),

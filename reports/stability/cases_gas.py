@@ -39,9 +39,9 @@ def gas(
     mass: Array | None = None,
 ) -> Scenario:
     """Disks of radius 0.25 m on a triangular lattice in a box that they fill to `packing`, with
-    Maxwell's velocities.
+    velocities from Maxwell's distribution.
 
-    kT is such that a disk of mass 1 flies `step` radii in a step at its root mean square speed.
+    kT is such that a disk of mass 1 at the root mean square speed flies `step` radii in a step.
     """
     n, rng = rows * columns, default_rng(seed)
     radius = np.full(n, RADIUS)
@@ -73,8 +73,8 @@ def gas(
 
 
 def maxwell(rng: Generator, mass: Array, speed: float) -> Array:
-    """(n, 2) m/s, sampled so that disks of each mass have the same temperature exactly, a mass of 1
-    the rms `speed`."""
+    """(n, 2) m/s, random, then scaled so that the disks of each mass have exactly the same
+    temperature and those of mass 1 the rms `speed`."""
     velocity = rng.normal(size=(len(mass), 2))
     for kind in np.unique(mass):
         same = mass == kind
@@ -98,8 +98,8 @@ def long_run(x: float, run: int) -> Scenario:
 
 
 def wrapped_run(x: float, run: int) -> Scenario:
-    """The same in the exercise's box: who leaves it comes in opposite, so that there is no wall to
-    take momentum."""
+    """The same in a box that wraps as the exercise's does: there is no wall that could change
+    the momentum."""
     one = long_run(x, run)
     scene = one.scene
     corners = np.stack([scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))])
@@ -119,18 +119,18 @@ def mixture(x: float, run: int) -> Scenario:
 
 
 def thermometer(x: float, run: int) -> Scenario:
-    """x = packing of 100 disks, 4000 steps; seen more often than they collide."""
+    """x = packing of 100 disks, 4000 steps; sampled more often than a disk collides."""
     return gas(x, run, rows=10, columns=10, steps=4000, every=20)
 
 
 def steps_of_gas(x: float, run: int) -> Scenario:
-    """x = steps of 36 disks at packing 0.3, seen at fifty instants at most."""
+    """x = number of steps of 36 disks at packing 0.3, sampled at most fifty times."""
     every = max(1, int(x) // 50)
     return gas(0.3, run, steps=int(x) // every * every, every=every)
 
 
 def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The scenario with another run of the same engine in the place of the truth."""
+    """The scenario, with another run of the same engine in place of the exact answer."""
     if other.status != "ok" or other.trajectory is None:
         return scenario, other
     beside: Trajectory = other.trajectory
@@ -138,7 +138,8 @@ def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
 
 
 def reversed_order(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The same gas inserted in the opposite order, beside the gas in its own order."""
+    """The same gas with its disks inserted in the opposite order, compared with the gas in its
+    own order."""
     scene = scenario.scene
     names = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
     turned = replace(
@@ -151,7 +152,7 @@ def reversed_order(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]
 
 
 def renumbered(played: Trajectory, n: int) -> Trajectory:
-    """The trajectory with disk i for disk n - 1 - i."""
+    """The trajectory with disk i renamed n - 1 - i."""
     collisions = played.collisions
     i, j = n - 1 - collisions.i, np.where(collisions.j < 0, collisions.j, n - 1 - collisions.j)
     low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
@@ -168,8 +169,8 @@ def renumbered(played: Trajectory, n: int) -> Trajectory:
 
 
 def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The gas stopped half way, read, and loaded into a new engine, beside the gas played
-    through."""
+    """The gas stopped half-way, read and loaded into a new engine, compared with the gas played
+    without a stop."""
     whole = played(variant, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
@@ -298,7 +299,7 @@ GAS = (
     Case(
         "thermometer",
         FAMILY,
-        "Has a gas the speeds, the rate of collisions and the wall pressure of the literature?",
+        "Does a gas have the speeds, collision rate and wall pressure that the literature gives?",
         "packing",
         "1",
         (0.2, 0.3, 0.4, 0.5, 0.6),
@@ -312,7 +313,7 @@ GAS = (
     Case(
         "insertion_order",
         FAMILY,
-        "After how many steps does the order of insertion show?",
+        "After how many steps does a gas depend on the order in which its disks were added?",
         "steps",
         "1",
         COUNTS,
@@ -328,7 +329,7 @@ GAS = (
     Case(
         "restart",
         FAMILY,
-        "After how many steps does it show that a gas was read and loaded again half way?",
+        "After how many steps does a gas that was read and loaded again half-way differ?",
         "steps",
         "1",
         COUNTS,

@@ -92,7 +92,7 @@ def last_bounce(height: float, e: float) -> float:
 
 
 def dropped(x: float, run: int) -> Scenario:
-    """A ball at e = 1 - x dropped from 1 m and up to 0.1 m more, seen for half as long again as it
+    """A ball with e = 1 - x is dropped from 1 m to 1.1 m and sampled for 1.5 times as long as it
     should bounce."""
     height = 1.0 + 0.1 * phase(run)
     until = 1.5 * last_bounce(height, 1 - x)
@@ -118,8 +118,8 @@ def dropped(x: float, run: int) -> Scenario:
 
 
 def pile(x: float, run: int) -> Scenario:
-    """Twelve disks at e = 1 - x fall into a box, seen for four times as long as one of them would
-    bounce alone."""
+    """Twelve disks with e = 1 - x fall into a box; the run is four times as long as one of them
+    would bounce alone."""
     rng = default_rng(run)
     k = np.arange(12)
     position = np.stack([0.8 * (k % 3) - 0.8, 0.5 + 0.7 * (k // 3)], -1) + rng.uniform(

@@ -15,8 +15,8 @@ SEEN = 300  # samples at most
 
 
 def in_steps(whole: Scenario, dt: float) -> Scenario:
-    """The scenario in steps as near to `dt` s as its duration allows, seen at `SEEN` instants at
-    most."""
+    """The scenario with a step as near to `dt` s as its duration allows, sampled at most `SEEN`
+    times."""
     steps = max(1, round(whole.duration / dt))
     every = -(-steps // SEEN)
     samples = -(-steps // every)
@@ -24,24 +24,24 @@ def in_steps(whole: Scenario, dt: float) -> Scenario:
 
 
 def at_dt(name: str, x: float, run: int) -> Scenario:
-    """x = dt in s; the number of the run is the seed."""
+    """x = dt in s; the seed is the number of the run."""
     return in_steps(scenario(name, run), x)
 
 
 def ladder(one: Scenario, an_octave: int = 1) -> tuple[float, ...]:
-    """s, so many to a factor of two, from an eighth of the sample interval to a tenth of the
-    duration."""
+    """Step sizes in s, a fixed number for each factor of two, from an eighth of the sample
+    interval to a tenth of the duration."""
     steps = [one.sample_interval * 2.0 ** (k / an_octave - 3) for k in range(23 * an_octave)]
     return tuple(dt for dt in steps if dt <= one.duration / 10)
 
 
 def dense_ladder(one: Scenario) -> tuple[float, ...]:
-    """s, as `ladder`, and from the sample interval on four to a factor of two, or two where a run
-    is long.
+    """Step sizes in s, as `ladder`, and from the sample interval on four for each factor of two
+    (two where a run is long).
 
-    Where nothing in a scene is random, each dt has its collisions elsewhere in their steps:
-    failures begin here and there, and only neighbours close to each other find the first. Finer
-    steps fail seldom and cost most. Both forms scan the same.
+    In a scene without random numbers each dt puts the collisions at other places within their
+    steps: failures appear at scattered step sizes, and only a dense scan finds the first. Finer
+    steps seldom fail and cost most. Both forms scan the same step sizes.
     """
     steps = one.duration / one.sample_interval * 8
     close = ladder(one, 2 if one.scene.n * steps > LONG else 4)

@@ -114,8 +114,8 @@ def find_limits(
 
 
 def gone_on_with(journal: Journal, plan: StabilityPlan, resume: bool) -> set[Task]:
-    """The tasks of the plan that ended well in an interrupted run; raises as `may_go_on`, lest
-    others are lost."""
+    """The tasks of the plan that an interrupted run finished; raises as `may_go_on`, so that no
+    other results are lost."""
     had, done = done_before(journal.path.parent, plan)
     may_go_on(journal.path.parent, had, bool(done), resume)
     if not done:
@@ -139,8 +139,8 @@ def write_files(folder: Path) -> StabilityResults:
 
 
 def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
-    """The cases, the maps and the scenes of touching disks that are meant; exits 2 with every
-    fault, one line each."""
+    """The cases, maps and scenes of touching disks that were asked for; if a name is wrong,
+    prints one line for each fault and exits 2."""
     faults = [unknown("--vary", what, VARIES) for what in vary if what not in VARIES]
     cases: list[str] = []
     maps, touching = (
@@ -172,8 +172,8 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
 
 
 def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The cases of a scene file, and why what was asked for cannot be varied; what nobody named is
-    left out quietly."""
+    """The cases of a scene file, and why something that was asked for cannot be varied; what was
+    not asked for by name is left out without a message."""
     one = read_scene_file(path)
     whys = {what: cannot_vary(one, what) for what in vary or VARIES if what in VARIES}
     faults = [f"{path}: --vary {what}: {why}" for what, why in whys.items() if why and vary]
@@ -193,7 +193,7 @@ def finish(results: StabilityResults, out: Path) -> NoReturn:
 
 
 def print_limits(console: Console, limits: Sequence[Limit]) -> None:
-    """A row a case, a column an engine, and what the marks in it mean."""
+    """A row for each case, a column for each engine, and what the marks mean."""
     engines = [name for name in ENGINES if any(limit.engine == name for limit in limits)]
     found = {(limit.case, limit.engine): limit for limit in limits}
     rows = []
@@ -217,7 +217,7 @@ def print_limits(console: Console, limits: Sequence[Limit]) -> None:
 
 
 def label_of(name: str) -> str:
-    """The case and what is varied in it; of a scene file the file without its folder."""
+    """The case and what is varied in it; for a scene file its name without the folder."""
     case = case_named(name)
     unit = "" if case.unit == "1" else f", {case.unit}"
     shown = name if name in CASES else Path(name.rpartition(":")[0]).name
@@ -225,5 +225,5 @@ def label_of(name: str) -> str:
 
 
 def in_words(limit: Limit) -> str:
-    """The limit in a few letters."""
+    """The limit in a few characters."""
     return limit.word or limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")

@@ -1,8 +1,8 @@
-"""Gives every limit its reason: the row of the table that fits it, or what was found by playing its
-failing run again.
+"""Gives every limit its reason: the matching row of the table of reasons, or what was found by
+playing the failing run again.
 
-A reason is tested by what it predicts, by the limit of a variant, by an intervention or by an
-ablation; else it is called likely.
+A reason is tested by the limit that it predicts, by the limit of a variant, by an intervention
+or by an ablation; a reason without a test is called likely.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ NEAR = (
 
 
 def tried_out(search: Search, limit: Limit) -> Limit:
-    """The limit with what was found by playing its failing run again: the mechanisms that suffice
-    for it, or an intervention that removes it.
+    """The limit with what was found by playing its failing run again: the mechanisms that are
+    enough to produce it, or an intervention that removes it.
 
-    Where a reason is written down, only an ablation can confirm it; what it predicts is enough.
+    A reason from the table whose predicted limit fits needs no more; otherwise only an ablation
+    can confirm it.
     """
     reason = reason_of(limit)
     if reason is not None and reason.predicts is not None and brackets(limit, reason.predicts):
@@ -42,16 +43,18 @@ def tried_out(search: Search, limit: Limit) -> Limit:
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their reasons, each tested if it can be: by itself, or by the limit of its
-    variant among them."""
+    """The limits with their reasons, each tested where that is possible: by the limit itself, or
+    by the limit of its variant."""
     by_name = {(limit.case, limit.engine): limit for limit in limits}
     return [with_reason(limit, by_name) for limit in limits]
 
 
 def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit:
-    """The limit with its reason and with how that was tested: "" if it was not, or did not hold.
+    """The limit with its reason and with how that reason was tested ("" if it was not, or if the
+    test failed).
 
-    A written reason that holds by nothing else gives way to an ablation that shows another.
+    A reason from the table that no other test confirms is replaced if an ablation shows another
+    cause.
     """
     if limit.status != "ok":
         return limit
@@ -92,13 +95,13 @@ def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Lim
 
 
 def brackets(limit: Limit, value: float) -> bool:
-    """Whether a value lies in the bracket, or outside by no more than `NEAR`."""
+    """Whether the value lies in the bracket, or outside by no more than the factor `NEAR`."""
     low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
     return low / NEAR <= value <= high * NEAR
 
 
 def farther(one: Limit, other: Limit) -> bool:
-    """Whether `one` fails later on the way from gentle to harsh, or not at all."""
+    """Whether `one` fails at a harsher value than the other, or not at all."""
     if one.verdict == NEVER_FAILS:
         return other.verdict != NEVER_FAILS
     values = CASES[one.case].values

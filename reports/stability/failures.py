@@ -1,5 +1,5 @@
-"""Keeps of the first failing run at a limit what is shown: the samples around the failure, and the
-collisions among them."""
+"""Keeps the part of the first failing run at a limit that the page shows: the samples around the
+failure, and the collisions among them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
 
 def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
-    """Save the first failing run of a search, and what it is shown beside, if there is any: here,
-    not for the page."""
+    """Save the first failing run of a search and the trajectory it is shown beside, if there is
+    one."""
     failing, seen = limit.failing, search.failure(limit)
     if failing is None or seen is None or seen[1].trajectory is None:
         return
@@ -42,8 +42,8 @@ def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
 def kept_failure(
     limit: Limit, folder: Path, scenario: Scenario
 ) -> tuple[Trajectory, Trajectory | None] | None:
-    """What was saved: the failing run and the one beside it; None if nothing was, or it is not of
-    the scenario."""
+    """The saved failing run and the one beside it; None if nothing was saved, or the file does
+    not fit the scenario."""
     path = file_of(limit, folder)
     if not path.exists() or limit.failing is None:
         return None
@@ -57,7 +57,8 @@ def kept_failure(
 
 
 def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
-    """Whether arrays that were read back are those of at most so many samples of the scenario."""
+    """Whether arrays read from a file can be a trajectory of the scenario with at most this many
+    samples."""
     k, n, collisions = len(np.atleast_1d(one.t)), scenario.scene.n, one.collisions
     shapes = {
         "t": (k,),
@@ -95,8 +96,8 @@ def beside_file(path: Path) -> Path:
 
 
 def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
-    """The samples around the failure, up to `BEFORE` and `AFTER` it; where it is early or late,
-    more of the others."""
+    """The samples around the failure, up to `BEFORE` before and `AFTER` after it; if the failure
+    is early or late in the run, more from the other side."""
     at = failing.at if np.isfinite(failing.at) else 0.0
     middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.intervals))
     first = max(0, min(middle - BEFORE, scenario.intervals - BEFORE - AFTER))
@@ -104,8 +105,8 @@ def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
 
 
 def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
-    """A trajectory at the samples `shown` that it has, and what it strikes meanwhile, if that is
-    few enough to show."""
+    """A trajectory at those of the samples `shown` that it has, and the collisions between them,
+    if they are few enough to show."""
     first, last = shown[0], shown[-1]
     t, x, v, angle, spin = (
         frozen(getattr(whole, name)[first : last + 1]) for name in ("t", *STATE)

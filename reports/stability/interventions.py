@@ -1,5 +1,5 @@
-"""Why a scene fails of which nothing was written down: the failing run with one thing changed,
-until it works."""
+"""Explains failures that have no written reason: the failing run is played with one thing
+changed, until it works."""
 
 from __future__ import annotations
 
@@ -27,37 +27,37 @@ UNITS = 32.0
 
 
 def finer(one: Scenario) -> Scenario:
-    """The same in steps of an eighth."""
+    """The same scene in steps of an eighth."""
     return replace(one, substeps=(one.substeps[0] * FINER,))
 
 
 def faster(one: Scenario) -> Scenario:
-    """The same film, 32 times as fast."""
+    """The same motion, 32 times as fast."""
     return at_tempo(one, UNITS)
 
 
 def slower(one: Scenario) -> Scenario:
-    """The same film, 32 times as slow."""
+    """The same motion, 32 times as slow."""
     return at_tempo(one, 1 / UNITS)
 
 
 def larger(one: Scenario) -> Scenario:
-    """The same, 32 times as large and as slow, so that speeds stay."""
+    """The same motion, 32 times as large and 32 times as slow, so that speeds stay."""
     return at_tempo(at_scale(one, UNITS), 1 / UNITS)
 
 
 def smaller(one: Scenario) -> Scenario:
-    """The same, 32 times as small and as fast."""
+    """The same motion, 32 times as small and 32 times as fast, so that speeds stay."""
     return at_tempo(at_scale(one, 1 / UNITS), UNITS)
 
 
 def at_home(one: Scenario) -> Scenario:
-    """The same with its middle at the origin along x."""
+    """The same scene, moved along x so that its middle is at the origin."""
     return at_offset(one, -float(np.mean(one.scene.position[:, 0])))
 
 
 def unchanged(one: Scenario) -> Scenario:
-    """The same."""
+    """The same scene."""
     return one
 
 
@@ -80,7 +80,7 @@ class Intervention(NamedTuple):
     engine: str = ""
 
     def fits(self, engine: str, varied: str) -> bool:
-        """Whether it is tried."""
+        """Whether the change is tried for this engine and this parameter."""
         return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
 
 
@@ -158,10 +158,10 @@ Where the step itself is varied, a finer one is no news.
 
 
 def intervention_of(search: Search, limit: Limit) -> str:
-    """The first change with which the run that failed at the limit works; "" if none does, or
+    """The first change with which the run that failed at the limit works; "" if none does, or if
     nothing failed.
 
-    What an engine refuses is explained by itself.
+    A refusal needs no other explanation.
     """
     seen = search.failure(limit)
     if seen is None or seen[1].status == "unsupported":
@@ -180,8 +180,8 @@ def intervention_of(search: Search, limit: Limit) -> str:
 
 
 def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
-    """Why a scene fails of which nothing was written down before, where that stands, and how it was
-    tested, or ""."""
+    """The reason for a failure that has none in the table, its source, and how it was tested, or
+    ""."""
     failing = limit.failing
     if failing is None:
         return "", "", ""

@@ -1,5 +1,5 @@
-"""What a case of the stability report asks, how thoroughly, and what a limit is; search.py finds
-one."""
+"""What a case of the stability report asks, how thoroughly it is searched, and what a limit is;
+search.py finds one."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Form:
     """How thorough a search is.
 
     Attributes:
-        few: runs at a value that is only passed on the way; next to the limit a value gets all of
+        few: runs at a value that is only scanned; next to the limit a value gets all runs of
             its case.
-        ratio: how close the bracket is made.
-        whole: whether every value is played to its last run, also where one has failed, and those
-            that only this form scans are, too.
+        ratio: the ratio of failing to working value at which bisection stops.
+        whole: whether every run at every value is played, also after a failure, and whether
+            the scan has the values that only this form has.
     """
 
     name: str
@@ -105,19 +105,21 @@ class Case:
 
     @property
     def harsher(self) -> int:
-        """1 if larger values are harsher, -1 if smaller ones are."""
+        """1 if larger values are harsher, -1 if smaller values are."""
         return 1 if self.values[-1] > self.values[0] else -1
 
     @property
     def varies(self) -> str:
-        """What is varied in a word: of a scene file (FILE.toml:speed) as `--vary` calls it."""
+        """The name of what is varied; for a scene file (FILE.toml:speed) the word that `--vary`
+        takes."""
         return self.name.rpartition(":")[2] if ":" in self.name else self.parameter
 
     def scan(self, form: Form) -> tuple[float, ...]:
-        """The values to scan; in the full form those half way between them as well, so that the
-        quick ones are some.
+        """The values to scan. The full form adds the values half-way between them, so that it
+        contains the quick form's.
 
-        Not where runs may fail by chance: the more values, the sooner too many do.
+        None are added where runs may fail by chance: with more values, too many failures by
+        chance become likelier.
         """
         if not form.whole:
             return self.quick_values or self.values
@@ -129,8 +131,8 @@ class Case:
         )
 
     def half_way(self, one: float, other: float, ratio: float) -> float | None:
-        """The value in the middle of two in their logarithm; None if they are within a ratio, or
-        there is none."""
+        """The geometric mean of two values; None if they are within the ratio, or if no whole
+        number lies between them where one is needed."""
         low, high = min(one, other), max(one, other)
         if high <= low * ratio:
             return None
@@ -142,11 +144,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Trial:
-    """The runs at one value: how many, how many of them failed, the worst reading, and the first
-    that failed.
+    """The runs at one value: how many were played, how many failed, the worst reading, and the
+    first that failed.
 
-    So many as are `allowed` may fail by chance. `left`: whether it was left at a failure, with runs
-    not played.
+    Up to `allowed` of them may fail by chance. `left`: whether the search stopped at a failure
+    before it played all runs.
     """
 
     value: float
@@ -163,7 +165,7 @@ class Trial:
 
     @property
     def works(self) -> bool:
-        """Whether no more runs failed than may by chance."""
+        """Whether no more runs failed than may fail by chance."""
         return self.failed <= self.allowed
 
 
@@ -217,7 +219,7 @@ class Limit:
 
     @property
     def word(self) -> str:
-        """What stands in a table where there is no limit, "" where there is one."""
+        """The word that a table shows in place of a limit, "" where there is a limit."""
         if self.status != "ok":
             return self.status
         if self.verdict == NEVER_WORKS:
@@ -230,25 +232,29 @@ class Limit:
 
     @property
     def sign(self) -> str:
-        """Before `fails_at` in a table: "≤" or "≥" where it fails up to there, and works beyond."""
+        """The sign before `fails_at` in a table: "≤" or "≥" if the engine fails up to there and
+        works beyond."""
         if self.verdict != ONLY_BEYOND:
             return ""
         return "≤" if self.works_at > self.fails_at else "≥"
 
     @property
     def why(self) -> str:
-        """The reason, called likely where nothing tested it."""
+        """The reason; an untested one begins with "likely"."""
         known = self.tested or not self.reason or self.reason.startswith(NOT_KNOWN)
         return self.reason if known else f"likely: {self.reason}"
 
     @property
     def runs(self) -> int:
-        """All runs behind it."""
+        """The number of runs on which it rests."""
         return sum(trial.runs for trial in self.trials)
 
 
 def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
-    """Who plays a case: these rows of `ENGINES`, and the case's own variants, in the order of
-    `VARIANTS`; an engine that only adds friction to another where the case names it."""
+    """The engines that play a case: these rows of `ENGINES`, and the variants that the case
+    names, in the order of `VARIANTS`.
+
+    An engine that only adds friction to another plays only the cases that name it.
+    """
     rows_alone = [name for name in VARIANTS if name in rows and name not in WITH_FRICTION_ONLY]
     return [name for name in VARIANTS if name in rows_alone or name in case.also]

@@ -1,5 +1,5 @@
-"""The schema of the journal of `crosscheck stability`: what a line holds, and what of it must be as
-case or map say."""
+"""The format of the journal of `crosscheck stability`: what each line holds, and the checks that
+it fits its case or map."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ Some = Annotated[int, Field(ge=0, le=MOST)]
 
 
 class Header(Line):
-    """What was asked for, and by what it was played."""
+    """What was asked for, and the versions that played it."""
 
     command: Words
     seed: Seed
@@ -60,7 +60,7 @@ class Header(Line):
 
 
 class HeaderLine(Line):
-    """The first line, and one for each time it was gone on with."""
+    """The first line, and another for each time the run was resumed."""
 
     header: Header
 
@@ -135,7 +135,7 @@ class MapRow(Line):
 
     @model_validator(mode="after")
     def on_the_grid(self) -> MapRow:
-        """All cells of the map, in its order; none if it was lost."""
+        """Whether these are all cells of the map, in its order, or none if the task was lost."""
         grid = [*product(MAPS[self.name].x, MAPS[self.name].y)] if self.status == "ok" else []
         if [tuple(cell[:2]) for cell in self.cells] != grid:
             raise ValueError("cells: must be those of the map's grid, in order")
@@ -157,7 +157,8 @@ class LawRow(Line):
 
     @model_validator(mode="after")
     def at_all_gaps(self) -> LawRow:
-        """All gaps, in order, each with a velocity of every disk or none; no gap if it was lost."""
+        """Whether these are all gaps in their order, each with a velocity for every disk or
+        none, or no gap if the task was lost."""
         if [gap[0] for gap in self.gaps] != (list(GAPS) if self.status == "ok" else []):
             raise ValueError("gaps: must be those that are played, in order")
         for k, (_, law, *numbers, velocity) in enumerate(self.gaps):
@@ -174,7 +175,7 @@ class LawRow(Line):
 
 
 def must_be(where: str, whole: bool) -> None:
-    """Raise `ValueError` where a list does not hold what it should."""
+    """Raise `ValueError` if a list does not hold what it should."""
     if not whole:
         raise ValueError(
             f"{where}: must hold numbers and text as `crosscheck stability` writes them"
@@ -182,7 +183,7 @@ def must_be(where: str, whole: bool) -> None:
 
 
 def number_like(value: Any) -> bool:
-    """Whether it is a number, or one that is not finite, as text."""
+    """Whether it is a number, or the text of one that is not finite."""
     if isinstance(value, str):
         return value in ("nan", "inf", "-inf")
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= 1e308
@@ -198,7 +199,7 @@ class TaskLine(Line):
 
     @model_validator(mode="after")
     def of_its_task(self) -> TaskLine:
-        """What it gave is of its kind, of its name, and of its engine."""
+        """Whether a result has the kind, the name and the engine of its task."""
         given = {"limit": self.limit, "map": self.map, "law": self.law}
         one = given.pop(self.task.kind)
         if one is None or any(given.values()):
@@ -219,8 +220,8 @@ KINDS = Kinds(
 
 
 def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """Why there is no such case or engine, as the end of a sentence; "" if there is. files: those
-    of the header."""
+    """Why there is no such case or engine, as the end of a sentence; "" if there is. `files`:
+    the scene files of the header."""
     if isinstance(one, Limit):
         path, _, what = one.case.rpartition(":")
         if one.case not in CASES and (path not in files or what not in VARIES):
@@ -232,7 +233,7 @@ def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 
 
 def impossible(limit: Limit, case: Case) -> str:
-    """Why no search of the case ends so, as the end of a sentence; "" if one may."""
+    """Why no search of the case can end like this, as the end of a sentence; "" if one can."""
     if limit.status != "ok":
         lost = (
             isnan(limit.works_at)
@@ -268,7 +269,8 @@ def impossible(limit: Limit, case: Case) -> str:
 
 
 def miscounted(trial: Trial, case: Case, at_the_limit: bool) -> str:
-    """Why no runs at a value of the case give that, as the end of a sentence; "" if some may."""
+    """Why no runs at a value of the case can give this, as the end of a sentence; "" if they
+    can."""
     if trial.runs > case.runs or trial.failed > trial.runs or trial.allowed > case.runs:
         return (
             f"runs = {trial.runs}, failed = {trial.failed}: must be at most {case.runs}, as the"

@@ -1,4 +1,4 @@
-"""Two parameters at once: how an engine's reading depends on both, as a grid for every engine."""
+"""Two parameters at once: a grid for every engine of how its reading depends on both."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class Map:
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on an engine: rows (x, y, worst reading, whether a run failed, what broke); s of
-    processor time it took."""
+    """A map on one engine: rows (x, y, worst reading, whether a run failed, what broke), and the
+    processor time in s that it took."""
 
     name: str
     engine: str
@@ -93,7 +93,7 @@ def map_of(name: str, engine: str) -> MapOf:
 
 
 def with_iterations(engine: str, scenario: Scenario, _ratio: float, count: float) -> Run:
-    """Play with so many iterations, or substeps, whichever the engine has."""
+    """Play with this many iterations, or substeps if the engine has those instead."""
     work = ENGINES[engine].work
     assert work is not None
     return play_once(
@@ -102,8 +102,8 @@ def with_iterations(engine: str, scenario: Scenario, _ratio: float, count: float
 
 
 def collision_at(x: float, y: float, run: int) -> Scenario:
-    """x = dt over 1/64 s, y = closing speed in m/s: `flyby` in other units of time would be the
-    same scene."""
+    """x = dt over 1/64 s, y = closing speed in m/s. A change of the unit of time alone would
+    give the scene of `flyby`."""
     return flyby(y, run, dt=x / 64)
 
 

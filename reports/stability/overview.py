@@ -1,4 +1,4 @@
-"""Reads off the limits what the page and the README say: cells, findings, maps as tables."""
+"""Turns limits into what the page and the README show: cells, findings, and maps as tables."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ EVERYWHERE = {"never": "everywhere"}  # a cell says where it fails, not when it 
 
 
 class LimitCell(NamedTuple):
-    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none),
-    failed."""
+    """A cell of a table: its text, a longer remark, its colour in the heat ramp (-1: none), and
+    whether it failed."""
 
     text: str
     remark: str = ""
@@ -30,7 +30,7 @@ class LimitCell(NamedTuple):
 
 
 class Why(NamedTuple):
-    """A reason in words, where it stands, how it was tested, and the engines it is given for."""
+    """A reason in words, its source, how it was tested, and the engines it is given for."""
 
     text: str
     source: str
@@ -39,15 +39,14 @@ class Why(NamedTuple):
 
 
 class MapTable(NamedTuple):
-    """An engine's map: a row a y, from large to small, a cell an x."""
+    """An engine's map: a row for each y, from large to small, with a cell for each x."""
 
     engine: str
     rows: list[tuple[float, list[LimitCell]]]
 
 
 def cell_of(case: Case, limit: Limit | None) -> LimitCell:
-    """A limit in the overview: the deeper its colour, the earlier on the way from gentle to harsh
-    it fails."""
+    """A limit in the overview; the gentler the value at which it fails, the deeper its colour."""
     if limit is None:
         return LimitCell("")
     remark = f"{limit.verdict}. {why(limit)}"
@@ -70,7 +69,7 @@ def why(limit: Limit) -> str:
 
 
 def reasons(limits: Sequence[Limit]) -> list[Why]:
-    """Every reason once, with the engines it is given for, in the order of appearance."""
+    """Every reason once, with the engines it is given for, in the order of first appearance."""
     found: dict[tuple[str, str, str], list[str]] = {}
     for limit in limits:
         if limit.verdict != NEVER_FAILS:
@@ -79,15 +78,15 @@ def reasons(limits: Sequence[Limit]) -> list[Why]:
 
 
 def bracket(limit: Limit) -> tuple[str, str]:
-    """Works at, fails at, as text."""
+    """The values where it works and where it fails, as text."""
     works = "nowhere" if isnan(limit.works_at) else number(limit.works_at, 4)
     fails = "nowhere tried" if isnan(limit.fails_at) else limit.sign + number(limit.fails_at, 4)
     return works, fails
 
 
 def where_it_works(limit: Limit) -> str:
-    """From gentle to harsh, between which of the values tried it works and fails; "" where it does
-    so once and for all."""
+    """The values at which it works and fails, from gentle to harsh; "" if there is only one
+    change."""
     if limit.monotone:
         return ""
     said = []
@@ -99,7 +98,7 @@ def where_it_works(limit: Limit) -> str:
 
 
 def findings(limits: Sequence[Limit]) -> list[str]:
-    """A few sentences, counted from the limits."""
+    """A few sentences with counts of the limits."""
     mine = [limit for limit in limits if limit.engine in ENGINES]
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
@@ -134,8 +133,8 @@ def findings(limits: Sequence[Limit]) -> list[str]:
 
 
 def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
-    """A sentence on who fails in the fewest and who in the most of these cases, of the engines that
-    take any of them; none on one case, or where nobody fails."""
+    """A sentence that names the engines that fail in the fewest and in the most of these cases,
+    among those that model any of them; none for a single case, or if no engine fails."""
     taken = [limit for limit in limits if limit.word != "refused"]
     # in reading order, which decides between equals
     fails = dict.fromkeys((limit.engine for limit in taken), 0)
@@ -155,7 +154,7 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
 
 
 def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
-    """Map -> a table an engine."""
+    """Map -> a table for each engine."""
     tables: dict[str, list[MapTable]] = {}
     for one in maps:
         bound = MAPS[one.name].predicate.bound
@@ -172,8 +171,8 @@ def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
 
 
 def map_cell(value: float, failed: bool, broken: str, bound: float) -> LimitCell:
-    """A reading as a share of its bound: pale far below, the deep half of the ramp where it
-    fails."""
+    """A reading as a share of its bound: pale far below the bound, in the deeper half of the
+    ramp where it fails."""
     if isnan(value):
         return LimitCell("r" if broken.startswith("refused") else "!", broken, -1, True)
     steps = (0.01, 0.1, 0.3, 1.0, 2.0, 5.0, 20.0, 100.0, 1e3)
@@ -186,7 +185,7 @@ def map_cell(value: float, failed: bool, broken: str, bound: float) -> LimitCell
 
 
 def law_cell(at: AtGap) -> LimitCell:
-    """The law that an engine follows at a gap; coloured where it follows none."""
+    """The law that an engine follows at a gap, with a colour where it follows none."""
     if not at.velocity:
         return LimitCell(at.law, "", -1, True)
     motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)

@@ -1,5 +1,5 @@
-"""Writes stability.html: the limits, the maps, and of every limit the first run that failed, to
-look at."""
+"""Writes stability.html: the limits, the maps, and a replay of the first run that failed at each
+limit."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ SECONDS = 5.0  # a replay lasts
 
 @dataclass(frozen=True)
 class Replay:
-    """The first failing run of an engine: what the page's player takes, its height over its width,
-    and a sentence."""
+    """The first failing run of an engine: the data of the page's player, its height over its
+    width, and a sentence."""
 
     engine: str
     pack: str
@@ -54,7 +54,7 @@ class CaseSection:
 
     @property
     def anchor(self) -> str:
-        """Its name as a fragment of a URL."""
+        """The name as a fragment of a URL."""
         return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
 
     def cell(self, engine: str) -> overview.LimitCell:
@@ -108,7 +108,7 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
 
 
 def families_of(sections: Sequence[CaseSection]) -> dict[str, list[CaseSection]]:
-    """The sections under their headings, both in the order of appearance."""
+    """The headings with their sections, both in the order of first appearance."""
     found: dict[str, list[CaseSection]] = {}
     for section in sections:
         found.setdefault(section.case.family, []).append(section)
@@ -130,8 +130,7 @@ def section_of(case: Case, limits: list[Limit], folder: Path) -> CaseSection:
 
 
 def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
-    """The first failing run at the limit, from just before the failure; None if nothing was
-    kept."""
+    """The first failing run at the limit, from just before the failure; None if none was kept."""
     failing = limit.failing
     if failing is None or not isfinite(failing.value):
         return None
@@ -150,13 +149,14 @@ def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
 
 
 def named(limit: Limit) -> Run:
-    """A run that carries an engine's name, which decides how it is drawn."""
+    """A run with the name of an engine, which decides how it is drawn."""
     engine, profile = limit.engine.split(":")
     return Run(engine, profile, limit.case, 0.0)
 
 
 def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:
-    """Where the engine starts: a tenth of what is shown before the failure; and what it marks."""
+    """The time at which the player starts, a tenth of the shown time before the failure, and
+    what it marks."""
     first, last = float(scenario.times[shown[0]]), float(scenario.times[shown[-1]])
     at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
     return {
@@ -167,7 +167,7 @@ def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, 
 
 
 def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The worst reading of every engine against the parameter, and the bound above which it
+    """The worst reading of every engine against the parameter, with the bound above which it
     fails."""
     predicate = case.predicate
     if predicate.bound == 0:
@@ -211,7 +211,8 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
 
 
 def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The share of runs that failed against the parameter, where a run has nothing else to read."""
+    """The fraction of runs that failed against the parameter, for a case that reads nothing
+    else."""
     lines = []
     for limit in limits:
         trials = [trial for trial in limit.trials if not trial.left]
@@ -232,12 +233,12 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
 
 
 def unit_of(case: Case) -> str:
-    """The unit of its parameter, "" of a ratio."""
+    """The unit of the parameter, "" for a ratio."""
     return "" if case.unit == "1" else case.unit
 
 
 def axis_of(case: Case) -> dict[str, Any]:
-    """The parameter's axis, logarithmic, harsher to the right."""
+    """The parameter's axis: logarithmic, with harsher values to the right."""
     harsh_left = case.values[0] > case.values[-1]
     title = case.parameter if case.unit == "1" else f"{case.parameter} ({case.unit})"
     return {"title": title, "type": "log"} | ({"autorange": "reversed"} if harsh_left else {})

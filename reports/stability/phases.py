@@ -1,5 +1,5 @@
-"""Where in its step a collision happens in the runs of a case: evenly spread and random, few the
-first of many."""
+"""Where within its step a collision happens in the runs of a case: half of the phases evenly
+spread, half random, in an order such that the first few are a good sample."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ def sampled(seed: int) -> tuple[float, ...]:
 
 
 def phase(run: int) -> float:
-    """Where in its step the collision of a run happens, from 0 to 1, its beginning and its end.
+    """Where within its step the collision of a run happens: 0 is the beginning of the step, 1
+    its end.
 
-    Run 0 has it at the step's very beginning, found latest of all; of the others every second is
-    spread evenly (van der Corput, 1/2, 1/4, 3/4, 1/8 ...), and the rest are random: what repeats
-    with the step could miss the even ones alone.
+    Run 0 has it at the very beginning, where it is found latest. Of the other runs every second
+    follows an even sequence (van der Corput: 1/2, 1/4, 3/4, 1/8 ...) and the rest are random,
+    because an error that repeats with the step could escape the even ones.
     """
     if run == 0:
         return EDGE

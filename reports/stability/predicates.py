@@ -1,5 +1,5 @@
-"""What failing means: named predicates with units, each a number read off a run and the bound it
-must not pass."""
+"""What failing means: each predicate reads one number with a unit from a run and has a bound
+above which the run fails."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from scenarios.model import Array, Scenario, Trajectory
 
 
 class Reading(NamedTuple):
-    """A number in the predicate's unit; when (s), how and at which disk (-1: all) it broke, and
-    what: a predicate."""
+    """A number in the predicate's unit; if it broke: when (s), how, at which disk (-1: all), and
+    which predicate."""
 
     value: float
     at: float = np.nan
@@ -44,7 +44,8 @@ class Predicate(NamedTuple):
 
 
 def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
-    """Read a run; one that was refused, broke off or raised fails with its reason."""
+    """Read a run; a run that was refused, stopped early or raised an exception fails with its
+    reason."""
     if run.status != "ok" or run.trajectory is None:
         outcome = "refused" if run.status == "unsupported" else run.status
         at = float(run.trajectory.t[-1]) if run.trajectory is not None else 0.0
@@ -58,19 +59,20 @@ def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
 
 
 def first_above(t: Array, series: Array, bound: float) -> float:
-    """s, the first sample at which the series (k,) is above its bound; the last if it never is."""
+    """s, the first sample at which the series (k,) exceeds its bound; the last sample if it
+    never does."""
     above = ~(series <= bound)
     return float(t[np.argmax(above)] if above.any() else t[-1])
 
 
 def truth_of(scenario: Scenario) -> Trajectory:
-    """The exact answer at the samples; a scenario of these cases always has one."""
+    """The exact answer at the samples; every scenario of these cases has one."""
     assert scenario.truth is not None
     return scenario.truth(scenario.times)
 
 
 def gain(trajectory: Trajectory) -> Array:
-    """(n,) m/s by which each disk's velocity differs between start and end."""
+    """(n,) m/s, by how much each disk's velocity changes between start and end."""
     change: Array = np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
     return change
 
@@ -185,11 +187,11 @@ def _bounces_off(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def apexes(scenario: Scenario, played: Trajectory) -> Array:
-    """(k,) how high a dropped ball comes in each flight, the drop itself the first, over the height
-    of the drop.
+    """(k,) the height that a dropped ball reaches in each flight, the drop itself first, over
+    the height of the drop.
 
-    An apex is the vertex of the parabola through the three highest samples of a flight, the first
-    three of the drop. A flight with fewer is left out.
+    An apex is the vertex of the parabola through the three highest samples of a flight, for the
+    drop through its first three. A flight with fewer samples is left out.
     """
     y = played.position[:, 0, 1] - scenario.scene.radius[0]
     top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
@@ -201,7 +203,7 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
 
 
 def first_bounce(scenario: Scenario) -> float:
-    """s, when a ball dropped over y = 0 collisions for the first time."""
+    """s, when a ball dropped onto y = 0 first hits it."""
     scene = scenario.scene
     return float(np.sqrt(2 * (scene.position[0, 1] - scene.radius[0]) / -scene.gravity[1]))
 

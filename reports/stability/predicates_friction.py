@@ -1,5 +1,5 @@
-"""What failing means where there is friction: it brakes or turns a disk otherwise than Coulomb's
-law, or moves one at rest."""
+"""What failing means where there is friction: a disk is slowed, turned or moved in another way
+than Coulomb's law says."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def _friction_off(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def tangent_of(scene: Scene) -> Array:
-    """(2,) along the surfaces of these scenes: of a floor, else of two disks one beside the
-    other."""
+    """(2,) unit vector along the contact in these scenes: along the floor, or between two disks
+    side by side."""
     return np.array([1.0, 0.0] if len(scene.walls) else [0.0, 1.0])
 
 
 def impulses(trajectory: Trajectory, scene: Scene, tangent: Array) -> Array:
-    """(2, n) N s of friction from start to end, as the disks' velocities show it and as their spins
-    do: m dv and I dw / r. Both are equal in size if it acts on the rim."""
+    """(2, n) N s of friction from start to end, once from the disks' velocities (m dv) and once
+    from their spins (I dw / r). The two have the same size if friction acts at the rim."""
     dv = (trajectory.velocity[-1] - trajectory.velocity[0]) @ tangent
     dw = trajectory.angular_velocity[-1] - trajectory.angular_velocity[0]
     return np.array([scene.mass * dv, scene.inertia * dw / scene.radius])

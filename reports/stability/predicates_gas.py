@@ -1,4 +1,5 @@
-"""What failing means for gases at e = 1: what drifts, and what departs from the literature."""
+"""What failing means for gases at e = 1: a conserved quantity drifts, or a statistic departs
+from the literature."""
 
 from __future__ import annotations
 
@@ -101,8 +102,7 @@ def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def literature(scenario: Scenario) -> Gas:
-    """What the gas of equal disks of a scenario should do, at the temperature that it starts
-    with."""
+    """What the literature says of the scenario's gas of equal disks, at its initial temperature."""
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n

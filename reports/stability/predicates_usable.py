@@ -1,4 +1,5 @@
-"""Whether a scene at large can be used as it was played: it is whole, and no collision is wrong."""
+"""Whether a scene as a whole can be used as it was played: the run is complete, and no collision
+is wrong."""
 
 from __future__ import annotations
 
@@ -75,11 +76,11 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
 
 
 def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
-    """A disk that keeps its velocity and does not go its way, as the last place of its position is
-    too coarse.
+    """The largest part of its way that a disk loses in a sample interval although it keeps its
+    velocity, because the last digit of its position is too coarse.
 
-    Before its first collision only: two collisions between two samples may leave it the velocity it
-    had.
+    Read before the first collision of a disk only: two collisions between two samples may leave
+    it with the velocity it had.
     """
     scene, v, collisions = scenario.scene, played.velocity, played.collisions
     if len(played) < 2 or scene.wrap is not None:
@@ -124,8 +125,8 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
-    """The first true collision up to `end` s of a pair that never collisions in the run; `match`
-    lets those pass that are close."""
+    """The first true collision up to `end` s of a pair that never collides in the run. `match`
+    leaves out such a collision near the start."""
     hard = (true.impulse > 0) & (true.t < end)
     missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
     return (

@@ -577,8 +577,8 @@ REASONS = (
 
 
 def reason_of(limit: Limit) -> Reason | None:
-    """The first row that fits; None where nothing failed. Of a scene of one's own only what holds
-    in all of them."""
+    """The first row that fits; None if nothing failed. For a user's own scene only rows that
+    hold in every scene."""
     if limit.verdict == NEVER_FAILS:
         return None
     rows = [row for row in REASONS if limit.case in CASES or row.cases == "*"]

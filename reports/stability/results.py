@@ -1,5 +1,5 @@
-"""The stability report: every case on every engine through the runner, journalled as each ends,
-with its table of limits."""
+"""Carries out the stability report: every case on every engine, written to a journal as each one
+ends, and the table of limits."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ SLOWEST_FIRST = (
 
 @dataclass(frozen=True)
 class StabilityPlan:
-    """What is asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and `ENGINES`, a
-    key of `FORMS`."""
+    """What was asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and
+    `ENGINES`, and a key of `FORMS`."""
 
     cases: Sequence[str]
     maps: Sequence[str]
@@ -86,7 +86,8 @@ class StabilityPlan:
 
 @dataclass(frozen=True)
 class Task:
-    """A case, a map or a scene of touching disks on an engine: independent of every other."""
+    """A case, a map or a scene of touching disks on one engine; tasks do not depend on each
+    other."""
 
     kind: str
     name: str
@@ -120,7 +121,7 @@ def found_limit(task: Task, folder: Path) -> Limit:
 def carry_out(
     plan: StabilityPlan, journal: Journal, done: Collection[Task], progress: Progress
 ) -> None:
-    """Do every task that is not `done`; all goes into the journal's folder."""
+    """Do every task that is not in `done`; all results go into the journal's folder."""
     folder = journal.path.parent
     (folder / "trajectories").mkdir(exist_ok=True)
     files = {
@@ -147,7 +148,7 @@ def carry_out(
 
 
 def tasks_of(plan: StabilityPlan) -> list[Task]:
-    """All tasks, the slowest first, so that none is left over at the end."""
+    """All tasks, the slowest first, so that no long one is left at the end."""
     smooth = [name for name in plan.engines if name not in WITH_FRICTION_ONLY]
     tasks = [
         Task("map", name, engine, plan.form)
@@ -166,7 +167,7 @@ def tasks_of(plan: StabilityPlan) -> list[Task]:
 
 
 def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
-    """What is known of a task whose worker died or was stopped."""
+    """The result of a task whose worker died or was stopped."""
     if task.kind == "map":
         return MapOf(task.name, task.engine, (), status=failure.status)
     if task.kind == "law":
@@ -189,8 +190,8 @@ class StabilityResults(NamedTuple):
 
 
 def read(folder: Path) -> StabilityResults:
-    """The stability report in a folder, in reading order; raises `ValueError` if its journal cannot
-    be used."""
+    """The stability report in a folder, in reading order; raises `ValueError` if its journal
+    cannot be used."""
     headers, results = journalled(folder)
     limits = [one for one in results.values() if isinstance(one, Limit)]
     maps = [one for one in results.values() if isinstance(one, MapOf)]
@@ -212,11 +213,11 @@ def read(folder: Path) -> StabilityResults:
 
 
 def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
-    """The headers in a folder's journal, and what came of every task; of two lines on one the later
-    holds.
+    """The headers in a folder's journal, and the result of every task; if a task has two lines,
+    the later one counts.
 
     Raises:
-        ValueError: naming a line that does not fit.
+        ValueError: with the line that does not fit.
     """
     made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
         "limit": limit_from,
@@ -241,7 +242,8 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
 
 
 def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """As `impossible`, of a limit whose case is known: not of a file that is not what it was."""
+    """As `impossible`, for a limit whose case is known; a scene file that has changed since is
+    not checked."""
     path = (
         ""
         if not isinstance(result, Limit) or result.case in CASES
@@ -253,7 +255,7 @@ def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
-    """The limit of a line of the journal, where what is not finite is text."""
+    """The limit in a line of the journal, in which numbers that are not finite are text."""
     trials = tuple(
         Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"]
     )
@@ -263,7 +265,7 @@ def limit_from(record: dict[str, Any]) -> Limit:
 
 
 def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
-    """These of a record as numbers: of the other fields a text may be "nan"."""
+    """These fields of a record as numbers; other fields may hold the text "nan"."""
     return {name: float(record[name]) for name in names}
 
 
@@ -286,7 +288,7 @@ def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:
-    """A row a limit, columns `COLUMNS`."""
+    """A row for each limit, with the columns `COLUMNS`."""
     return pd.DataFrame([row_of(limit) for limit in limits], columns=list(COLUMNS))
 
 
@@ -321,5 +323,5 @@ def row_of(limit: Limit) -> dict[str, Any]:
 
 
 def shortened(value: float) -> float:
-    """To six significant digits: brackets are wider."""
+    """The number with six significant digits; no bracket is narrower."""
     return value if math.isnan(value) else float(f"{value:.6g}")

@@ -1,5 +1,5 @@
-"""Finds the limit up to which an engine works: the first failure on the way from gentle to harsh,
-then bisection."""
+"""Finds the limit up to which an engine works: a scan from gentle to harsh up to the first
+failure, then bisection."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class Search:
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
     def limit(self) -> Limit:
-        """Scan to the first failure, and bisect between it and the value before; the values beyond
-        are played as well."""
+        """Scan to the first failure and bisect between it and the value before; harsher values
+        are played too."""
         scan = self.case.scan(self.form)
         first = next(
             (k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan)
@@ -64,10 +64,10 @@ class Search:
         return good, bad
 
     def trial(self, value: float, runs: int = ALL, to_the_end: bool = False) -> Trial:
-        """Play up to `runs` runs at a value; stop when more have failed than are allowed, unless
-        the form is the full one.
+        """Play up to `runs` runs at a value, and stop when more have failed than may (not in the
+        full form).
 
-        If a run has failed and some may fail by chance, all runs are played.
+        If a run failed and some may fail by chance, all runs are played.
         """
         most, readings = self.case.runs, self.readings.setdefault(value, [])
         failed = sum(reading.failed for reading in readings)
@@ -85,12 +85,12 @@ class Search:
 
     @property
     def few(self) -> int:
-        """The runs at a value of the scan: at least half of all where some may fail by chance."""
+        """The runs at a scanned value; at least half of all if some may fail by chance."""
         return max(self.form.few, self.case.runs // 2) if self.case.by_chance else self.form.few
 
     @property
     def allowed(self) -> int:
-        """How many runs at a value may fail by chance."""
+        """The number of runs at a value that may fail by chance."""
         return int(self.case.by_chance * self.case.runs)
 
     def tried(self, value: float) -> Trial:
@@ -117,7 +117,7 @@ class Search:
         )
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
-        """The limit, with all that was tried from gentle to harsh; at its failure every run is
+        """The limit with all trials from gentle to harsh; at its failing value every run is
         played."""
         if not isnan(fails_at):
             self.trial(fails_at, to_the_end=True)

@@ -1,8 +1,8 @@
-"""Which law an engine follows where touching disks are struck, and how far they must be apart until
-the question is gone.
+"""Which law an engine follows when touching disks are hit, and how large the gaps must be until
+the question disappears.
 
-Named, never scored: where disks touch, no limit of small gaps decides; where they do not, the exact
-answer does.
+The law is named, never scored: where disks touch, the limit of small gaps does not decide
+between laws; where there are gaps, the exact answer does.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class AtGap(NamedTuple):
 
 @dataclass(frozen=True)
 class LawOf:
-    """What an engine did at every gap."""
+    """The result of an engine at every gap."""
 
     name: str
     engine: str
@@ -104,7 +104,7 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk strikes a row of n - 1."""
+    """A disk hits a row of n - 1 disks."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))
@@ -140,8 +140,8 @@ TOUCHING = {
 
 
 def scene_of(one: Touching, gap: float) -> Scenario:
-    """Disk 0 flies in and is there in the middle of its fourth step; seen until the last collision
-    is long over."""
+    """Disk 0 flies in and arrives in the middle of its fourth step; the scene lasts until long
+    after the last collision."""
     position = (one.position + gap * one.displaced) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
     n = len(position)
@@ -159,8 +159,8 @@ def scene_of(one: Touching, gap: float) -> Scenario:
 
 @cache
 def answers(name: str, gap: float) -> dict[str, list[Array]]:
-    """Law -> the velocities (n, 2) it allows; of disks that do not touch, pair after pair is the
-    exact answer."""
+    """Law -> the velocities (n, 2) that it allows; if the disks do not touch, the exact answer
+    is pair after pair."""
     one = TOUCHING[name]
     if gap == 0:
         return one.laws
@@ -187,7 +187,7 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
 
 
 def named(velocity: Array, gap: float, laws: dict[str, list[Array]]) -> AtGap:
-    """The law that velocities (n, 2), in units of the incoming speed, are nearest to."""
+    """The law whose velocities are nearest to these (n, 2), in units of the incoming speed."""
     off = {
         law: min(float(np.abs(velocity - v).max()) for v in allowed)
         for law, allowed in laws.items()

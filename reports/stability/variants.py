@@ -1,5 +1,5 @@
-"""Who is put to the test: every row of `ENGINES`, and engines with one thing changed, to test a
-reason by."""
+"""The engines that are tested: every row of `ENGINES`, and engines with one thing changed, by
+which a reason is tested."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from scenarios.model import Scenario, Scene
 
 
 class Variant(NamedTuple):
-    """A name, engine:profile; how to make its engine; and what is changed in it: "" for a row of
-    `ENGINES`."""
+    """A name, engine:profile; a function that makes the engine; and what is changed in it, ""
+    for a row of `ENGINES`."""
 
     name: str
     make: Callable[[], Engine]
@@ -24,7 +24,7 @@ class Variant(NamedTuple):
 
 
 class Changed:
-    """An engine with one thing changed right after `load`; all else is passed on."""
+    """An engine with one thing changed right after `load`; all other calls are passed on."""
 
     def __init__(self, engine: Engine, change: Callable[[Any], None]) -> None:
         self.engine, self.change = engine, change
@@ -39,14 +39,14 @@ class Changed:
 
 
 def varied(name: str, variant: str) -> Any:
-    """The engine of a row of `ENGINES` as one of the row's variants."""
+    """The engine of a row of `ENGINES`, changed as one of the row's variants says."""
     settings, _, loaded = ENGINES[name].variants[variant]
     engine = changed(name, **settings)
     return Changed(engine, loaded) if loaded else engine
 
 
 def with_variant(variant: str) -> tuple[str, ...]:
-    """The keys of `VARIANTS` of all engines that have this variant."""
+    """The keys in `VARIANTS` of all engines that have this variant."""
     return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
 
 
@@ -72,5 +72,5 @@ def played(variant: Variant, scenario: Scenario) -> Run:
 
 
 def play_as(engine: str, scenario: Scenario) -> Run:
-    """`played` by a key of `VARIANTS`."""
+    """`played`, by a key of `VARIANTS`."""
     return played(VARIANTS[engine], scenario)

@@ -1,4 +1,4 @@
-"""A case out of a scene that nobody here wrote: a scene file, and what of it is varied."""
+"""A case from a user's scene file: the scene, and one quantity of it that is varied."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FAMILY = "A scene of your own"
 
 
 def at_speed(one: Scenario, x: float) -> Scenario:
-    """All start velocities and spins times x."""
+    """All initial velocities and spins times x."""
     scene = one.scene
     faster: Scene = replace(
         scene, velocity=scene.velocity * x, angular_velocity=scene.angular_velocity * x
@@ -46,7 +46,8 @@ def at_restitution(one: Scenario, x: float) -> Scenario:
 
 
 def at_scale(one: Scenario, x: float) -> Scenario:
-    """All lengths times x, times as they are: velocities, gravity and thrusts grow along."""
+    """All lengths times x at the same times, so that velocities, gravity and thrusts grow with
+    them."""
     scene = one.scene
     larger: Scene = replace(
         scene,
@@ -63,7 +64,7 @@ def at_scale(one: Scenario, x: float) -> Scenario:
 
 
 def at_tempo(one: Scenario, x: float) -> Scenario:
-    """The same film x times as fast, in steps that are as much shorter."""
+    """The same motion x times as fast, in steps that are shorter by the same factor."""
     scene = one.scene
     sped: Scene = replace(
         scene,
@@ -86,7 +87,7 @@ def at_tempo(one: Scenario, x: float) -> Scenario:
 
 
 def at_offset(one: Scenario, x: float) -> Scenario:
-    """All of it moved by x m to the right."""
+    """The whole scene moved by x m to the right."""
     scene, by = one.scene, np.array([x, 0.0])
     moved = replace(
         scene,
@@ -100,11 +101,11 @@ def at_offset(one: Scenario, x: float) -> Scenario:
 def similar(
     one: Scenario, size: float = 1.0, tempo: float = 1.0, by: Array | float = 0.0
 ) -> Callable[[Array], Trajectory] | None:
-    """The exact answer of a scene so many times as large and as fast, and moved by so many m, from
-    that of the scene.
+    """The exact answer of a scene scaled in size and speed and moved by so many m, computed from
+    that of the scene itself.
 
-    It is exact but for the last place of the scene's numbers; the oracle itself follows nothing
-    that is far from 1.
+    It is exact except for the last digit of the scene's numbers; the oracle does not accept
+    scenes whose scale is far from 1.
     """
     truth = one.truth
     if truth is None:
@@ -133,7 +134,7 @@ def similar(
 
 
 def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
-    """The thrust times so much."""
+    """The thrust times a factor."""
     return replace(thrust, force=thrust.force * force, torque=thrust.torque * torque)
 
 
@@ -141,8 +142,8 @@ FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3)
 
 
 class Varied(NamedTuple):
-    """What is varied in a scene file: what a value of it is, its unit, the values to scan, and
-    how."""
+    """What can be varied in a scene file: what a value means, its unit, the values to scan, and
+    how the scene is changed."""
 
     parameter: str
     unit: str
@@ -184,7 +185,7 @@ VARIES = {
 
 
 def varied(path: str, what: str, x: float, _run: int) -> Scenario:
-    """The scene of a file at the finest step of its ladder, with one thing varied."""
+    """The scene of a file at the finest step of its ladder, with one quantity varied."""
     one = read_scene_file(Path(path))
     if what == "dt":
         return in_steps(one, x)

@@ -163,8 +163,8 @@ def test_every_change_is_tried_on_somebody():
 
 
 def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
-    """Within two steps of the start `match` lets it pass; a pair that should collision, and never
-    does, is a wrong collision."""
+    """`match` leaves out a collision within two steps of the start; but a pair that should
+    collide and never does is a wrong collision."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "speed"), "reference:exercise", QUICK)
     fast = search.trial(1000.0)
