@@ -73,7 +73,7 @@ def slip_at_rest(view: View) -> Value | None:
 
 
 def rubs(view: View) -> bool:
-    """Whether in the exact answer, which the run is beside, disks collide with friction."""
+    """Whether disks collide with friction in the exact answer that the run is compared with."""
     if not view.scenario.scene.friction or view.other is None or view.jumps is None:
         return False
     return bool(view.other.collisions.impulse.any())

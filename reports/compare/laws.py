@@ -20,10 +20,12 @@ ON_THE_WALL = 1e-9  # radii: more than rounding, in the coordinates of any scene
 
 
 def once(law: Law) -> Law:
-    """The law, worked out once for the same arguments and forgotten with the first of them.
+    """The law, evaluated once for the same arguments and forgotten together with the first of
+    them.
 
-    Trajectories, scenes and scenarios are frozen, and equal only to themselves. A run is set
-    against each other engine at its dt: without this its energy would be added up some forty times.
+    Trajectories, scenes and scenarios are frozen, and equal only to themselves. A run is
+    compared with each other engine at its dt: without this its energy would be computed about
+    forty times.
     """
     known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
 
@@ -38,7 +40,7 @@ def once(law: Law) -> Law:
 
 
 def read_only(value: Any) -> Any:
-    """The same; an array cannot be edited any more."""
+    """The same array, which can no longer be written to."""
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
     return value

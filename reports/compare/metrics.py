@@ -123,7 +123,7 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall, so that no collision can bring them back."""
+    """Disks whose centre has crossed a wall, which no collision can bring back."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))

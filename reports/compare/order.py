@@ -1,4 +1,4 @@
-"""The order of convergence with an interval, and what stands in the way of one."""
+"""The order of convergence with an interval, or what prevents one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which points nobody beats, and what an accuracy costs."""
+"""The points that no other point beats, and the cost of an accuracy."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAILED = "failed"
 
 
 class Reached(NamedTuple):
-    """What an accuracy costs: µs per simulated second at dt in s; or nan and why it is not
+    """The cost of an accuracy: µs per simulated second at dt in s; or nan and why it is not
     reached."""
 
     cost: float

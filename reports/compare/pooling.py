@@ -1,5 +1,5 @@
-"""All scenarios in one number: the geometric mean of the middle half of them, and how much any one
-of them moves it."""
+"""All scenarios in one number: the geometric mean of their middle half, and how much any single
+scenario changes it."""
 
 from __future__ import annotations
 

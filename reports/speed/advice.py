@@ -75,7 +75,7 @@ class Attempt:
 
     @property
     def make(self) -> Callable[[], Engine]:
-        """How to make the engine."""
+        """A function that makes the engine."""
         made = {(option.engine, option.change): option.make for option in OPTIONS}
         return made.get((self.name, self.change)) or row_of(self.name).make
 
@@ -192,7 +192,7 @@ def advise(
 
 
 def held_by(scene: str, seed: int) -> Scenario:
-    """The scenario up to the horizon of its exact answer; raises `NoAdvice` without one."""
+    """The scenario up to the horizon of its exact answer; raises `NoAdvice` if it has none."""
     try:
         return ladder.held(scene, seed).scenario
     except NoTruth as refusal:
@@ -215,7 +215,7 @@ def changes(one: Attempt) -> list[str]:
 
 
 def smallest(one: Attempt) -> float:
-    """Sort key: the error; a failed attempt, or one that cannot be judged, comes last."""
+    """Sort key: the error; an attempt that failed or cannot be judged comes last."""
     return one.error if isfinite(one.error) else inf
 
 
@@ -250,7 +250,7 @@ def attempts(
 
 
 def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, str]:
-    """The error of one run up to the horizon; inf and why if it failed."""
+    """The error of one run up to the horizon; inf and the reason if it failed."""
     scenario, truth = ladder.held(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
     if run.status != "ok" or run.trajectory is None:
@@ -262,7 +262,7 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
 def timed(
     scene: str, seed: int, played: Sequence[Attempt], progress: Progress
 ) -> tuple[list[Attempt], float, float]:
-    """The attempts with their costs, the noise, and how many cores others kept busy."""
+    """The attempts with their costs, the noise, and how many cores other programs used."""
     if not played:
         return [], nan, nan
     makes = {
@@ -292,7 +292,8 @@ def reasons(
     workers: int,
     progress: Progress,
 ) -> list[Short]:
-    """What most of the error of each is made of at the finest step, by the error budget."""
+    """The largest contribution to the error of each engine at the finest step, from the error
+    budget."""
     tasks = {
         one.task: partial(budget_of, scene, seed, played_as(one.name), finest)
         for one in short

@@ -1,8 +1,8 @@
-"""Where an engine's error comes from: its mechanisms enabled in the reference one at a time,
-and what is left over.
+"""What an engine's error consists of: its mechanisms are enabled in the reference one at a time,
+and what remains is the residual.
 
-As vectors, disk by disk and sample by sample, the contributions close: engine - truth =
-contributions + interplay + residual.
+As vectors, for each disk and sample, the contributions close: engine - truth = contributions +
+interplay + residual.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ LIMIT = 0.5
 
 
 class NotPlayed(Exception):
-    """An engine failed the scene, so that there is nothing to explain."""
+    """The engine failed in the scene, so that there is no error to explain."""
 
 
 class Offset(NamedTuple):
@@ -84,8 +84,8 @@ class Offset(NamedTuple):
         return float(np.sqrt((self.position**2).sum(axis=2).mean()))
 
     def share_of(self, total: Offset) -> float:
-        """By how much of the total's position it lies along it: what adds up to the total has 1 in
-        all."""
+        """The share of the total's position error along this one; the shares of what adds up to
+        the total sum to 1."""
         size = float((total.position**2).sum())
         return float((self.position * total.position).sum()) / size if size else 0.0
 
@@ -172,10 +172,10 @@ class Window:
     dt: float
 
     def played(self, make: Callable[[], Engine]) -> Run:
-        """What a new engine makes of it.
+        """The run of a new engine.
 
         Raises:
-            NotPlayed: it has failed.
+            NotPlayed: the engine failed.
         """
         run = play_once(make, "one:run", self.scenario, self.dt)
         if run.status != "ok":

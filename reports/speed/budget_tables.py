@@ -1,5 +1,5 @@
-"""The error budget as tables: in which scenes which contribution is the largest, and all
-contributions of one scene side by side."""
+"""The error budget as tables: the largest contribution in each scene, and all contributions of
+one scene side by side."""
 
 from __future__ import annotations
 

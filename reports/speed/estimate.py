@@ -1,5 +1,5 @@
-"""How long a measurement will take where nothing else runs: a rough sum over the steps of
-everybody."""
+"""How long a measurement will take on an idle machine: a rough sum over the steps of all
+engines."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ PAGE = 8.0  # s
 
 
 def estimate(plan: SpeedPlan, measurements: Sequence[Measurement], reach: Reach) -> str:
-    """A sentence on how much there is to do and about how long it takes on an idle machine."""
+    """A sentence that says how much there is to measure and about how long it takes on an idle
+    machine."""
     budgets = BUDGET * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
     playing = (
         budgets + sum(seconds_to_play(measurement, reach) for measurement in measurements)
@@ -44,14 +45,14 @@ def estimate(plan: SpeedPlan, measurements: Sequence[Measurement], reach: Reach)
 
 
 def step_of(scenario: Scenario) -> float:
-    """s, of one step of a scene, in Python included."""
+    """s, of one step of a scene, with the time that Python takes."""
     n = scenario.scene.n
     wrapping = n * WRAP_DISK if scenario.scene.wrap is not None else 0.0
     return STEP + n * STEP_DISK + (FORCE if scenario.thrusts else 0.0) + wrapping
 
 
 def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
-    """s, of all step sizes, read at every sample."""
+    """s, to play all step sizes, read at every sample."""
     scenario, samples = (
         open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
@@ -61,7 +62,8 @@ def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
 
 
 def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> float:
-    """s, of all rounds of all step sizes; the middle one is there twice on a ladder of a scene."""
+    """s, for all rounds of all step sizes; on a ladder of a scene the middle step size is timed
+    twice."""
     scenario, samples = (
         open_scene(measurement.scene, measurement.seed),
         reach[measurement.scene, measurement.seed],
@@ -75,8 +77,8 @@ def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> f
 
 
 def all_rounds(run: float, effort: Effort) -> float:
-    """s, of samples of one run of so many s, or more to fill them, as `timing.interleaved` takes
-    them."""
+    """s, for the rounds of one run of this many s, which is repeated until it fills a sample, as
+    in `timing.interleaved`."""
     sample = max(run, LEAST)
     rounds = min(
         effort.rounds - WARM_UP, max(FEWEST_ROUNDS - WARM_UP, ceil(effort.budget / sample))
@@ -85,7 +87,7 @@ def all_rounds(run: float, effort: Effort) -> float:
 
 
 def seconds_of_sizes(effort: Effort) -> float:
-    """s, for the numbers of disks; who is slow drops out. Making ready takes as long as some twenty
-    steps."""
+    """s, for the numbers of disks; an engine that is too slow stops. Setting up takes as long as
+    about twenty steps."""
     steps = [STEP + n * STEP_DISK for n in effort.sizes]
     return len(ENGINES) * sum(all_rounds(step, effort) + 20 * step for step in steps)

@@ -1,5 +1,5 @@
-"""How much of the errors the budget explains, and over how much of the scenes: what is cut is part
-of the answer."""
+"""How much of the errors the error budget explains, and for how much of the scenes: what is cut
+off is stated too."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COLUMNS = [*WHOSE, "error_radii", "residual_radii", "note"]
 
 
 class Cut(NamedTuple):
-    """A scene that is not evaluated as far as its exact answer goes; both in s."""
+    """A scene that is evaluated for a shorter time than its exact answer lasts; both in s."""
 
     scenario: str
     until: float
@@ -29,8 +29,8 @@ class Cut(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """How many scenes, the simulated seconds evaluated and of their exact answers, and those that
-    are cut."""
+    """The number of scenes, the simulated seconds that are evaluated and those that have an
+    exact answer, and the scenes that are cut."""
 
     scenes: int
     evaluated: float

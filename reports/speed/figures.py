@@ -1,5 +1,5 @@
-"""The few figures that are kept in the repository, with machine and versions, and whether a new
-measurement agrees."""
+"""The figures that the repository keeps, with machine and versions, and the test whether a new
+measurement agrees with them."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ LOOSE = 3.0
 
 
 def figures(results: Results) -> pd.DataFrame:
-    """Columns `COLUMNS`: pooled points, cost at matched accuracy, cost by number of disks and its
-    exponent, driving."""
+    """Columns `COLUMNS`: the pooled points, the cost of each accuracy, the cost by number of
+    disks with its exponent, and what a call costs."""
     failed = results.pooled.failed
     parts = [
         results.pooled.assign(
@@ -96,8 +96,8 @@ def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.Dat
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
-    """The figures as CSV below comment lines that say on what machine, with what versions and how
-    quietly."""
+    """Write the figures as CSV, below comment lines with the machine, the versions and how quiet
+    the machine was."""
     noise = results.noise_summary()
     about = {
         "command": header["command"],
@@ -117,11 +117,11 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
 
 
 def keep(folder: Path) -> None:
-    """Keep figures, orders of convergence, and how much of the errors is explained, of a
+    """Keep the figures, the orders of convergence and the explained share of the errors of the
     measurement in `folder`.
 
-    The latter two hold no times: the same versions give the same rows on any machine of a kind, and
-    an engine that gives another's bits has no rows of its own.
+    The last two hold no times: the same versions give the same rows on every machine of a kind.
+    An engine that gives another's bits has no rows of its own.
     """
     KEPT.write_bytes((folder / "speed_figures.csv").read_bytes())
     for path in (ORDERS, EXPLAINED):
@@ -131,8 +131,8 @@ def keep(folder: Path) -> None:
 
 
 def read(path: Path = KEPT) -> pd.DataFrame:
-    """A table without its header; what is empty in a column of words is "", in one of numbers
-    nan."""
+    """A table without its header; an empty cell is "" in a column of words and nan in one of
+    numbers."""
     lines = [
         line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
     ]
@@ -141,8 +141,8 @@ def read(path: Path = KEPT) -> pd.DataFrame:
 
 
 def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
-    """(`engine:profile`, disks) -> how many times as dear as `YARDSTICK` a step is, each at its
-    fastest."""
+    """(`engine:profile`, disks) -> the cost of a step over that of `YARDSTICK`, each from its
+    fastest round."""
     rows = kept[kept.figure == "cost of a step"]
     best = {
         (f"{row['engine']}:{row['profile']}", int(float(row["at"]))): float(row["best"])
@@ -159,8 +159,8 @@ def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
 def drifted(
     kept: Mapping[tuple[str, int], float], fresh: Mapping[tuple[str, int], float]
 ) -> list[str]:
-    """A sentence for every ratio that is not within `LOOSE` of the one kept, or that only one of
-    the two has."""
+    """A sentence for every ratio that differs from the kept one by more than `LOOSE`, or that
+    only one of the two tables has."""
     said = [
         f"{name}, {n} disks: only one of the two has it"
         for name, n in sorted(set(kept) ^ set(fresh))

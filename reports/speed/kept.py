@@ -1,5 +1,5 @@
-"""What a measurement has got so far, on disk task by task, so that an interrupt loses nothing that
-has ended."""
+"""Stores the results of a measurement on disk, task by task, so that an interruption loses no
+finished task."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ TEXT = frozenset(
 
 
 class Kept:
-    """The results of tasks: those of an interrupted measurement of the same, and those of this one
+    """The results of tasks: those of an interrupted measurement of the same plan, and new ones
     as they come.
 
-    A task is a tuple of strings and whole numbers, a result what JSON can hold, numbers that are
-    not finite included.
+    A task is a tuple of strings and whole numbers. A result is what JSON can hold, and numbers
+    that are not finite.
     """
 
     def __init__(
@@ -80,19 +80,19 @@ class Kept:
             journal.append({"header": header})
 
     def __len__(self) -> int:
-        """How many had ended before."""
+        """The number of tasks that the interrupted measurement finished."""
         return len(self.results)
 
     def __contains__(self, task: tuple[Any, ...]) -> bool:
-        """Whether it had ended."""
+        """Whether the interrupted measurement finished this task."""
         return json.dumps(task) in self.results
 
     def __getitem__(self, task: tuple[Any, ...]) -> Any:
-        """What it gave."""
+        """The result of the task."""
         return numbered(self.results[json.dumps(task)])
 
     def add(self, task: tuple[Any, ...], result: Any) -> None:
-        """Keep what a task gave."""
+        """Store the result of a task."""
         self.journal.append({"task": task, "result": result})
 
 
@@ -106,8 +106,8 @@ def numbered(value: Any) -> Any:
 
 
 def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
-    """Why a line is of none of the scenarios by name or file, as the end of a sentence; "" if it is
-    of one."""
+    """Why a line belongs to none of the scenarios, as the end of a sentence; "" if it belongs to
+    one."""
     scene = scene_of(line["task"])
     if not scene:
         return ""

@@ -1,4 +1,4 @@
-"""Play one engine through one scene at several step sizes: its errors in one pass, its times in
+"""Plays one engine in one scene at several step sizes: its errors in one pass, its times in
 another."""
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from scenarios.no_truth import NoTruth
 
 
 class Held(NamedTuple):
-    """A scenario cut at the last sample before its truth's horizon, and its truth up to there."""
+    """A scenario cut at the last sample before the horizon of its exact answer, and the answer
+    up to there."""
 
     scenario: Scenario
     truth: Trajectory

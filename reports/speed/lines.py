@@ -1,5 +1,5 @@
-"""The schema of the journal of `crosscheck speed`: what a line holds, and what of it must be as
-scene and task say."""
+"""The format of the journal of `crosscheck speed`: what each line holds, and the checks that it
+fits its scene and task."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ Substeps = Annotated[int, Field(ge=1, le=10**7)]
 
 
 class Header(Line):
-    """The measurement that was asked for; only the very same is gone on with."""
+    """The measurement that was asked for; only exactly the same one can be resumed."""
 
     scenes: list[File]
     files: dict[File, Words]
@@ -67,7 +67,7 @@ class HeaderLine(Line):
 
 
 class Row(Line):
-    """What the rows of all tables have."""
+    """The fields that the rows of all tables have."""
 
     scenario: Words
     engine: Words
@@ -128,19 +128,19 @@ class SampleRow(Row):
 
 
 class Errors(Line):
-    """What a ladder gave."""
+    """The result of a ladder of step sizes."""
 
     result: Annotated[list[ErrorRow], Field(min_length=1)]
 
 
 class Budget(Line):
-    """What the contributions of an error are."""
+    """The contributions to an error."""
 
     result: Annotated[list[BudgetRow], Field(min_length=1)]
 
 
 class Samples(Line):
-    """What was timed together: of each thing every round from the warm-up on."""
+    """What was timed together: every round of each thing, the warm-up first."""
 
     result: list[SampleRow]
 
@@ -170,7 +170,7 @@ class Samples(Line):
 
 
 class SizesOf(Line):
-    """What steps cost by the number of disks, and who was not measured with so many."""
+    """The cost of a step by number of disks, and which engines were not measured at which sizes."""
 
     samples: list[SampleRow]
     stopped: list[Annotated[list[Any], Field(min_length=3, max_length=3)]]
@@ -276,14 +276,14 @@ KINDS = Kinds(
 
 
 def scene_of(task: list[Any]) -> str:
-    """The scene that a task is of; "" if it is of none."""
+    """The scene of a task; "" if it has none."""
     if task[0] == "budget":
         return str(task[1])
     return str(task[2]) if len(task) > 2 else ""
 
 
 def stranger(line: Mapping[str, Any], scenario: Scenario) -> str:
-    """Why a result is none of that scenario, as the end of a sentence; "" if it is."""
+    """Why a result does not belong to the scenario, as the end of a sentence; "" if it does."""
     rows = line["result"] if isinstance(line["result"], list) else [line["result"]]
     for k, row in enumerate(rows):
         if row["scenario"] != scenario.name:

@@ -1,5 +1,5 @@
-"""The two passes: first how far off everybody is, in parallel; then, alone on the machine, what it
-costs."""
+"""The two passes of a measurement: first the errors, in parallel; then the costs, one after the
+other with nothing else running."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Measured:
 
 
 def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Measured:
-    """Both passes of all that is planned; what is `kept` of an interrupted measurement is not done
+    """Both passes of the plan; results `kept` from an interrupted measurement are not measured
     again."""
     measured = Measured()
     reach = find_reach(plan, measured, progress)
@@ -69,8 +69,8 @@ def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Me
 
 
 def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach:
-    """(scene, seed) -> how many sample intervals have an exact answer; those that have none are
-    reported."""
+    """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
+    have none are reported."""
     # In workers, which can be stopped whatever they are doing.
     asked = {seeded: partial(ladder.reach_of, *seeded) for seeded in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
@@ -89,8 +89,8 @@ def measure_errors(
     progress: Progress,
     kept: Kept | None,
 ) -> list[Measurement]:
-    """How far off all engines are; returns those of the first seed, at the steps that they played
-    to their end."""
+    """The errors of all engines; returns those of the first seed at the steps that were played
+    to the end."""
     tasks = {measurement.task: measurement.errors for measurement in measurements}
     results = dict(done(tasks, plan.workers, progress, "error", kept=kept))
     rows: list[dict[str, Any]] = []
@@ -111,8 +111,8 @@ def measure_errors(
 
 
 def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict[str, Any]]:
-    """A ladder whose worker died or hung once more, each step size by itself, so that the others
-    are kept."""
+    """A ladder whose worker died or hung, played again one step size at a time, so that the
+    other step sizes are kept."""
     rows: list[dict[str, Any]] = []
     for k, result in run_all(
         {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes},
@@ -145,7 +145,7 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
 def measure_budget(
     plan: SpeedPlan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None
 ) -> None:
-    """What the errors are made of, of the engines whose mechanisms are known, at the middle dt."""
+    """The error budgets of the engines whose mechanisms are known, at the middle dt."""
     tasks = {
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
         for scene in plan.budget_scenes
@@ -171,7 +171,7 @@ def measure_times(
     progress: Progress,
     kept: Kept | None,
 ) -> None:
-    """What everything costs that was played to its end: one process, one thing at a time."""
+    """The cost of everything that was played to the end, in one process and one thing at a time."""
     measured.busy = busy_cores()
     rows: list[dict[str, Any]] = []
     truths = []
@@ -194,8 +194,8 @@ def measure_times(
 def timings(
     plan: SpeedPlan, played: Sequence[Measurement]
 ) -> dict[tuple[Any, ...], Callable[[], Any]]:
-    """The tasks of the second pass: all measurements of a kind in a scene in one, as they are
-    compared."""
+    """The tasks of the second pass: all measurements of one kind in one scene are one task,
+    because they are compared with each other."""
     often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
     tasks: dict[tuple[Any, ...], Callable[[], Any]] = {}
@@ -296,7 +296,7 @@ def done(
     patience: float = HANGS,
     kept: Kept | None = None,
 ) -> Iterable[tuple[Any, Any]]:
-    """Run the tasks and say so; results as they come, first those that are kept already."""
+    """Run the tasks with progress; yields the kept results first, then new ones as they come."""
     left = {task: do for task, do in tasks.items() if kept is None or task not in kept}
     if kept is not None:
         yield from ((task, kept[task]) for task in tasks if task not in left)

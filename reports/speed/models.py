@@ -18,10 +18,10 @@ RUNS = 20
 
 
 def closed_form(scene: str, seed: int) -> dict[str, Any]:
-    """scenario, truth: what the harness takes for the truth, closed_us: µs per simulated second of
-    a closed form.
+    """Rows of scenario, truth (the kind of exact answer) and closed_us: µs per simulated second
+    to compute a closed form.
 
-    One computed in many digits is kept on disk, so what it costs cannot be measured by asking
+    An answer computed in many digits is cached on disk, so its cost cannot be measured by asking
     again.
     """
     scenario = held(scene, seed).scenario
@@ -40,11 +40,11 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
 
 
 def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario: truth, closed_us, and the cheapest engine that is right to `FINEST` and to
-    1 % of a radius.
+    """A row for each scenario: truth, closed_us, and the cheapest engines with an error of at
+    most `FINEST` and of at most 1 % of a radius.
 
-    Columns model, engine, cost_us for the first and loose_engine, loose_us for the second; "" and
-    nan where none is.
+    The first are the columns model, engine and cost_us, the second loose_engine and loose_us; ""
+    and nan where no engine is that accurate.
     """
     rows = []
     for row in truths.to_dict("records"):
@@ -67,7 +67,8 @@ def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
 
 
 def best_of(points: pd.DataFrame) -> tuple[str, float]:
-    """`engine:profile` and µs per simulated second of the cheapest; "" and nan of none."""
+    """`engine:profile` and cost in µs per simulated second of the cheapest; "" and nan if there
+    is none."""
     if points.empty:
         return "", np.nan
     row = points.nsmallest(1, "cost").to_dict("records")[0]

@@ -1,4 +1,4 @@
-"""What is asked for, and everybody who is played and timed for it."""
+"""What is measured: the scenes, and the engines that are played and timed in them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Measurement(NamedTuple):
 
     @property
     def task(self) -> tuple[Any, ...]:
-        """What stands for it where results are kept."""
+        """The key under which its result is stored."""
         return ("error", *self[:5], *self.step_sizes)
 
     @property
@@ -65,22 +65,22 @@ class SpeedPlan:
 
     @property
     def options(self) -> list[Option]:
-        """The rows of `OPTIONS` for the engines that are asked for."""
+        """The rows of `OPTIONS` of the engines that were asked for."""
         return [option for option in OPTIONS if self.whole and option.engine in self.engines]
 
     @property
     def sweeps(self) -> list[Sweep]:
-        """The rows of `SWEEPS` for the engines that are asked for."""
+        """The rows of `SWEEPS` of the engines that were asked for."""
         return [sweep for sweep in SWEEPS if self.whole and sweep.engine in self.engines]
 
     @property
     def option_scenes(self) -> tuple[str, ...]:
-        """Where the changed engines are measured, if any are."""
+        """The scenes in which options are measured; none if only some scenes were asked for."""
         return self.effort.option_scenes if self.options else ()
 
     @property
     def sweep_scenes(self) -> tuple[str, ...]:
-        """Where parameters are swept, if any are."""
+        """The scenes in which parameters are swept; none if only some scenes were asked for."""
         return self.effort.sweep_scenes if self.sweeps else ()
 
     @property
@@ -90,7 +90,7 @@ class SpeedPlan:
 
     @property
     def seeded_scenes(self) -> list[tuple[str, int]]:
-        """(scene, seed) of all that an exact answer is needed for."""
+        """(scene, seed) for which an exact answer is needed."""
         scenes = dict.fromkeys((*self.scenes, *self.option_scenes, *self.sweep_scenes))
         seeded = [
             (scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)

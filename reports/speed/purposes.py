@@ -30,8 +30,8 @@ def of_trajectory(view: View) -> float:
 
 
 def of_energy(view: View) -> float:
-    """The metric `energy_error`, over the energy at hand: by the law where energy is kept, else
-    beside the exact answer."""
+    """The metric `energy_error`, over the energy at hand: against the law where energy is
+    conserved, else against the exact answer."""
     alone = View(view.scenario, view.dt, view.played, rounding=view.rounding)
     found = (METRICS["energy_error"].of(each) for each in (alone, view))
     return next((float(value.value) for value in found if value is not None), nan)

@@ -1,4 +1,4 @@
-"""All tables of a measurement in one place, as the page shows them and the files hold them."""
+"""All tables of a measurement in one place, for the page and for the files."""
 
 from __future__ import annotations
 
@@ -46,13 +46,14 @@ class Results:
 
     @cached_property
     def asks(self) -> dict[str, str]:
-        """scenario -> its question, of those that were measured, in the order asked for."""
+        """Scenario -> its question, for the measured scenarios in the order in which they were
+        asked for."""
         named = dict(tables.asks_of(scene) for scene in self.plan.scenes)
         return {name: asks for name, asks in named.items() if name in set(self.points.scenario)}
 
     @property
     def scenes(self) -> list[str]:
-        """Those that were measured."""
+        """The measured scenarios."""
         return list(self.asks)
 
     @cached_property
@@ -74,7 +75,8 @@ class Results:
         return tables.reached(self.points, self.orders)
 
     def poolable(self, table: pd.DataFrame) -> pd.DataFrame:
-        """The rows of scenes without friction, of which is all that is pooled; all if none is."""
+        """The rows of scenes without friction, which alone are pooled; all rows if every scene
+        has friction."""
         opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
         rough = table.scenario.isin([one.name for one in opened if one.scene.friction])
         return table if rough.all() else table[~rough]

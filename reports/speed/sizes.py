@@ -1,4 +1,4 @@
-"""What a step costs against the number of disks, in a gas."""
+"""What a step of a gas costs against the number of disks."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def costs(
     patience: float,
     seed: int,
 ) -> tuple[list[Sample], dict[tuple[str, int], str]]:
-    """Samples, s a step, by (name, n), from few disks to many; and who was not measured where, and
-    why.
+    """Samples in s a step, by (name, n), from few disks to many; and which engines were not
+    measured at which sizes, and why.
 
-    An engine that would take longer than `patience` s for a step at the next size, as its last two
-    sizes extend, stops there.
+    An engine stops before a size at which a step would take longer than `patience` s,
+    extrapolated from its last two sizes.
     """
     samples: list[Sample] = []
     left_out: dict[tuple[str, int], str] = {}
@@ -79,8 +79,7 @@ def costs(
 
 
 class _Going:
-    """A gas that is already going: every sample goes on where the one before left off, or begins
-    again."""
+    """A gas in motion: every sample continues where the last one ended, or starts again."""
 
     def __init__(self, engine: Engine, scene: Scene) -> None:
         """Find out how many steps fill a sample."""
@@ -108,7 +107,7 @@ class _Going:
 
 
 def foreseen(course: Sequence[tuple[int, float]], n: int) -> float:
-    """s a step with `n` disks, as the last two sizes extend; 0 where fewer are known."""
+    """s a step with `n` disks, extrapolated from the last two sizes; 0 if fewer are known."""
     if len(course) < 2:
         return 0.0
     (n1, cost1), (n2, cost2) = course[-2:]

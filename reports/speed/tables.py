@@ -1,4 +1,4 @@
-"""What the samples and errors come to: points, orders, what an accuracy costs, sizes, options, the
+"""The tables made from samples and errors: points, orders, cost of an accuracy, sizes, options,
 noise floor."""
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def beside(found: pd.DataFrame) -> pd.DataFrame:
 
 
 def measurable(here: pd.DataFrame) -> pd.Series:
-    """Whether there is something to divide by."""
+    """Whether there is a value to divide by."""
     finite: pd.Series = np.isfinite(here.cost_here) & np.isfinite(here.error_here)
     return finite & (here.error_here > 0)
 
@@ -121,7 +121,7 @@ def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
 
 
 def doublings(found: pd.DataFrame) -> pd.Series:
-    """How often the steps of a row have been halved from the scenario's coarsest."""
+    """How often the step of a row has been halved from the scenario's coarsest."""
     coarsest = found.groupby("scenario").substeps.transform("min")
     return (found.substeps / coarsest).map(np.log2).round().astype(int)
 
@@ -135,7 +135,7 @@ def times(measured: Measured, kind: str) -> pd.DataFrame:
 
 
 def in_us(table: pd.DataFrame) -> pd.DataFrame:
-    """Its times in µs."""
+    """The same times in µs."""
     columns = ["cost", "low", "high", "best", "wrapping"]
     return table.assign(**{column: table[column] * 1e6 for column in columns})
 
@@ -174,11 +174,11 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
 
 
 def no_nearer(fitted: pd.DataFrame) -> pd.Series:
-    """Of the rows of `orders`: whether from the coarsest to the finest step the error falls by less
-    than a tenth.
+    """For each row of `orders`, whether the error falls by less than a tenth from the coarsest
+    to the finest step.
 
-    Not so where all steps failed, or where the finest is right to `FINEST`; a failed finest step is
-    no nearer.
+    False if all steps failed, or if the finest one has an error of at most `FINEST`; True if
+    only the finest step failed.
     """
     falls = fitted.finest_error < NEARER * fitted.coarsest_error
     return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)

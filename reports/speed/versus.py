@@ -1,9 +1,9 @@
-"""What every engine with end-of-step detection costs over this project's own solver, scene by
-scene, at its cheapest.
+"""The cost of every engine with end-of-step detection over that of this project's own solver,
+scene by scene, each at its cheapest.
 
-Our own solver must not be called the cheapest by a pooled number alone: here is every scene in
-which it is not, with and without what an idle step costs (the binding and the engine's fixed cost),
-and for every changed setting measured.
+A pooled number alone must not make our own solver the cheapest: this lists every scene in which
+it is not, with and without the cost of an idle step (the binding and the engine's fixed cost),
+and for every changed setting that was measured.
 """
 
 from __future__ import annotations
