@@ -28,6 +28,7 @@ KILLED, ABORTED, TRAPPED, TERMINATED = (
 """The exit statuses of processes that these signals ended; None where there is no such signal."""
 OUT_OF_MEMORY = 77  # the exit status of a process that its thread ended
 PIECE = 1 << 20  # bytes
+BINARY: int = getattr(os, "O_BINARY", 0)  # without it Windows writes \r\n for \n
 LOOK = 0.1  # s between two looks of a thread that watches
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 # comes again until a command has ended; on Windows, which has no alarm, as Ctrl-C does

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.system import lock
+from adapters.system import BINARY, lock
 from scenarios.regular import opened
 
 JOURNAL = "journal.jsonl"
@@ -34,7 +34,7 @@ class Journal:
         """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it
         cannot be had."""
         self.path = folder / JOURNAL
-        self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
         try:
             lock(self.file)
             moved = not self.path.exists() or not os.path.samestat(

@@ -118,4 +118,6 @@ def main(words: Sequence[str]) -> None:
     line = socket.create_connection(("127.0.0.1", port))
     connection = Connection(line.detach())
     connection.send_bytes(bytes.fromhex(os.environ.pop(KEY)))
-    worker_process.work(connection, os.open(trail, os.O_WRONLY | os.O_APPEND), memory)
+    worker_process.work(
+        connection, os.open(trail, os.O_WRONLY | os.O_APPEND | system.BINARY), memory
+    )

@@ -31,7 +31,10 @@ OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # exits that no engine makes by
 PRINTED = 65536
 WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
 ASKING = "own_solver/process.py"  # waits for what a solver's file answers
-INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)')
+# of the thread that got the signal, which is the one that plays: others only watch
+INNERMOST = re.compile(
+    r'Current thread [^\n]*most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)'
+)
 
 
 class Worker:
