@@ -21,6 +21,7 @@ from time import process_time, sleep
 from typing import IO, Any
 
 KERNEL = sys.platform == "linux" and os.environ.get("CROSSCHECK_SYSTEM") != "portable"
+ALARMS = hasattr(signal, "setitimer")  # not on Windows
 LIMITED_BY = "the kernel" if KERNEL else "a thread that watches the process"
 KILLED, ABORTED, TRAPPED, TERMINATED = (
     -getattr(signal, name, 0) or None for name in ("SIGKILL", "SIGABRT", "SIGTRAP", "SIGTERM")
@@ -32,7 +33,7 @@ BINARY: int = getattr(os, "O_BINARY", 0)  # without it Windows writes \r\n for \
 LOOK = 0.1  # s between two looks of a thread that watches
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 # comes again until a command has ended; on Windows, which has no alarm, as Ctrl-C does
-REPEATED = signal.SIGALRM if KERNEL else signal.SIGINT
+REPEATED = signal.SIGALRM if ALARMS else signal.SIGINT
 # where in a file Windows locks a byte: behind all that is written, so that others may read
 LOCKED = 2**40
 
@@ -199,7 +200,7 @@ def stopped_after(
 
 def every(seconds: float) -> None:
     """From now on the main thread gets the signal `REPEATED` every so many s; 0: no more."""
-    if KERNEL:
+    if ALARMS:
         signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
         return
     global _repeating
@@ -218,7 +219,7 @@ def _repeat(seconds: float, over: threading.Event) -> None:
 @contextmanager
 def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
     """Within it none of these signals is handled in the main thread; one that came is, after it."""
-    if KERNEL:
+    if ALARMS:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
         try:
             yield
