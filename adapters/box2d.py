@@ -11,7 +11,7 @@ import numpy as np
 
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
-from adapters.library_versions import version
+from adapters.library_versions import BOX2D, version
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
 
@@ -318,7 +318,7 @@ class Box2DEngine:
 
     def versions(self) -> dict[str, str]:
         """The package; it carries its own copy of Box2D 2.3."""
-        return {"box2d-py": version("box2d-py")}
+        return {BOX2D: version(BOX2D)}
 
     def close(self) -> None:
         """Drop the world; Box2D frees it with the last reference."""

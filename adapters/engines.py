@@ -11,6 +11,7 @@ import numpy as np
 
 from adapters.engine import Engine
 from adapters.engine_row import FLOAT32, FLOAT64, EngineRow, Mark, Variant, Work
+from adapters.library_versions import BOX2D
 from adapters.matched import Searched
 from scenarios.model import Scene
 
@@ -115,7 +116,7 @@ _Pymunk = partial(
 )
 _Box2D = partial(
     EngineRow,
-    distributions=("box2d-py",),
+    distributions=(BOX2D,),
     mark=Mark("#00876c", "#5be0b5", "square"),
     searched=_box2d_searched,
     work=Work("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
 from importlib import metadata
+
+# The distribution of Box2D 2.3: the same C++ and the same bits, from source or as a wheel; see
+# pyproject.toml.
+BOX2D = "box2d-py" if sys.platform == "linux" else "box2d"
 
 
 @cache

@@ -27,4 +27,4 @@ def all_of(path: str | Path) -> bytes:
 
 def _without_waiting(path: str, flags: int) -> int:
     """Opens as `open` does, but does not wait for somebody to write into a pipe."""
-    return os.open(path, flags | os.O_NONBLOCK)
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))  # Windows has no such pipes

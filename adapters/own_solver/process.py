@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import pickle
-import select
 import signal
 import subprocess
 import tempfile
@@ -15,6 +14,7 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
+from adapters import system
 from adapters.engine import NotStarted
 from adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
 from adapters.own_solver.worker import HERE
@@ -97,9 +97,11 @@ class SolverProcess:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 env=os.environ | settings,
-                start_new_session=True,
                 bufsize=0,
+                **system.own_group(),
             )
+            assert self.process.stdout is not None
+            self.pieces = system.Pieces(self.process.stdout)
             if self.receive(STARTING) == HERE:
                 return
             why = "its first line was not the expected one"
@@ -148,18 +150,15 @@ class SolverProcess:
 
     def receive(self, limit: float) -> Any:
         """Read one line from the process, within `limit` s."""
-        assert self.process is not None
-        assert self.process.stdout is not None
         received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
             left = deadline - monotonic()
-            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, left))
-            if not ready or left < 0:  # a process that writes without end is always ready
+            chunk = self.pieces.next(left)
+            if chunk is None or left < 0:  # a process that writes without end always has a piece
                 self.close()
                 raise SolverFailed(
                     "timeout", f"does not come back within {limit:g} s and had to be stopped"
                 )
-            chunk = os.read(self.process.stdout.fileno(), 1 << 20)
             if not chunk:
                 raise self.lost()
             received += chunk
@@ -176,17 +175,17 @@ class SolverProcess:
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         # what V8 sends when its heap is full
-        ends_v8 = self.kind != "python" and -code in (signal.SIGTRAP, signal.SIGABRT)
-        if ends_v8:
+        ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
+        if ends_v8 or code == system.OUT_OF_MEMORY:
             return SolverFailed(
                 "memory", "wants more memory than it is given, and its process was ended"
             )
-        if -code == signal.SIGKILL:
+        if code == system.KILLED:
             return SolverFailed(
                 "crashed",
                 "its process was ended by SIGKILL, as a system does that runs out of memory",
             )
-        if -code == signal.SIGABRT:
+        if code == system.ABORTED:
             return SolverFailed("crashed", "its process was ended by SIGABRT")
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
         return SolverFailed("crashed", f"ended its own process ({name})")
@@ -195,7 +194,7 @@ class SolverProcess:
         """End the process and all it has started."""
         if self.process is not None:
             if self.process.poll() is None:
-                os.killpg(self.process.pid, signal.SIGKILL)
+                system.end_all(self.process.pid)
             self.process.wait()
             for stream in (self.process.stdin, self.process.stdout):
                 if stream is not None:

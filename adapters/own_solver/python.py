@@ -4,7 +4,6 @@ reference_impl."""
 from __future__ import annotations
 
 import random
-import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ from typing import Any
 from adapters.own_solver.beside import Neighbours
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
 from adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
+from adapters.system import stopped_after
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
 LOGGED = 400  # contacts that are kept for the judge
@@ -109,25 +109,16 @@ class PythonSolver:
         """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of
         processor time."""
 
-        def stop(_signal: int, _frame: FrameType | None) -> None:
-            raise SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
+        def too_late() -> SolverFailed:
+            return SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
 
-        timers = {
-            signal.ITIMER_PROF: (signal.SIGPROF, limit),
-            signal.ITIMER_REAL: (signal.SIGALRM, PATIENCE * limit),
-        }
-        for timer, (number, after) in timers.items():  # the clock stops what only waits
-            signal.signal(number, stop)
-            signal.setitimer(timer, after)
         try:
-            yield
+            with stopped_after(limit, PATIENCE * limit, too_late):
+                yield
         except SolverFailed:
             raise
         except BaseException as error:  # SystemExit too: a solver may not end the process
             raise self.failure(error, when) from None
-        finally:
-            for timer in timers:
-                signal.setitimer(timer, 0)
 
     def failure(self, error: BaseException, when: str) -> SolverFailed:
         """What was raised, in a sentence, with its place in the solver's file."""

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import os
 import pickle
-import resource
-import select
-import signal
+import queue
 import sys
 from json import dumps, loads  # as they are before a solver may replace them
 from pathlib import Path
 from threading import Thread
 from typing import IO, Any
 
+from adapters import system
 from adapters.own_solver.file import SolverFailed
 
 HERE = "here"  # what is said before anything of the solver is in this process
@@ -28,15 +27,14 @@ MEMORY = 2 * 2**30
 def main() -> None:
     """Load the text that the first line holds, say what it has, then answer request by request
     until the input ends."""
-    requests, answers = private_pipes()
-    Thread(target=end_with_parent, args=(requests,), daemon=True).start()
-    _, allowed = resource.getrlimit(resource.RLIMIT_DATA)  # which nobody but root may raise
-    most = MEMORY if allowed == resource.RLIM_INFINITY else min(MEMORY, allowed)
-    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    stream, answers = private_pipes()
+    requests: queue.SimpleQueue[str] = queue.SimpleQueue()
+    Thread(target=listen, args=(stream, requests), daemon=True).start()
+    system.limit_memory(MEMORY)
+    system.write_no_core()
     tell(answers, HERE)
     try:
-        solver = load(*pickle.loads(bytes.fromhex(loads(requests.readline()))))
+        solver = load(*pickle.loads(bytes.fromhex(loads(requests.get()))))
     except SolverFailed as failure:
         tell(answers, {"failed": vars(failure)})
         return
@@ -44,8 +42,8 @@ def main() -> None:
         answers,
         {"functions": solver.functions, "surface": solver.surface, "versions": solver.versions()},
     )
-    for line in requests:
-        tell(answers, reply(solver, loads(line)))
+    while True:
+        tell(answers, reply(solver, loads(requests.get())))
 
 
 def private_pipes() -> tuple[IO[str], IO[str]]:
@@ -60,13 +58,12 @@ def private_pipes() -> tuple[IO[str], IO[str]]:
     return requests, answers
 
 
-def end_with_parent(requests: IO[str]) -> None:
-    """When nobody is left who could ask, end this process and all that the file has started,
-    whatever it is doing."""
-    hung_up = select.poll()
-    hung_up.register(requests, 0)
-    hung_up.poll()
-    os.killpg(os.getpid(), signal.SIGKILL)
+def listen(stream: IO[str], requests: queue.SimpleQueue[str]) -> None:
+    """Hand on the lines of the parent; at their end, when nobody is left who could ask, end this
+    process and all that the file has started, whatever it is doing."""
+    for line in stream:
+        requests.put(line)
+    system.end_all(os.getpid())
 
 
 def load(solver: Any, copies: Path | None) -> Any:

@@ -22,7 +22,7 @@ from reports.run.cells import Cell
 from reports.run.folders import found
 from reports.run.playing import play_here
 from reports.run.scenes import played_scenario
-from reports.run.worker import Worker
+from reports.run.worker import new_worker
 from reports.run.worker_process import Failure
 from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import legible
@@ -128,7 +128,7 @@ def again(
     """Status, reason and trajectory, from a process of its own that prints where the user sees
     it."""
     cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
-    worker = Worker(memory=0, show=True)
+    worker = new_worker(memory=0, show=True)
     try:
         outcome = worker.do(partial(play_here, cell, row, scenario), timeout)
     finally:

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
+import psutil
+
 from adapters.engines import row_of
 from reports.commands.own_solvers import checks_of
 from reports.commands.report import finish
@@ -97,7 +99,7 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
             cluster(scheduler).close()
         except NoScheduler as fault:
             refuse([str(fault)])
-    share = 0 if scheduler else os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // workers
+    share = 0 if scheduler else psutil.virtual_memory().total // workers
     return Means(workers, timeout, memory * 1_000_000 or share, scheduler)
 
 

@@ -4,7 +4,6 @@ read by any."""
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import math
 import os
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.system import BINARY, lock
 from scenarios.regular import opened
 
 JOURNAL = "journal.jsonl"
@@ -26,17 +26,17 @@ class Busy(Exception):
 class Journal:
     """The journal of a folder, open for writing and locked against every other writer.
 
-    The lock is the kernel's (flock) and ends with the process that holds it, however it ends: none
-    is ever stale.
+    The lock is the system's and ends with the process that holds it, however it ends: none is ever
+    stale.
     """
 
     def __init__(self, folder: Path) -> None:
         """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it
         cannot be had."""
         self.path = folder / JOURNAL
-        self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
         try:
-            fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self.file)
             moved = not self.path.exists() or not os.path.samestat(
                 os.fstat(self.file), self.path.stat()
             )

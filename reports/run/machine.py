@@ -6,9 +6,11 @@ import os
 import platform
 from datetime import UTC, datetime
 from pathlib import Path
-from time import sleep
 from typing import Any
 
+import psutil
+
+from adapters.system import LIMITED_BY
 from reports.run.cells import source_hash, versions
 
 
@@ -28,6 +30,7 @@ def about(command: str, seed: int) -> dict[str, Any]:
             "architecture": platform.machine(),
             "processor": processor(),
             "cores": os.cpu_count() or 1,
+            "memory limited by": LIMITED_BY,
         },
     }
 
@@ -36,23 +39,10 @@ def busy_cores(seconds: float = 0.5) -> float:
     """How many cores others keep busy while this process sleeps so long; nan where the system does
     not tell."""
     try:
-        before = _ticks()
-        sleep(seconds)
-        after = _ticks()
+        share = psutil.cpu_percent(seconds) / 100
     except (OSError, ValueError):
         return float("nan")
-    passed, idle = (later - earlier for later, earlier in zip(after, before))
-    return (1 - idle / max(passed, 1)) * (os.cpu_count() or 1)
-
-
-def _ticks() -> tuple[int, int]:
-    """All ticks of all cores since the system began, and those without work (man 5 proc: idle and
-    iowait)."""
-    ticks = [
-        int(field)
-        for field in Path("/proc/stat").read_text(encoding="utf-8").splitlines()[0].split()[1:]
-    ]
-    return sum(ticks[:8]), ticks[3] + ticks[4]
+    return float(share) * (os.cpu_count() or 1)
 
 
 def processor() -> str:

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 import logging
 import math
-import os
 import pickle
 import re
-import resource
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
@@ -16,6 +14,9 @@ from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import Any
 
+import psutil
+
+from adapters.system import most_files
 from reports.run.worker import ATTEMPTS, CREW, in_worker
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say
@@ -120,8 +121,8 @@ def outcome_of(future: Future[Any]) -> tuple[Any | Failure, Exception | None]:
 def affordable(workers: int) -> int:
     """As many workers of the `workers` asked for as can start on this machine; says so if those are
     fewer."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 1_000_000
-    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    memory: int = psutil.virtual_memory().total // 1_000_000
+    files = most_files()
     most = {
         f"memory of {memory} MB, of which each takes {LEAST_MEMORY}": max(
             1, memory // LEAST_MEMORY

@@ -9,28 +9,32 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Callable
+from math import inf
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from adapters import system
 from adapters.safe_path import path_of_this, python
-from reports.run.worker_process import CLOCK, Failure
+from reports.run.worker_process import CLOCK, Failure, out_of_memory
 from reports.terminal.foreign_text import legible
 
 # s for Python to start and to import what a task is made of, on a machine that is busy
 STARTING = 120.0
 ATTEMPTS = 3  # at a task whose worker was killed from outside
-OUTSIDE = {-signal.SIGKILL, -signal.SIGTERM, 0}  # exits that no engine makes by a fault of its own
+OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # exits that no engine makes by a fault of its own
 # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
 PRINTED = 65536
 WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
 ASKING = "own_solver/process.py"  # waits for what a solver's file answers
-INNERMOST = re.compile(r'most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)')
+# of the thread that got the signal, which is the one that plays: others only watch
+INNERMOST = re.compile(
+    r'Current thread [^\n]*most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)'
+)
 
 
 class Worker:
@@ -45,10 +49,14 @@ class Worker:
         error."""
         self.memory, self.show, self.stopped = memory, show, False
         self.printed = b""
+        self.open()
+
+    def open(self) -> None:
+        """Start the process, with its channels."""
         self.connection, theirs = Pipe()
         self.output, printing = os.pipe()
-        self.trail = nameless_file()
-        self.process = start(theirs, self.trail, printing, memory)
+        self.trail = os.memfd_create("trail")
+        self.process = start(theirs, self.trail, printing, self.memory)
         theirs.close()
         os.close(printing)
 
@@ -59,10 +67,10 @@ class Worker:
         `timeout` counts from when the worker has the task, and again from each call of `allow`.
         """
         self.printed = b""
-        os.ftruncate(self.trail, 0)
-        os.lseek(self.trail, 0, os.SEEK_SET)
+        self.forget_trail()
         limit, begun = STARTING, False
         try:
+            self.connect()
             self.connection.send_bytes(pickle.dumps(task))
             while (answer := self.answer(limit)).startswith(CLOCK):
                 limit, begun = max(float(answer.removeprefix(CLOCK)), timeout), True
@@ -77,6 +85,9 @@ class Worker:
                 else f"its worker did not start in {limit:g} s{where}"
             )
             return Failure("timeout", said, self.left(), outside=not begun)
+
+    def connect(self) -> None:
+        """Nothing: the process has had its end of the connection from the start."""
 
     def answer(self, timeout: float) -> bytes:
         """The next message of the worker; its output meanwhile is kept. Raises `TimeoutError`, or
@@ -101,13 +112,21 @@ class Worker:
             sys.stderr.write(legible(new.decode(errors="replace")))
         return len(new)
 
+    def hear(self, seconds: float) -> None:
+        """Read the output to its end, for at most so many s."""
+        end = monotonic() + seconds
+        while wait([self.output], None if seconds == inf else max(0.0, end - monotonic())):
+            if not self.listen():
+                return
+
     def death(self, begun: bool) -> Failure | None:
         """How a worker died, its task `begun` or not; None if it was killed from outside."""
-        while self.listen():
-            pass
+        self.hear(inf)
         code = self.process.wait()
         if code in OUTSIDE:
             return None
+        if code == system.OUT_OF_MEMORY:
+            return out_of_memory(self.memory)
         what = "worker died" if begun else "its worker could not start"
         return Failure(
             "crashed", f"{what}: {name_of_exit(code)}{self.place()}", self.left(), outside=not begun
@@ -115,10 +134,9 @@ class Worker:
 
     def abort(self) -> str:
         """Kill a worker that hangs; returns where in Python it was."""
-        self.process.send_signal(signal.SIGABRT)  # faulthandler answers even from within C
-        end = monotonic() + 1.0
-        while wait([self.output], max(0.0, end - monotonic())) and self.listen():
-            pass
+        if os.name == "posix":
+            self.process.send_signal(signal.SIGABRT)  # faulthandler answers even from within C
+            self.hear(1.0)
         self.process.kill()
         self.process.wait()
         return self.place()
@@ -137,6 +155,11 @@ class Worker:
         said = [line for line in (before if fatal else printed).splitlines() if line.strip()]
         return place + (f'; it had printed "{said[-1].strip()[:200]}"' if said else "")
 
+    def forget_trail(self) -> None:
+        """Begin a new trail."""
+        os.ftruncate(self.trail, 0)
+        os.lseek(self.trail, 0, os.SEEK_SET)
+
     def left(self) -> bytes:
         """The trail of the task."""
         return os.pread(self.trail, os.fstat(self.trail).st_size, 0)
@@ -148,6 +171,10 @@ class Worker:
         self.process.wait()
 
     def __del__(self) -> None:
+        self.close_channels()
+
+    def close_channels(self) -> None:
+        """Let go of what the process had besides its connection."""
         for line in (self.output, self.trail):
             os.close(line)
 
@@ -166,13 +193,13 @@ def start(theirs: Connection, trail: int, printing: int, memory: int) -> subproc
     )
 
 
-def nameless_file() -> int:
-    """The descriptor of a file without a name, which is in memory on Linux."""
-    if sys.platform == "linux":
-        return os.memfd_create("trail")
-    file, path = tempfile.mkstemp()
-    os.unlink(path)
-    return file
+def new_worker(memory: int, show: bool = False) -> Worker:
+    """A worker as this system can have it; see `Worker`."""
+    if system.KERNEL:
+        return Worker(memory, show)
+    from reports.run.portable_worker import PortableWorker
+
+    return PortableWorker(memory, show)
 
 
 class Crew:
@@ -193,7 +220,7 @@ class Crew:
             with self.lock:
                 if self.dismissed:
                     raise InterruptedError("the run is over")
-                self.mine.worker = worker = Worker(memory)
+                self.mine.worker = worker = new_worker(memory)
                 self.all.add(worker)
         return worker
 

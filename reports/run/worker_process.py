@@ -4,22 +4,20 @@ they give."""
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import faulthandler
 import os
 import pickle
-import resource
 import signal
-import sys
 from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
+
+from adapters import system
 
 CLOCK = b"clock "  # before a number of s; no pickle begins so
 LONGEST = 1e6  # s, for what is stopped only with the run
 # s without a task after which a process leaves: workers on other machines outlive the run
 IDLE = 60.0
-PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 _trail: int | None = None
 _parent: Connection | None = None
@@ -48,7 +46,7 @@ def leave(parts: Sequence[Any]) -> None:
     if _trail is not None:
         # a trail that cannot be kept is no fault of the engine that is played
         with contextlib.suppress(OSError):
-            os.writev(_trail, list(parts))
+            os.write(_trail, b"".join(parts))
 
 
 def allow(seconds: float = 0.0) -> None:
@@ -76,12 +74,7 @@ def serve(connection: Connection, memory: int) -> None:
             answer = pickle.dumps(task())
         except MemoryError as error:
             error.__traceback__ = None  # lets go of the frames, and so of what they hold
-            limit = (
-                f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
-            )
-            connection.send_bytes(
-                pickle.dumps(Failure("error", f"MemoryError: took {limit}", outside=True))
-            )
+            connection.send_bytes(pickle.dumps(out_of_memory(memory)))
             return  # what is not let go of ends with the process
         except Exception as error:  # an engine may raise anything
             # of `NotStarted`; an import of it here would take long
@@ -92,27 +85,36 @@ def serve(connection: Connection, memory: int) -> None:
         connection.send_bytes(answer)
 
 
+def out_of_memory(memory: int) -> Failure:
+    """What comes of a task that took more than `memory` bytes, 0: than there is."""
+    limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
+    return Failure("error", f"MemoryError: took {limit}", outside=True)
+
+
 def prepare(memory: int) -> None:
     """What a process must be before an engine is let in.
 
     A crash prints where Python was and writes no core; Ctrl-C is left to the parent, who alone
-    decides what it means; data beyond `memory` bytes cannot be had (RLIMIT_DATA; Linux counts
-    private mappings); it dies with its parent.
+    decides what it means; data beyond `memory` bytes cannot be had; it dies with its parent.
     """
     faulthandler.enable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    system.write_no_core()
     if memory:
-        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        system.limit_memory(memory)
+    system.end_with_parent()
 
 
 def main(arguments: Sequence[Any]) -> None:
     """What the process does; its words are CONNECTION TRAIL MEMORY: two file descriptors and a
     number of bytes."""
-    global _trail, _parent
     connection, trail, memory = (int(argument) for argument in arguments)
-    _trail, _parent = trail, Connection(connection)
+    work(Connection(connection), trail, memory)
+
+
+def work(connection: Connection, trail: int, memory: int) -> None:
+    """Carry out the tasks that come by a connection; `trail`: the descriptor of its file."""
+    global _trail, _parent
+    _trail, _parent = trail, connection
     prepare(memory)
-    serve(_parent, memory)
+    serve(connection, memory)

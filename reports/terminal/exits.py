@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
+from adapters.system import REPEATED, every, signals_wait
 from reports.terminal.foreign_text import legible
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
@@ -43,12 +44,8 @@ class Listening:
     def __call__(self, number: int, _: object) -> NoReturn:
         """Raise `Stopped`, and again every `AGAIN` s: what is raised in a destructor or a callback
         from C is lost."""
-        self.status = self.status or STATUS[signal.Signals(number)]
-        signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
-        raise Stopped(self.status)
-
-    def once_more(self, *_: object) -> NoReturn:
-        """The handler of the timer."""
+        self.status = self.status or STATUS.get(signal.Signals(number), INTERRUPTED)
+        every(AGAIN)
         raise Stopped(self.status)
 
 
@@ -58,14 +55,13 @@ def stoppable() -> Iterator[Listening]:
 
     SIGINT stays ignored where it is ignored, as in what a shell has put into the background.
     """
-    before = {number: signal.getsignal(number) for number in (*STATUS, signal.SIGALRM)}
+    before = {number: signal.getsignal(number) for number in (*STATUS, REPEATED)}
     outer = before[signal.SIGTERM]
     if isinstance(outer, Listening):
         yield outer
         return
     listening = Listening()
-    signal.signal(signal.SIGALRM, listening.once_more)
-    for number in STATUS:
+    for number in {*STATUS, REPEATED}:
         if before[number] is not signal.SIG_IGN:
             signal.signal(number, listening)
     try:
@@ -80,7 +76,7 @@ def stoppable() -> Iterator[Listening]:
 @contextmanager
 def deaf() -> Iterator[None]:
     """Within it a command that is ending is not signalled again; the timer is off for good."""
-    signal.setitimer(signal.ITIMER_REAL, 0)
+    every(0)
     before = {number: signal.signal(number, signal.SIG_IGN) for number in STATUS}
     try:
         yield
@@ -93,11 +89,8 @@ def deaf() -> Iterator[None]:
 def unbroken() -> Iterator[None]:
     """What must not be left half done and takes no time: a signal that comes meanwhile is heard
     after it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {*STATUS, signal.SIGALRM})
-    try:
+    with signals_wait({*STATUS, REPEATED}):
         yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

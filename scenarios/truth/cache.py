@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from platformdirs import user_cache_path
 
 from scenarios.model import Scenario, frozen
 from scenarios.regular import opened
@@ -27,16 +28,16 @@ NUMBERS = ("horizon", "error_bound", "bits", "method", "reason", "float64_horizo
 
 
 def folder() -> Path | None:
-    """$CROSSCHECK_CACHE, or crosscheck2d in $XDG_CACHE_HOME or ~/.cache; None where there is no
-    home."""
+    """$CROSSCHECK_CACHE, or crosscheck2d in the user's cache folder, on Linux $XDG_CACHE_HOME or
+    ~/.cache; None where there is no home."""
     if given := os.environ.get("CROSSCHECK_CACHE"):
         return Path(given)
-    if base := os.environ.get("XDG_CACHE_HOME"):
-        return Path(base) / "crosscheck2d"
     try:
-        return Path.home() / ".cache" / "crosscheck2d"
+        Path.home()
     except RuntimeError:
-        return None
+        if not os.environ.get("XDG_CACHE_HOME"):
+            return None
+    return user_cache_path("crosscheck2d", appauthor=False)
 
 
 def key_of(scenario: Scenario, certifying: bool) -> str:

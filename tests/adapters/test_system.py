@@ -1,0 +1,207 @@
+"""What operating systems do differently. The branch of macOS and Windows is played on Linux."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from adapters import system
+from adapters.own_solver.file import SolverFailed, read_solver
+from adapters.own_solver.process import SolverProcess
+from tests.reports.terminal.command_line import CROSSCHECK
+
+PORTABLE = os.environ | {"CROSSCHECK_SYSTEM": "portable"}
+ROOT = Path(__file__).parents[2]
+
+# What Windows has not, taken away after the libraries have loaded theirs.
+ELSEWHERE = """
+import importlib, os, pathlib, signal, sys
+import asyncio, multiprocessing.connection, subprocess, tempfile, socket, shutil
+import hypothesis, jinja2, py_mini_racer, numba, numpy, pandas, platformdirs, plotly, psutil
+import plotly.graph_objects, plotly.io, pydantic, pymunk, Box2D, pyb2d3, rich.console
+import rich.progress, starlette, starlette.applications, typer, uvicorn, websockets
+for name in ("fcntl", "resource", "pwd", "grp", "termios"):
+    sys.modules[name] = None
+for module, names in {
+    os: "fork killpg memfd_create pread writev sysconf getuid setsid O_NONBLOCK".split(),
+    signal: "SIGALRM SIGKILL SIGPROF SIGTRAP ITIMER_REAL ITIMER_PROF setitimer pthread_sigmask"
+    .split(),
+}.items():
+    for name in names:
+        delattr(module, name)
+sys.platform = "PLATFORM"
+for package in ("adapters", "reference_impl", "reports", "scenarios"):
+    for path in sorted(pathlib.Path(package).rglob("*.py")):
+        if "out" not in path.parts and path.name not in ("__main__.py",):
+            importlib.import_module(".".join(path.with_suffix("").parts).removesuffix(".__init__"))
+from adapters import system
+assert not system.KERNEL and not system.ALARMS
+print("all imported")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", ["win32", "darwin"])
+def test_everything_is_imported_without_what_only_linux_has(platform: str):
+    """No fcntl, resource, pwd, fork or alarm at import; the control needs one of them."""
+    code = ELSEWHERE.replace("PLATFORM", platform)
+    done, control = (
+        subprocess.run(
+            [sys.executable, "-c", text], cwd=ROOT, capture_output=True, text=True, timeout=200
+        )
+        for text in (code, code + "import fcntl")
+    )
+
+    assert done.stdout == "all imported\n", done.stderr[-2000:]
+    assert "import of fcntl halted" in control.stderr
+
+
+@pytest.mark.slow
+def test_the_portable_branch_gives_the_same_bits(tmp_path: Path):
+    """Workers that connect, watchers in place of the kernel's limits: the same numbers, and the run
+    says which kind of limit held."""
+    words = ["run", "head_on_equal_e09", "--timings", "0", "--engine", "reference:exercise"]
+    for name, environment in (("kernel", os.environ), ("portable", PORTABLE)):
+        done = subprocess.run(
+            [CROSSCHECK, *words, "--out", name],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=200,
+        )
+        assert done.returncode == 0, done.stderr
+
+    tables = {name: (tmp_path / name / "deviations.csv").read_text() for name in LIMITS}
+    assert tables["kernel"] == tables["portable"]
+    for name, said in LIMITS.items():
+        assert f'"memory limited by": "{said}"' in (tmp_path / name / "machine.json").read_text()
+
+
+LIMITS = {"kernel": "the kernel", "portable": "a thread that watches the process"}
+
+
+@pytest.mark.slow
+def test_a_bad_engine_ends_the_same_on_the_portable_branch():
+    """The tests of the workers and of hand-written solvers themselves, on the other branch."""
+    chosen = "bad_cell or endless or memory"
+    files = ["tests/reports/run/test_runner.py", "tests/adapters/test_own_solver.py"]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-n", "0", "-q", "-k", chosen, *files],
+        cwd=ROOT,
+        env=PORTABLE,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+    assert done.returncode == 0, done.stdout[-3000:]
+
+
+def test_a_second_process_is_refused_the_lock(tmp_path: Path):
+    """Also of one process: the lock is of the open file."""
+    one, other = (os.open(tmp_path / "file", os.O_RDWR | os.O_CREAT) for _ in range(2))
+    system.lock(one)
+    with pytest.raises(BlockingIOError):
+        system.lock(other)
+    os.close(one)
+    system.lock(other)
+    os.close(other)
+
+
+def test_windows_locks_a_byte_behind_all_that_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """So that others may read the file meanwhile; that it is locked is said as on other systems."""
+    asked: list[Sequence[int]] = []
+
+    def locking(file: int, mode: int, count: int) -> None:
+        asked.append((os.lseek(file, 0, os.SEEK_CUR), mode, count))
+        if len(asked) > 1:
+            raise PermissionError(13, "Permission denied")
+
+    stand_in = ModuleType("msvcrt")
+    vars(stand_in).update(locking=locking, LK_NBLCK=2)
+    monkeypatch.setitem(sys.modules, "msvcrt", stand_in)
+    monkeypatch.setattr(system, "os", windows())
+    file = os.open(tmp_path / "file", os.O_RDWR | os.O_CREAT)
+    os.write(file, b"a line\n")
+    system.lock(file)
+
+    assert asked == [(system.LOCKED, 2, 1)]
+    assert os.lseek(file, 0, os.SEEK_CUR) == 7
+    with pytest.raises(BlockingIOError):
+        system.lock(file)
+    os.close(file)
+
+
+def windows() -> SimpleNamespace:
+    """The module `os`, which says that it is of Windows."""
+    return SimpleNamespace(**{**vars(os), "name": "nt"})
+
+
+def test_a_signal_comes_again_without_alarms(monkeypatch: pytest.MonkeyPatch):
+    """From a thread, until it is called off."""
+    came: list[int] = []
+    monkeypatch.setattr(system, "ALARMS", False)
+    monkeypatch.setattr(system, "REPEATED", signal.SIGUSR1)
+    before = signal.signal(signal.SIGUSR1, lambda number, _: came.append(number))
+    try:
+        system.every(0.01)
+        end = time.monotonic() + 30.0
+        while len(came) < 3 and time.monotonic() < end:
+            time.sleep(0.001)
+        system.every(0)
+        time.sleep(0.03)
+        until = len(came)
+        time.sleep(0.05)
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+    assert until >= 3
+    assert len(came) == until
+
+
+@pytest.mark.parametrize("alarms", [True, False])
+def test_a_signal_waits_until_what_must_not_be_broken_off_is_done(
+    monkeypatch: pytest.MonkeyPatch, alarms: bool
+):
+    """And then it is handled, once."""
+    done: list[str] = []
+    monkeypatch.setattr(system, "ALARMS", alarms)
+    before = signal.signal(signal.SIGUSR1, lambda *_: done.append("handled"))
+    try:
+        with system.signals_wait({signal.SIGUSR1}):
+            signal.raise_signal(signal.SIGUSR1)
+            done.append("written")
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+    assert done == ["written", "handled"]
+
+
+@pytest.mark.slow
+def test_a_thread_ends_a_solver_that_takes_all_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """It ends alone, with the status that the kernel's limit gives it elsewhere."""
+    file = tmp_path / "solver.py"
+    file.write_text(
+        "held = []\n\ndef integrate(s, dt):\n    while True:\n        held.append(bytearray(10**8))"
+        "\n\ndef sphereSphereCollisionHandling(a, b):\n    pass\n"
+    )
+    monkeypatch.setenv("CROSSCHECK_SYSTEM", "portable")
+    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
+    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
+    with SolverProcess(read_solver(file)) as solver, pytest.raises(SolverFailed) as failed:
+        solver.do("ask", question, 20.0)
+
+    assert failed.value.kind == "memory"
