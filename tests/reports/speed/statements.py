@@ -11,6 +11,7 @@ import re
 import pandas as pd
 
 from adapters.engines import ENGINES
+from reports.run.scenes import open_scene
 from reports.speed import explained, figures
 from reports.speed.figures import AGAINST, AGAINST_BARE
 from reports.speed.tables import no_nearer
@@ -171,9 +172,17 @@ def nearer(orders: pd.DataFrame) -> str:
 
 
 def budget(table: pd.DataFrame) -> str:
-    """How much of the errors is explained, and over how much of the scenes."""
-    said = explained.sentence(table)
-    return f"{said[0].upper()}{said[1:]}.\n"
+    """How much of the errors is explained, and over how much of the scenes; those with friction
+    apart."""
+    smooth, rough = (explained.sentence(part) for part in apart(table))
+    return f"Without friction: {smooth}. With friction: {rough}.\n"
+
+
+def apart(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows of scenes without friction, and those with."""
+    rough = {name for name in set(table.scenario) if open_scene(name, 0).scene.friction}
+    with_friction = table.scenario.isin(rough)
+    return table[~with_friction], table[with_friction]
 
 
 def measured() -> str:
@@ -181,7 +190,7 @@ def measured() -> str:
     kept, orders, table = (
         figures.read(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED)
     )
-    return "\n".join([costs(kept), as_far(kept), nearer(orders), budget(table)])
+    return "\n".join([costs(kept), as_far(kept), nearer(apart(orders)[0]), budget(table)])
 
 
 if __name__ == "__main__":
