@@ -82,6 +82,8 @@ class EngineRow:
             asked for. "": of none.
         adds_friction: it plays scenes with friction, which that engine refuses; without friction it
             is never played beside that one.
+        orders_collisions: it takes each collision at its own time, not at the end of a step; it is
+            ranked apart from the engines.
         departs: a probe of the protocol that it misses by its own physics, not by its adapter ->
             the cause.
         package: the npm package, pinned in adapters/javascript/package.json, that it plays by and
@@ -103,6 +105,7 @@ class EngineRow:
     searched: Callable[[], Searched] | None = None
     bits_of: str = ""
     adds_friction: bool = False
+    orders_collisions: bool = False
     departs: Mapping[str, str] = field(default_factory=dict, hash=False)
     package: str = ""
     source: str = ""

@@ -164,6 +164,7 @@ ENGINES: dict[str, EngineRow] = {
         "hand-written: exact flight, collisions in order, friction; 535 lines, no projection",
         0.5,
         FLOAT64,
+        orders_collisions=True,
     ),
     "pymunk:shipped": _Pymunk(
         partial(_pymunk, "shipped"),
@@ -247,6 +248,7 @@ ENGINES: dict[str, EngineRow] = {
         0.5,
         FLOAT64,
         mark=Mark("#6b5f00", "#d9c84a", "star"),
+        orders_collisions=True,
     ),
 }
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from adapters.engine import Unsupported
 from scenarios.model import Scene
 
+REFUSAL = "does not model friction"
+
 
 class Frictionless(Unsupported):
     """The engine knows no friction, which no engine need know."""
@@ -13,4 +15,4 @@ class Frictionless(Unsupported):
 def must_be_frictionless(scene: Scene, who: str) -> None:
     """Raise `Frictionless` for a scene with friction, which the engine `who` does not model."""
     if scene.friction:
-        raise Frictionless(f"{who} does not model friction, the scene has {scene.friction:g}")
+        raise Frictionless(f"{who} {REFUSAL}, the scene has {scene.friction:g}")

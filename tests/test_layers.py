@@ -21,7 +21,7 @@ LAYERS = {
     "scenarios": ["regular faults", "model", "no_truth", "truth", "families", "files", "catalogue"],
     "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines sliding", "record", "exact"],
     "adapters": [
-        "matched safe_path",
+        "matched safe_path system",
         "engine",
         "advance engine_row first_collisions float32 friction library_versions run runaway",
         "play",

@@ -64,13 +64,12 @@ def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
 def print_summary(report: Report, page: str) -> None:
     """Medians over the scenarios at their middle step, the finding, and where the page is."""
     console = Console()
-    headings = ["engine"]
-    for column in overview.SUMMARY.values():
-        # ten engines are to fit into 80 columns
-        headings += [column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")]
     for comparisons in filter(None, by_friction(report.comparisons)):
         names = overview.names_of(comparisons)
-        found = overview.summary(comparisons, names, report.untrusted)
+        columns, found = overview.with_numbers(
+            overview.summary(comparisons, names, report.untrusted)
+        )
+        headings = ["engine", *map(heading, columns)]
         rows = [[name, *(cell.text for cell in cells)] for name, cells in found.items()]
         rough = any(each.scenario.scene.friction for each in comparisons)
         print_table(console, headings, rows, title_of(len(comparisons), rough))
@@ -82,6 +81,12 @@ def print_summary(report: Report, page: str) -> None:
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def heading(column: overview.Column) -> str:
+    """Its title above its unit, in lines so short that ten engines fit into 80 columns."""
+    title = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
+    return f"{title}\n{column.short}"
 
 
 def own_solvers(said: Mapping[str, list[str]]) -> list[str]:

@@ -421,13 +421,13 @@ def cheapest(found: pd.DataFrame) -> str:
         " second)"
         for name, costs in sorted(wins.items(), key=lambda item: -len(item[1]))
     ]
-    parts += [f"in {even} none is surely the cheapest"] if even else []
+    parts += [f"no engine surely in {even}"] if even else []
     nowhere = len(scenes) - even - sum(map(len, wins.values()))
-    parts += [f"in {nowhere} no engine gets there"] if nowhere else []
+    parts += [f"no engine is that near in {nowhere}"] if nowhere else []
     return (
-        f"An error of at most {NEAR:g} radii costs least with {'; '.join(parts)}, of"
-        f" {counted(len(scenes), 'scene')}; the cost of the way from Python to the engine decides"
-        " none of these."
+        f"Cheapest with an error of at most {NEAR:g} radii, of {counted(len(scenes), 'scene')}:"
+        f" {'; '.join(parts)}. It is the cheapest there with the cost of the calls from Python and"
+        " without it."
     )
 
 

@@ -25,18 +25,18 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
         return sentences
     scores = pooled.scores(rough)
     scores = scores[scores.middle & ~scores.name.isin(untrusted)]
-    groups = grouped(dict.fromkeys(scores.name), scores)
+    groups = grouped(dict.fromkeys(scores.name))
     off = ranked(position_errors(scores, rough), groups)
     played = [name for name in off.columns if np.isfinite(off[name]).any()]
     said = closest(off[played or list(off.columns)])  # who refuses friction is not called the last
-    return [*sentences, f"With friction, in scenes that nothing above counts: {said}"]
+    return [*sentences, f"Scenes with friction, which are not counted above. {said}"]
 
 
 def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
     """The findings of scenes that all have friction or all have none."""
     scores = pooled.scores(comparisons)
     scores = scores[scores.middle & ~scores.name.isin(untrusted)]
-    groups = grouped(dict.fromkeys(scores.name), scores)
+    groups = grouped(dict.fromkeys(scores.name))
     refused = own_refusals(comparisons)
     off = position_errors(scores, comparisons)
     for name in refused.keys() & off.columns:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.engines import OWN
+from adapters.friction import REFUSAL
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
@@ -24,6 +25,7 @@ OUTCOMES = {
     "timeout": "time-out",
 }
 MAPPED = "position_max_radii"
+NO_FRICTION = "no friction"  # what a table says of an engine that models none
 
 
 class OverviewCell(NamedTuple):
@@ -58,11 +60,13 @@ Found = dict[tuple[str, str], Measured]  # (`engine:profile`, metric) -> its num
 
 
 class Column(NamedTuple):
-    """A column of the summary, lower is better: heading, unit, and what it means in a line."""
+    """A column of the summary, lower is better: heading, unit, what it means in a line, and the
+    unit in nine letters for a terminal."""
 
     title: str
     unit: str
     meaning: str
+    short: str
 
 
 class Failure(NamedTuple):
@@ -75,18 +79,28 @@ class Failure(NamedTuple):
 
 
 SUMMARY: dict[str, Column] = {
-    MAPPED: Column("Position", "radii", "largest distance of any disk from where it truly is"),
-    "momentum_error": Column("Momentum", "of Σ m|v|", "largest momentum that came or went unasked"),
+    MAPPED: Column(
+        "Position", "radii", "largest distance of any disk from where it truly is", "radii"
+    ),
+    "momentum_error": Column(
+        "Momentum", "of Σ m|v|", "largest momentum that came or went unasked", "of Σ m|v|"
+    ),
     "energy_error": Column(
-        "Energy", "of the energy at hand", "largest energy that came or went unasked"
+        "Energy", "of the energy at hand", "largest energy that came or went unasked", "of energy"
     ),
     "restitution_error": Column(
-        "Restitution", "no unit", "largest |e measured − e asked for| of any collision"
+        "Restitution",
+        "no unit",
+        "largest |e measured − e of the scene| of any collision",
+        "in e",
     ),
     "wrong_collisions": Column(
-        "Wrong collisions", "collisions", "missed and spurious collisions of a scene together"
+        "Wrong collisions",
+        "number",
+        "missed and spurious collisions of a scene together",
+        "number",
     ),
-    "failed": Column("Not played", "scenarios", "refused, crashed, diverged or timed out"),
+    "failed": Column("Not played", "scenes", "refused, crashed, diverged or timed out", "scenes"),
 }
 
 
@@ -122,7 +136,8 @@ def failures(comparison: Comparison) -> list[Failure]:
     steps: dict[tuple[str, str, str], list[str]] = {}
     for run in comparison.runs:
         if run.status != "ok":
-            key = (run.name, OUTCOMES.get(run.status, run.status), run.reason)
+            outcome = OUTCOMES.get(run.status, run.status), run.reason
+            key = (run.name, NO_FRICTION if not_modelled(outcome) else outcome[0], run.reason)
             steps.setdefault(key, []).append(number(run.dt))
     return [Failure(*key, ", ".join(dts)) for key, dts in steps.items()]
 
@@ -170,10 +185,34 @@ def summary(
         asked = [each for each in failed if not unasked(name, each)]
         count = sum(name in each for each in asked)
         cells.append(OverviewCell(f"{count} of {len(asked)}", failed=count > 0, value=count))
+        if asked and all(not_modelled(each.get(name)) for each in asked):
+            cells = [OverviewCell("–", REFUSAL) for _ in cells[:-1]] + [OverviewCell(NO_FRICTION)]
         rows[name] = cells
-    groups = situations.grouped(names, scores)
+    groups = situations.grouped(names)
     marked = [mark_best({name: rows[name] for name in each}, untrusted) for each in groups.values()]
     return {name: each[name] for name in names for each in marked if name in each}
+
+
+def with_numbers(
+    rows: Mapping[str, list[OverviewCell]],
+) -> tuple[list[Column], dict[str, list[OverviewCell]]]:
+    """The columns of `SUMMARY`, and the rows of `summary`, without those in which no engine has a
+    number."""
+    kept = [
+        k
+        for k in range(len(SUMMARY))
+        if not rows or any(not np.isnan(cells[k].value) for cells in rows.values())
+    ]
+    columns = list(SUMMARY.values())
+    return [columns[k] for k in kept], {
+        name: [cells[k] for k in kept] for name, cells in rows.items()
+    }
+
+
+def not_modelled(outcome: tuple[str, str] | None) -> bool:
+    """Whether an engine refused a scene because it models no friction, which is no failure of
+    it."""
+    return outcome is not None and REFUSAL in outcome[1]
 
 
 def unasked(name: str, outcomes: Mapping[str, tuple[str, str]]) -> bool:
@@ -250,7 +289,7 @@ def heat_map(
         cells = []
         for name in names:
             if name in failed:
-                cells.append(OverviewCell(*failed[name], failed=True))
+                cells.append(outcome_cell(failed[name]))
             elif (name, MAPPED) in found:
                 value, remark, judged = found[name, MAPPED]
                 cells.append(
@@ -264,6 +303,13 @@ def heat_map(
                 cells.append(OverviewCell("–", "not asked to play"))
         rows[comparison.scenario.name] = cells
     return rows
+
+
+def outcome_cell(outcome: tuple[str, str]) -> OverviewCell:
+    """The cell of a run that was not played to its end."""
+    if not_modelled(outcome):
+        return OverviewCell(NO_FRICTION, outcome[1])
+    return OverviewCell(*outcome, failed=True)
 
 
 def scenario_table(
@@ -281,11 +327,7 @@ def scenario_table(
             if (name, key) in found:
                 cells.append(OverviewCell(found[name, key].text, found[name, key].remark))
             else:
-                cells.append(
-                    OverviewCell(failed[name][0], failed[name][1], failed=True)
-                    if name in failed
-                    else OverviewCell("–")
-                )
+                cells.append(outcome_cell(failed[name]) if name in failed else OverviewCell("–"))
         unit = "" if metric.unit == "1" else metric.unit
         better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
         rows.append((key, unit, better, cells))

@@ -11,7 +11,7 @@ import pandas as pd
 from adapters.matched import searched
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS, Metric
-from reports.page import overview, pooled, situations, style
+from reports.page import overview, situations, style
 from reports.page.trust import how_far_to_trust
 from reports.run.known_answers import MEANING
 
@@ -78,11 +78,12 @@ def page_tables(
 
 
 class Summary(NamedTuple):
-    """A table of medians: its heading, "" for the first; how many scenes it is of; the rows of
-    `overview.summary`; and the groups that they stand in."""
+    """A table of medians: its heading, "" for the first; how many scenes it is of; its columns; the
+    rows of `overview.summary` with these; and the groups that they stand in."""
 
     title: str
     scenes: int
+    columns: Sequence[overview.Column]
     rows: Mapping[str, list[overview.OverviewCell]]
     groups: Mapping[str, list[str]]
 
@@ -94,10 +95,12 @@ def summaries(
     found = []
     for comparisons, title in ((smooth, ""), (rough, "Summary of the scenes with friction")):
         names = overview.names_of(comparisons)
-        rows = overview.summary(comparisons, names, untrusted)
-        groups = situations.grouped(names, pooled.scores(comparisons))
+        columns, rows = overview.with_numbers(overview.summary(comparisons, names, untrusted))
+        groups = situations.grouped(names)
         found += (
-            [Summary(title, len(comparisons), rows, groups)] if comparisons or not title else []
+            [Summary(title, len(comparisons), columns, rows, groups)]
+            if comparisons or not title
+            else []
         )
     return found
 

@@ -16,7 +16,7 @@ from scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
 ERROR, ANGLE = "position_max_radii", "angle_max"
-SCORES = [*situations.COLUMNS, "step_size", "dt_s", "middle"]
+SCORES = [*situations.COLUMNS, "step_size", "middle"]
 
 
 def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
@@ -44,7 +44,7 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
             cost = run.seconds / scenario.duration * 1e6 if np.isfinite(error) else np.nan
             middle = run.dt == comparison.middle_dt
             step_size = steps.index(run.dt)
-            rows.append((scenario.name, run.name, error, angle, cost, step_size, run.dt, middle))
+            rows.append((scenario.name, run.name, error, angle, cost, run.dt, step_size, middle))
     return pd.DataFrame(rows, columns=SCORES).astype({"middle": bool})
 
 

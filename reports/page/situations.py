@@ -36,9 +36,9 @@ SITUATIONS = {
 }
 YOURS, ENGINE = "Your solver", "Engines"
 OWN, EXACT = "Solvers of this project", "Solvers of this project that order collisions by time"
-RIGHT = 1e-6  # radii: what is closer is right; in half of the scenes only collisions in order are
+RIGHT = 1e-6  # radii: what is closer is right
 FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
-COLUMNS = ["scenario", "name", "error", "angle", "cost"]
+COLUMNS = ["scenario", "name", "error", "angle", "cost", "dt_s"]
 
 
 def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
@@ -120,6 +120,7 @@ class Answer(NamedTuple):
     Attributes:
         title, meaning, unit: of the situation.
         scenes: which belong to it.
+        steps: s, the smallest and the largest step size of these scores.
         best, other: of what takes part as an engine, the nearest to the exact answers; and the best
             profile of any other engine, if there is one.
         yours: the reader's own solvers, the best first.
@@ -131,6 +132,7 @@ class Answer(NamedTuple):
     meaning: str
     unit: str
     scenes: Sequence[str]
+    steps: tuple[float, float]
     best: Ranked
     other: Ranked | None
     yours: Sequence[Ranked]
@@ -138,14 +140,13 @@ class Answer(NamedTuple):
     exact: Sequence[Ranked]
 
 
-def grouped(names: Iterable[str], scores: pd.DataFrame) -> dict[str, list[str]]:
+def grouped(names: Iterable[str]) -> dict[str, list[str]]:
     """`YOURS`, `ENGINE`, `OWN`, `EXACT` -> their names in the order given; groups without a name
     are left out.
 
-    Yours is a solver's file; an engine is a library. A solver of this project belongs to `EXACT` if
-    the median of its errors is below `RIGHT`.
+    Yours is a solver's file; an engine is a library. Of this project's solvers those belong to
+    `EXACT` that say so in their row, whatever scenes were played.
     """
-    medians = scores.groupby("name").error.median()
     groups: dict[str, list[str]] = {YOURS: [], ENGINE: [], OWN: [], EXACT: []}
     for name in names:
         row = ENGINES.get(name)
@@ -154,7 +155,7 @@ def grouped(names: Iterable[str], scores: pd.DataFrame) -> dict[str, list[str]]:
         elif row is None or row.distributions:
             groups[ENGINE].append(name)
         else:
-            groups[EXACT if medians.get(name, np.inf) < RIGHT else OWN].append(name)
+            groups[EXACT if row.orders_collisions else OWN].append(name)
     return {group: members for group, members in groups.items() if members}
 
 
@@ -165,7 +166,7 @@ def answers(
     there are more.
 
     scores: columns `COLUMNS`: errors in radii and in rad, inf without a result, angle nan where it
-        was not read; cost in µs per simulated second.
+        was not read; cost in µs per simulated second; dt in s.
     situations: scene -> what `situations_of` says. Who is `untrusted` is left out.
     """
     scores = scores[~scores.name.isin(untrusted)]
@@ -175,7 +176,7 @@ def answers(
         of_kind = scores[rough if title == FRICTION else ~rough]
         members = [s for s in dict.fromkeys(of_kind.scenario) if title in [*situations[s], ALL]]
         here = of_kind[of_kind.scenario.isin(members)]
-        groups = grouped(dict.fromkeys(of_kind.name), of_kind)
+        groups = grouped(dict.fromkeys(of_kind.name))
         ranked = next((groups[each] for each in (ENGINE, OWN, EXACT, YOURS) if each in groups), [])
         by_angle = title == SPIN and not here.angle.isna().all()
         if by_angle:
@@ -215,6 +216,7 @@ def answer(
         meaning,
         unit,
         list(dict.fromkeys(here.scenario)),
+        (float(here.dt_s.min()), float(here.dt_s.max())),
         best,
         next((one for one in rest if one.name.split(":")[0] != engine), None),
         in_order(name for name in groups.get(YOURS, []) if name not in ranked),

@@ -17,7 +17,7 @@ from typing import Any
 import psutil
 
 from adapters.system import most_files
-from reports.run.worker import ATTEMPTS, CREW, in_worker
+from reports.run.crew import ATTEMPTS, CREW, in_worker
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say
 

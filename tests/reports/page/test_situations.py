@@ -79,6 +79,29 @@ def with_friction() -> tuple[list[Comparison], list[Comparison]]:
     return smooth, [compared("friction_bounce_e1_mu01"), compared("slip_to_roll")]
 
 
+def test_who_models_no_friction_is_not_shown_as_failed(with_friction):
+    """In the map and at the scene it says "no friction"; another refusal stays a failure."""
+    _, rough = with_friction
+    row = overview.heat_map(rough, ["reference:exercise", "pymunk:matched"])["slip_to_roll"]
+
+    assert (row[0].text, row[0].failed) == (overview.NO_FRICTION, False)
+    assert {each.outcome for each in overview.failures(rough[0])} == {overview.NO_FRICTION}
+    assert overview.outcome_cell(("refused", "collisions accumulate")).failed
+
+
+def test_an_engine_stands_in_one_group_whatever_was_played():
+    """That it orders collisions is said in its row, and not read off errors, which may be
+    infinite."""
+    names = ["pymunk:matched", "reference:exercise", "reference:ordered", "event_driven:float64"]
+    groups = situations.grouped(names)
+
+    assert groups == {
+        situations.ENGINE: names[:1],
+        situations.OWN: names[1:2],
+        situations.EXACT: names[2:],
+    }
+
+
 def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
     """Summary, situations and findings of a run without them are to the letter those of one with
     them; what they add stands behind."""
@@ -86,7 +109,9 @@ def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
     alone, both = (summaries(each, apart, set()) for each, apart in ((smooth, []), with_friction))
     assert both[0] == alone[0]
     assert [table.scenes for table in both] == [2, 2]
-    assert both[1].rows["reference:exercise"][-1].text == "2 of 2"
+    assert both[1].rows["reference:exercise"][-1] == overview.OverviewCell(overview.NO_FRICTION)
+    assert "Momentum" in [column.title for column in both[0].columns]
+    assert "Momentum" not in [column.title for column in both[1].columns]
     assert situations.by_friction([*smooth, *rough]) == with_friction
     assert situations.by_friction(rough) == (rough, [])
 
@@ -100,7 +125,7 @@ def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
 
     said, less = (findings.findings(each, set()) for each in (whole, smooth))
     assert said[:-1] == less
-    assert said[-1].startswith("With friction, in scenes that nothing above counts: Closest to")
+    assert said[-1].startswith("Scenes with friction, which are not counted above. Closest to")
     # the control: in one heap, the medians would be others
     names = overview.names_of(smooth)
     heap = overview.summary(whole, names, set())
@@ -110,7 +135,7 @@ def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
 def score(errors: dict[str, list[float]]) -> pd.DataFrame:
     """Scores of scenes a, b, c, ... by `engine:profile`."""
     rows = [
-        (scene, name, error, np.nan, 100.0)
+        (scene, name, error, np.nan, 100.0, 0.01)
         for name, mine in errors.items()
         for scene, error in zip("abcde", mine)
     ]
@@ -145,7 +170,7 @@ def test_a_solvers_file_is_yours_and_not_ranked_among_the_engines():
     with_mine = score(ERRORS | {"mine.py:own": [1e-3, 2.0, 1e-9]})
     [row] = situations.answers(with_mine, PLACES, set())
     [alone] = situations.answers(score({"mine.py:own": [1e-3, 2.0]}), PLACES, set())
-    groups = situations.grouped(dict.fromkeys(with_mine.name), with_mine)
+    groups = situations.grouped(dict.fromkeys(with_mine.name))
 
     assert [one.name for one in row.yours] == ["mine.py:own"]
     assert (row.yours[0].right, row.yours[0].fails) == (1, {"b": 2.0})
