@@ -161,7 +161,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:ordered": _Reference(
         _ordered,
-        "hand-written: exact flight, collisions in order, friction; 535 lines, no projection",
+        "hand-written: exact flight, collisions in order, friction; 540 lines, no projection",
         0.5,
         FLOAT64,
         orders_collisions=True,

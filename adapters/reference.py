@@ -58,7 +58,7 @@ class Reference:
             scene.velocity,
             scene.radius,
             scene.mass,
-            scene.inertia,
+            np.where(scene.static, np.inf, scene.inertia),  # friction turns no static disk
             scene.angle,
             scene.angular_velocity,
         )

@@ -9,7 +9,12 @@ s = 0 is the end, s = -dt the start.
 Every search asks the pairs of a neighbour list. Where collisions accumulate (a ball that bounces
 ever lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is
 the last one, and after `MOST` collisions a disk the rest of a step goes unresolved, which shows as
-overlap. It knows friction. Compiled by numba, as `exercise` is.
+overlap. One disk at rest can use up the collisions of all: the force that holds it leaves a
+rounding of its speed, and it meets its wall again at the same instant. Another disk at rest then
+falls and slides freely for that step. Alone on its wall none does.
+
+It knows friction. What holds a disk at rest does so to the end of the step, also if a collision
+lifts the disk off before. Compiled by numba, as `exercise` is.
 """
 
 from math import inf, sqrt

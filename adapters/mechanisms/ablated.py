@@ -97,10 +97,9 @@ class AblatedReference(Reference):
         return self.moves * self.alpha - (self.moves - 1) / 2 - after
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Copy the scene into the solver's arrays; what stands still does not turn either."""
+        """Copy the scene into the solver's arrays."""
         self.kept = no_contacts(scene.n, len(scene.walls), self.precision)
         super().load(scene, dt)
-        self.disks.inertia[scene.static] = np.inf
         self.world = self.world._replace(
             restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution)),
             friction=float(scene.friction if self.friction is None else self.friction),
