@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from adapters.engine import SILENT
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
@@ -30,6 +31,11 @@ class Run:
     def name(self) -> str:
         """`engine:profile`, the key in `ENGINES`."""
         return f"{self.engine}:{self.profile}"
+
+    @property
+    def silent(self) -> bool:
+        """Whether the engine reports no collisions, as its settings say."""
+        return bool(self.settings.get("collisions", (None, None))[1] == SILENT)
 
 
 def run_of(name: str, scenario: Scenario, dt: float) -> Run:

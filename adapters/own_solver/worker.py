@@ -70,10 +70,12 @@ def end_with_parent(requests: IO[str]) -> None:
 
 
 def load(solver: Any, copies: Path | None) -> Any:
-    """The solver by its kind, its texts kept in `copies`, or the engine of a package; raises
-    `SolverFailed`."""
+    """The solver by its kind, its texts kept in `copies`, or the engine of a package or of a file;
+    raises `SolverFailed`."""
     if solver.kind == "packaged":
         return solver.load()
+    if solver.engine:
+        return solver.load(copies)
     if solver.kind == "javascript":
         from adapters.own_solver.javascript import JavaScriptSolver
 
