@@ -75,9 +75,10 @@ def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             yield from (x.id for t in targets for x in ast.walk(t) if isinstance(x, ast.Name))
         else:
-            for part in ("body", "orelse", "finalbody", "handlers"):
-                for inner in getattr(node, part, ()):
-                    yield from names_of(getattr(inner, "body", None) or [inner])
+            for part in ("body", "orelse", "finalbody"):
+                yield from names_of(getattr(node, part, ()))
+            for handler in getattr(node, "handlers", ()):
+                yield from names_of(handler.body)
 
 
 def listed(names: Iterable[str]) -> str:

@@ -13,6 +13,8 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
+from adapters.engines import ENGINES
+from adapters.own_engine.engine import TEMPLATES
 from reports import cli
 from reports.page.links import PAGES
 from reports.run.folders import RUN, begun
@@ -150,7 +152,7 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
         (["--engine", "bullet"], "engine 'bullet' is not known"),
         (
             ["slow_collision", "--engine", "../solvers/correct/plain.py"],
-            "a file is not driven to its limits: crosscheck check",
+            "a solver of the exercise is not driven to its limits: crosscheck check",
         ),
         (
             ["scenes/still.toml", "--vary", "mass_ratio"],
@@ -271,3 +273,24 @@ def test_every_case_of_the_issue_is_there():
     }
 
     assert wanted <= set(CASES)
+
+
+@pytest.mark.slow
+def test_an_engine_in_a_file_is_driven_to_its_limit(tmp_path: Path):
+    """One that bounces with e below 1 m/s times the speed fails there, and its failing run is kept;
+    resumed, it is not played again."""
+    text = TEMPLATES["javascript"].read_text()
+    right = "const impulse = -(1 + world.e)"
+    assert right in text
+    slow = "const impulse = -(1 + world.e * Math.min(1, -closing))"
+    (tmp_path / "slow.js").write_text(text.replace(right, slow))
+    words = ("slow_collision", "--engine", "slow.js", "--out", "limits")
+    done = crosscheck("stability", *words, cwd=tmp_path)
+    [limit] = pd.read_csv(tmp_path / "limits" / "limits.csv").itertuples()
+    kept = sorted(path.name for path in (tmp_path / "limits" / "trajectories").iterdir())
+    again = crosscheck("stability", *words, cwd=tmp_path)
+
+    assert done.returncode == again.returncode == 0, done.stderr + again.stderr
+    assert limit.fails_at < 1 <= limit.works_at * 1.05  # the bracket's width
+    assert "slow_collision.slow.js-own.npz" in kept
+    assert "slow.js:own" not in ENGINES
