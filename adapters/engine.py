@@ -11,8 +11,6 @@ NOT_READABLE = "not readable"  # the binding has no getter
 PASSED = "passed with every step"  # an argument of the step, which the engine does not store
 KEPT = "kept by the adapter"  # the adapter does it, the engine has no such setting
 NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
-# The setting "collisions" of an engine that reports none, whose collisions are then not judged:
-SILENT = "not reported"
 
 
 class Unsupported(Exception):

@@ -93,7 +93,7 @@ Object.defineProperty(globalThis, "__engine", { value: (() => {
       const one = found[k];
       const fits = typeof one === "object" && one !== null && isInteger(one[0]) && isInteger(one[1])
         && one[0] >= 0 && one[0] < scene.n && one[1] < scene.n && one[1] >= -scene.walls && one[0] !== one[1]
-        && (one.length === 2 || (one.length === 3 && typeof one[2] === "number"));
+        && (one.length === 2 || (one.length === 3 && typeof one[2] === "number" && (isFinite(one[2]) || one[2] !== one[2])));
       if (!fits) throw new Wrong(`collisions returned ${shown(one)}; ${COLLISION}`);
       log[log.length] = `[${steps},${one[0]},${one[1]},${one.length === 3 ? one[2] : NaN}]`;
     }

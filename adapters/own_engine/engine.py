@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import SILENT, Unsupported
+from adapters.engine import Unsupported
 from adapters.engine_row import EngineRow
 from adapters.own_engine.models import must_model, refusal
 from adapters.own_engine.surface import is_engine, must_be_either
 from adapters.own_solver.engine import STEP_LIMIT, Student, row_of_solver
-from adapters.own_solver.file import SolverFailed, SolverText, read_solver
+from adapters.own_solver.file import LONGEST, SolverFailed, SolverText, printable, read_solver
 from adapters.own_solver.restitution import EXERCISE
+from adapters.run import SILENT
 from scenarios.model import Array, Scene
 
 TEMPLATES = {
@@ -29,6 +30,7 @@ CREATE_LIMIT = 10.0  # s that `create` may take
 # The relative rounding that the probes allow: as of an engine that keeps a velocity as the
 # difference of two positions some 1e-4 m apart.
 ROUNDING = 2.0**-36
+NAMED = ("create ", "step ", "read ", "collisions ")
 CALLED = {"whole_load": "create", "whole_step": "step", "whole_play": "step or read"}
 
 
@@ -69,7 +71,7 @@ class OwnEngine(Student):
         self.forget(scene)
         what = {"scene": told(scene), "dt": dt, "listening": self.listening}
         if refused := self.do("whole_load", what, CREATE_LIMIT):
-            raise Unsupported(f"{self.path.name} refuses the scene: {refused}")
+            raise Unsupported(f"{self.path.name} refuses the scene: {printable(refused[:LONGEST])}")
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
         """Add to what acts during the next step; raises `Unsupported` if the file models none."""
@@ -87,8 +89,10 @@ class OwnEngine(Student):
         try:
             return super().do(command, argument, limit)
         except SolverFailed as failure:
-            if failure.kind == "crashed" or not failure.what.startswith(tuple(NAMED)):
+            if failure.kind == "crashed":
                 failure.what = f"{CALLED[command]} was called: {failure.what}"
+            elif not failure.what.startswith(NAMED):  # whoever stopped it cannot say where it was
+                failure.what = f"{CALLED[command]} {failure.what}"
             failure.what = f"{self.path.name}: {failure.what}"
             raise
 
@@ -101,9 +105,6 @@ class OwnEngine(Student):
             **({} if self.process.functions["collisions"] else {"collisions": (None, SILENT)}),
             **self.of_file(),
         }
-
-
-NAMED = ("create ", "step ", "read ", "collisions ")
 
 
 def told(scene: Scene) -> dict[str, Any]:

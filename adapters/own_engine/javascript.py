@@ -61,6 +61,7 @@ class JavaScriptFile(JavaScriptSolver):
             raise SolverFailed(answer["kind"], answer["wrong"])
         if "error" in answer:
             failed = thrown(answer["error"])
-            what = f"{answer['inside']} threw {failed.what}"
+            verb = "" if failed.what.startswith(("calls ", "wants ")) else "threw "
+            what = f"{answer['inside']} {verb}{failed.what}"
             raise SolverFailed(failed.kind, what, failed.line, failed.column)
         return answer["done"]

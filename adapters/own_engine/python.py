@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from math import inf
+from math import inf, isinf, nan
+from operator import index
 from types import ModuleType
 from typing import Any
 
@@ -106,10 +107,11 @@ class PythonFile(PythonSolver):
         for one in found:
             try:
                 i, j, *impulse = one
-                row = [self.steps, int(i), int(j), float(impulse[0]) if impulse else np.nan]
+                row = [self.steps, index(i), index(j), float(impulse[0]) if impulse else nan]
             except (TypeError, ValueError):
                 raise wrong("collisions", one, COLLISION) from None
-            if not (0 <= row[1] < self.n and -self.walls <= row[2] < self.n and row[1] != row[2]):
+            there = 0 <= row[1] < self.n and -self.walls <= row[2] < self.n and row[1] != row[2]
+            if not there or isinf(row[3]):
                 raise wrong("collisions", one, COLLISION)
             self.log.append(row)
 

@@ -59,8 +59,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
 def _opponents(
     run: Run, runs: Sequence[Run], truth: Trajectory | None
 ) -> Iterator[tuple[str, Trajectory | None, bool]]:
-    """What a run is measured against: the laws, the truth, and each later engine of `runs`; and
-    whether that one reports no collisions."""
+    """The laws, the truth, each later engine of `runs`; and whether it reports no collisions."""
     yield ITSELF, None, False
     if truth is not None:
         yield TRUTH, truth, False

@@ -369,7 +369,7 @@ def test_who_reports_no_collisions_is_not_said_to_miss_them(tmp_path: Path):
         ("a.py", "x = 1", "has neither the functions of the exercise"),
         (
             "a.js",
-            "var create, step, read; function projectObjects() {}",
+            "let create = 1; let step = 1; let read = 1; function projectObjects() {}",
             "has create, step and read, as an engine has, and projectObjects, as a solver of the",
         ),
     ],
