@@ -114,6 +114,6 @@ def times_of(
         for key, make in engines.items()
     ]
     for name, make in also.items():
-        besides = [Timed((name, each), *run) for each, *run in beside(make, scenario)]
-        what += [timed for timed in besides if can(timed)]
+        besides = (Timed((name, each), run, k) for each, run, k in beside(make, scenario))
+        what += filter(can, besides)
     return interleaved(what, rounds, budget, seed)
