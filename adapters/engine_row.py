@@ -64,7 +64,7 @@ class EngineRow:
         summary: one line for `crosscheck list`.
         alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t
             is (alpha - 1/2) a dt t. A property of the order of updates, not an error of the
-            adapter.
+            adapter. NaN: of an engine's own file, in which any order of updates is right.
         rounding: the relative rounding of the numbers the engine keeps.
         leaves_state: what it played before changes what it plays next, so that each cell needs a
             process of its own; true of none in `ENGINES` (a test plays each after others, bit for
@@ -90,6 +90,8 @@ class EngineRow:
             that is fetched once; "": it needs none.
         source: what distinguishes a solver's file that was saved from its earlier text; "" for an
             engine of this program.
+        exercise: it is a solver's file with the functions of the exercise, which `crosscheck check`
+            judges.
     """
 
     make: Callable[..., Engine]
@@ -109,3 +111,4 @@ class EngineRow:
     departs: Mapping[str, str] = field(default_factory=dict, hash=False)
     package: str = ""
     source: str = ""
+    exercise: bool = False

@@ -344,9 +344,9 @@ def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
 def read_row(name: str) -> EngineRow:
     """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises
     `NotASolver`."""
-    from adapters.own_solver.engine import engine_file
+    from adapters.own_engine.engine import row_of_file
 
-    _read[name] = row = engine_file(Path(name.removesuffix(OWN)))
+    _read[name] = row = row_of_file(Path(name.removesuffix(OWN)))
     return row
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
+# The setting "collisions" of an engine that reports none, whose collisions are then not judged:
+SILENT = "not reported"
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
 
 
@@ -30,6 +32,11 @@ class Run:
     def name(self) -> str:
         """`engine:profile`, the key in `ENGINES`."""
         return f"{self.engine}:{self.profile}"
+
+    @property
+    def silent(self) -> bool:
+        """Whether the engine reports no collisions, as its settings say."""
+        return bool(self.settings.get("collisions", (None, None))[1] == SILENT)
 
 
 def run_of(name: str, scenario: Scenario, dt: float) -> Run:

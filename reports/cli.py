@@ -39,7 +39,7 @@ Engines = Annotated[
     typer.Option(
         "--engine",
         metavar="NAME[:PROFILE]|FILE",
-        help="Only this engine, or this solver's file; may be given again.",
+        help="Only this engine, or your solver's or engine's file; may be given again.",
     ),
 ]
 Dts = Annotated[
@@ -464,6 +464,26 @@ def tune(
     from reports.tune.command import tune as search_settings
 
     search_settings(engine or [], out)
+
+
+@app.command(name="new-engine")
+def new_engine(
+    name: Annotated[
+        Path,
+        typer.Argument(
+            metavar="NAME",
+            parser=place,
+            help="The file to write: NAME.js in JavaScript, NAME.py in Python.",
+        ),
+    ],
+) -> None:
+    """Write an engine to begin with, in a file of your own.
+
+    It works as it is. Put your own engine in its place, and judge it with --engine NAME.
+    """
+    from reports.commands.new_engine import write_engine
+
+    write_engine(name)
 
 
 @app.command(name="list")

@@ -27,7 +27,7 @@ LAYERS = {
         "play",
         "reference pymunk box2d box2d_v3 event_driven",
         "own_solver",
-        "javascript",
+        "javascript own_engine",
         "engines",
         "mechanisms conformance",
     ],

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from adapters.engine import Engine, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.first_collisions import first_collisions
+from adapters.run import SILENT
 from scenarios.model import Array, Scene, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states
@@ -80,7 +81,8 @@ def load_first(engine: Engine, scenes: Sequence[Scene], dt: float) -> Scene:
 
 def simplified(scene: Scene) -> tuple[Scene, ...]:
     """`scene`, then what a solver of the exercise plays of it, which has no walls, no static disks
-    and a restitution of its own: without the first two, with the exercise's e, one disk alone."""
+    and a restitution of its own: without the first two, with the exercise's e, one disk alone. Each
+    of them also without spin, gravity, or both, for an engine's file that does not model them."""
     moving = np.where(scene.static, 1.0, scene.mass)
     bare = replace(scene, walls=np.zeros((0, 2, 2)), mass=moving, inertia=moving)
     alone = {
@@ -88,7 +90,15 @@ def simplified(scene: Scene) -> tuple[Scene, ...]:
         for name, value in vars(bare).items()
         if name not in ("walls", "gravity", "restitution", "friction", "wrap")
     }
-    return scene, bare, replace(bare, restitution=EXERCISE), replace(bare, **alone)
+    fuller = (scene, bare, replace(bare, restitution=EXERCISE), replace(bare, **alone))
+    return tuple(poorer for each in fuller for poorer in without_spin_and_gravity(each))
+
+
+def without_spin_and_gravity(scene: Scene) -> tuple[Scene, ...]:
+    """`scene`, then without spin, without gravity, without both."""
+    still: dict[str, Any] = {"angular_velocity": np.zeros(scene.n)}
+    light: dict[str, Any] = {"gravity": np.zeros(2)}
+    return scene, replace(scene, **still), replace(scene, **light), replace(scene, **still, **light)
 
 
 def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
@@ -140,7 +150,9 @@ def plain() -> Scene:
 
 
 def reported(engine: Engine, dt: float = DT) -> str:
-    """The collisions an engine reports, as "disk 0 and disk 1, disk 0 and wall 2"."""
+    """The collisions an engine reports, as "disk 0 and disk 1, disk 0 and wall 2"; raises
+    `Unsupported` for one that says it reports none."""
+    must_report(engine)
     collisions = first_collisions(engine.collisions(), dt)
     names = [
         (f"disk {i}", f"disk {j}" if j >= 0 else f"wall {-1 - j}")
@@ -149,11 +161,27 @@ def reported(engine: Engine, dt: float = DT) -> str:
     return ", ".join(" and ".join(pair) for pair in names) or "none"
 
 
+def must_report(engine: Engine) -> None:
+    """Raise `Unsupported` for an engine whose settings say that it reports no collisions."""
+    if engine.settings().get("collisions", (None, None))[1] == SILENT:
+        raise Unsupported("it reports no collisions")
+
+
+def pushed(engine: Engine, disk: int, force: tuple[float, float], torque: float) -> bool:
+    """Apply a force and a torque, or the force alone, or nothing, whatever the engine does not
+    refuse; whether the torque was among it."""
+    for turning in (torque, 0.0):
+        with suppress(Unsupported):
+            engine.apply_force(disk, np.array(force), turning)
+            return turning != 0.0
+    return False
+
+
 def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
     """What an engine does from now on, with a force in the first step: (what and when, its bytes)
     for every array at every 10th step, then the collisions."""
     seen: list[tuple[str, bytes]] = []
-    engine.apply_force(0, np.array([3.0, 1.0]), 0.5)
+    pushed(engine, 0, (3.0, 1.0), 0.5)
     for k in range(0, steps + 1, 10):
         if k:
             engine.step(10)

@@ -61,7 +61,7 @@ class Student:
                 self.started = SolverProcess(self.solver, compiled=True)
             except SolverFailed as failure:
                 raise Unsupported(f"{self.path.name} {failure}") from None
-            self.whole = self.started.surface == "advance"
+            self.whole = self.started.surface != "exercise"
             if not self.whole:
                 make_globals(self.started)
                 self.restitution = restitution_of(self.solver, self.started)
@@ -79,10 +79,7 @@ class Student:
         """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
         must_be_frictionless(scene, self.path.name)
         process = self.process
-        self.forces = np.zeros((scene.n, 3))
-        self.asked: list[dict[str, Any]] = []
-        self.log: list[ContactImpulse] = []
-        self.rows: Array | None = None
+        self.forget(scene)
         if self.whole:
             fields = {
                 name: None if value is None else np.asarray(value).tolist()
@@ -96,6 +93,17 @@ class Student:
         process.do(
             "load", {"spheres": spheres, "dt": dt, "gravity": scene.gravity.tolist(), "wrap": wrap}
         )
+
+    def forget(self, scene: Scene) -> None:
+        """Forget the scene before: what acted, what was asked for, what was heard and seen."""
+        self.forces = np.zeros((scene.n, 3))
+        self.asked: list[dict[str, Any]] = []
+        self.log: list[ContactImpulse] = []
+        self.rows: Array | None = None
+
+    def do(self, command: str, argument: Any, limit: float) -> Any:
+        """One request to the process; raises `SolverFailed`."""
+        return self.process.do(command, argument, limit)
 
     def refuse(self, scene: Scene) -> None:
         """Raise `Unsupported` for a missing function, walls, disks that cannot move, another
@@ -131,7 +139,7 @@ class Student:
         self.rows = None
         if not self.collected:
             for steps in self.take():
-                self.process.do("whole_step" if self.whole else "step", steps, self.limit)
+                self.do("whole_step" if self.whole else "step", steps, self.limit)
             self.limit = self.patience
 
     def take(self) -> list[dict[str, Any]]:
@@ -143,7 +151,7 @@ class Student:
         """(n, 12) or (n, 6) numbers of the spheres or the arrays; collisions are noted, too."""
         if self.rows is None:
             what = {"steps": self.take(), "heard": len(self.log)}
-            answer = self.process.do("whole_play" if self.whole else "play", what, self.limit)
+            answer = self.do("whole_play" if self.whole else "play", what, self.limit)
             self.limit = self.patience
             self.rows = np.array(answer["rows"], float)
             self.log += [
@@ -168,16 +176,15 @@ class Student:
         """What the file decides."""
         own = "the scene's" if self.whole else str(self.restitution)
         order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
+        return {"restitution": (None, own), "order of a step": (None, order), **self.of_file()}
+
+    def of_file(self) -> dict[str, tuple[Any, Any]]:
+        """Which file it is, and what it takes from beside it."""
         beside = ", ".join(file for file, _ in self.solver.beside)
-        return {
-            "restitution": (None, own),
-            "order of a step": (None, order),
-            "file": (str(self.path), f"sha256 {self.solver.digest}"),
-        } | (
-            {"from beside it": (None, f"{beside}; sha256 of all {self.solver.source}")}
-            if beside
-            else {}
-        )
+        which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
+        if not beside:
+            return which
+        return which | {"from beside it": (None, f"{beside}; sha256 of all {self.solver.source}")}
 
     def versions(self) -> dict[str, str]:
         """Of the language's engine."""
@@ -221,11 +228,16 @@ def spheres_of(scene: Scene) -> list[list[float]]:
 def engine_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
     """The row of `ENGINES` that a solver's file, as it is now, stands for; raises `NotASolver` if
     the path is none."""
-    solver = read_solver(path)
+    return row_of_solver(read_solver(path), patience, collected)
+
+
+def row_of_solver(solver: SolverText, patience: float, collected: bool) -> EngineRow:
+    """The row of a solver's text."""
     return EngineRow(
         partial(Student, solver, patience, collected),
-        f"your own solver, {path}",
+        f"your own solver, {solver.path}",
         1.0,
         FLOAT64,
         source=solver.source,
+        exercise=True,
     )

@@ -11,7 +11,7 @@ import hashlib
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from adapters.own_solver.beside import modules_beside
 from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
@@ -35,7 +35,7 @@ class SolverFailed(Exception):
 
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
-            adapters/javascript.
+            adapters/javascript; "diverged" of an engine's file that reads what is not finite.
         what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is
             escaped, and what goes on for more than `LONGEST` characters is cut.
         line, column: where in the solver's file, from 1; 0 where nobody can tell.
@@ -51,7 +51,7 @@ class SolverFailed(Exception):
     @property
     def status(self) -> str:
         """Of a run that it ends, one of `STATUSES` of run.py."""
-        return self.kind if self.kind in ("timeout", "crashed") else "error"
+        return self.kind if self.kind in ("timeout", "crashed", "diverged") else "error"
 
     def __str__(self) -> str:
         return f"{self.what} (line {self.line}, column {self.column})" if self.line else self.what
@@ -85,7 +85,10 @@ class SolverText:
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
         beside: the modules that it imports from its own folder, or the gl-matrix that it calls:
             file, relative to the folder or to the one above with its node_modules, -> text.
+        engine: it is an engine's file, `EngineText` of adapters/own_engine, which loads itself.
     """
+
+    engine: ClassVar[bool] = False
 
     path: Path
     kind: str

@@ -48,6 +48,8 @@ class JavaScriptSolver:
     """The file in a fresh V8. Raises `SolverFailed` if it cannot be loaded."""
 
     surface = "exercise"
+    drivers: tuple[str, ...] = (DRIVER,)  # which stand in V8 before the file
+    bind = BIND  # which finds its functions
 
     def __init__(self, solver: SolverText) -> None:
         self.solver = solver
@@ -57,12 +59,13 @@ class JavaScriptSolver:
         """Load the file into a V8 of its own, with nothing in it of what was called before."""
         solver, self.v8 = self.solver, MiniRacer()
         self.v8.set_hard_memory_limit(HEAP)
-        self.v8.eval(DRIVER)
+        for driver in self.drivers:
+            self.v8.eval(driver)
         for name, text in solver.beside:
             self.load_library(name, text)
         try:
             self.v8.eval(f"{solver.text}\n//# sourceURL={NAME}", timeout_sec=LOAD_LIMIT)
-            self.functions = json.loads(str(self.v8.eval(BIND, timeout_sec=LOAD_LIMIT)))
+            self.functions = json.loads(str(self.v8.eval(self.bind, timeout_sec=LOAD_LIMIT)))
         except JSEvalException as error:
             raise self.failure(error, LOAD_LIMIT, "while it is loaded") from None
 

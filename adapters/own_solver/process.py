@@ -38,8 +38,8 @@ class SolverProcess:
         functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it
             replaced.
         kind: "javascript" or "python"; or "packaged", an engine of adapters/javascript.
-        surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl) or
-            "packaged".
+        surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl),
+            "engine" (a file of adapters/own_engine) or "packaged".
         versions: library -> version.
 
     Raises:

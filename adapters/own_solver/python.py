@@ -75,6 +75,10 @@ class PythonSolver:
         sys.modules["solver"] = module  # numba and dataclasses look a function's module up
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
             exec(compile(solver.text, self.name, "exec"), module.__dict__)
+        self.take(module)
+
+    def take(self, module: ModuleType) -> None:
+        """Find the functions of the module."""
         self.surface = "advance" if callable(getattr(module, "advance", None)) else "exercise"
         named = {
             "integrate": "integrate",

@@ -67,10 +67,12 @@ def listen(stream: IO[str], requests: queue.SimpleQueue[str]) -> None:
 
 
 def load(solver: Any, copies: Path | None) -> Any:
-    """The solver by its kind, its texts kept in `copies`, or the engine of a package; raises
-    `SolverFailed`."""
+    """The solver by its kind, its texts kept in `copies`, or the engine of a package or of a file;
+    raises `SolverFailed`."""
     if solver.kind == "packaged":
         return solver.load()
+    if solver.engine:
+        return solver.load(copies)
     if solver.kind == "javascript":
         from adapters.own_solver.javascript import JavaScriptSolver
 

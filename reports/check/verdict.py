@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from adapters.own_engine.surface import is_engine
 from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
 from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
+ENGINE = "is an engine (create, step, read), and check is for solvers of the exercise"
+RATHER = "to judge it: crosscheck run bouncing_ball_e09 --engine"
 MOST = 3  # sentences
 NONE = "holds no .js and no .py file"
 NAMED = 3  # files that are none
@@ -144,6 +148,8 @@ def check_file(path: Path) -> FileCheck:
         return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:
         solver = read_solver(path)
+        if is_engine(solver):
+            raise NotASolver(f"{path}: {ENGINE}; {RATHER} {shlex.quote(str(path))}")
         rows, restitution = examine(solver)
         return FileCheck(path, rows, restitution=restitution, solver=solver)
     except NotASolver as refusal:

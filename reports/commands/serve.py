@@ -8,6 +8,7 @@ from pathlib import Path
 
 from starlette.applications import Starlette
 
+from adapters.engines import ENGINES
 from reports.commands.own_solvers import said_of
 from reports.game.command import FIRST, game_of
 from reports.game.server import Game, routes
@@ -24,7 +25,7 @@ def application(game: Game) -> Starlette:
 def play(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
     """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
     game = game_of(flight, engines)
-    game.said = said_of(game.engines)
+    game.said = said_of([name for name in game.engines if ENGINES[name].exercise])
     server.serve(application(game), port, "/", opens)
 
 

@@ -13,6 +13,8 @@ from reports.compare.faces import SAME
 from reports.compare.restitution import Restitutions
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 
+UNHEARD = not_judged("an engine reports no collisions")
+
 
 def restitution(view: View) -> Value | None:
     """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the
@@ -34,6 +36,8 @@ def restitution_error(view: View) -> Value | None:
 def collision_count_error(view: View) -> Value | None:
     """Collisions of the engine less collisions of the other, whenever they come; pairs at rest from
     the start are not counted."""
+    if view.silent:
+        return UNHEARD
     resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
     counted = (
         by_pair(collisions, resting, view.end - SAME * view.dt) for collisions in view.collisions
@@ -116,5 +120,7 @@ def _unjudged(view: View) -> Value | None:
     Where most collisions are too close together for a step, or lie on contacts that rest, most of
     what an engine reports is excused: that it misses and invents nothing says nothing.
     """
+    if view.silent:
+        return UNHEARD
     few = view.matched.judged < LEAST_SHARE * len(view.collisions[1])
     return not_judged(f"only {_carried(view)}") if few else None

@@ -50,22 +50,22 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
         if run.status != "ok":
             rows.append(status_row(run, f"{run.status}: {run.reason}"))
             continue
-        for versus, other in _opponents(run, runs, truth):
-            view = beside(scenario, run, other, jumps if versus == TRUTH else None)
+        for versus, other, silent in _opponents(run, runs, truth):
+            view = beside(scenario, run, other, jumps if versus == TRUTH else None, silent)
             rows += _measure(run, view, versus)
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
 
 
 def _opponents(
     run: Run, runs: Sequence[Run], truth: Trajectory | None
-) -> Iterator[tuple[str, Trajectory | None]]:
-    """What a run is measured against: the laws, the truth, and each later engine of `runs`."""
-    yield ITSELF, None
+) -> Iterator[tuple[str, Trajectory | None, bool]]:
+    """The laws, the truth, each later engine of `runs`; and whether it reports no collisions."""
+    yield ITSELF, None, False
     if truth is not None:
-        yield TRUTH, truth
+        yield TRUTH, truth, False
     for other in runs[runs.index(run) + 1 :]:
         if other.dt == run.dt and other.name != run.name and other.status == "ok":
-            yield other.name, other.trajectory
+            yield other.name, other.trajectory, other.silent
 
 
 def _measure(run: Run, view: View, versus: str) -> list[TableRow]:

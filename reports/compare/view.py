@@ -61,6 +61,7 @@ class View:
         other: the truth, another engine's trajectory, or None: only the laws of physics.
         jumps: of `other` (delays.py) if it is the truth; None for an engine.
         rounding: the relative rounding of the numbers that the engine keeps.
+        silent: whether one of the two reports no collisions, so that they cannot be compared.
     """
 
     scenario: Scenario
@@ -69,6 +70,7 @@ class View:
     other: Trajectory | None = None
     jumps: Jumps | None = None
     rounding: float = FLOAT64
+    silent: bool = False
 
     @cached_property
     def deviation(self) -> Array:
@@ -229,15 +231,23 @@ class View:
         return match(*self.collisions, self.end, self.dt)
 
 
-def beside(scenario: Scenario, run: Run, other: Trajectory | None, jumps: Jumps | None) -> View:
-    """What a run played beside `other`, over the samples both have."""
+def beside(
+    scenario: Scenario,
+    run: Run,
+    other: Trajectory | None,
+    jumps: Jumps | None,
+    silent: bool = False,
+) -> View:
+    """What a run played beside `other`, over the samples both have; `silent`: that engine reports
+    no collisions."""
     assert run.trajectory is not None
     known = ENGINES | FETCHED
     # a solver's file keeps float64
     rounding = known[run.name].rounding if run.name in known else FLOAT64
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
     other = None if other is None else cut(other, k)
-    return View(scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding)
+    silent = silent or run.silent
+    return View(scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding, silent)
 
 
 def cut(trajectory: Trajectory, k: int) -> Trajectory:

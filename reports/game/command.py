@@ -12,7 +12,8 @@ from typing import cast
 from adapters.engine import Engine
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, OWN
-from adapters.own_solver.engine import Student, engine_file
+from adapters.own_engine.engine import row_of_file
+from adapters.own_solver.engine import Student
 from adapters.own_solver.file import KINDS
 from adapters.own_solver.restitution import EXERCISE
 from adapters.runaway import fault_of
@@ -55,14 +56,15 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
     rows, faults, restitutions = {}, [], []
     for name in names:
         path = Path(name.removesuffix(OWN))
-        rows[name] = engine_file(path, PATIENCE, collected=True)
+        rows[name] = row_of_file(path, PATIENCE, collected=True)
         with closing(cast(Student, rows[name].make())) as engine:
             try:
                 restitutions.append(engine.own_restitution)
                 try_out(engine, restitutions[-1])
             except Exception as error:  # somebody's solver may raise anything
                 reason = str(error) or type(error).__name__
-                faults.append(f"{path}: {reason.removeprefix(f'{path.name} ')}")
+                reason = reason.removeprefix(f"{path.name}: ").removeprefix(f"{path.name} ")
+                faults.append(f"{path}: {reason}")
     if faults:
         refuse(faults)
     return rows, next(iter(restitutions), EXERCISE)

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import pandas as pd
 
-from adapters.engines import ENGINES, FETCHED, OWN
+from adapters.engines import ENGINES, FETCHED, OWN, row_of
 from reports.page.style import number
 from reports.run.arguments import checked_engines, opening, unknown
 from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
@@ -35,7 +35,7 @@ from reports.stability.results import (
     tasks_of,
 )
 from reports.stability.touching import TOUCHING, AtGap
-from reports.stability.variants import WITH_FRICTION_ONLY
+from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
@@ -61,7 +61,7 @@ LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stabil
 PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in ENGINES)
 STABILITY = Kind(
     "crosscheck stability",
-    rf"journal\.jsonl|trajectories/.+\.({PLAYED_BY})[^/.]*\.npz",
+    rf"journal\.jsonl|trajectories/.+(\.({PLAYED_BY})|-own)[^/.]*\.npz",
     ("trajectories",),
 )
 
@@ -84,17 +84,24 @@ def find_limits(
     if packaged := [name for name in chosen if name in FETCHED]:
         how = "is not driven to its limits; crosscheck run and crosscheck speed play it"
         refuse([f"--engine {name}: {how}" for name in packaged])
-    if files := [name.removesuffix(OWN) for name in chosen if name not in ENGINES]:
+    own = {name: row_of(name) for name in chosen if name not in ENGINES}
+    if files := [name.removesuffix(OWN) for name, row in own.items() if row.exercise]:
         how = (
-            "a file is not driven to its limits: crosscheck check judges it, crosscheck run"
-            " plays it"
+            "a solver of the exercise is not driven to its limits: crosscheck check judges it,"
+            " crosscheck run plays it"
         )
         refuse([f"--engine {file}: {how}" for file in files])
     plan = StabilityPlan(
         cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
     )
-    if not tasks_of(plan) and {*chosen} <= {*WITH_FRICTION_ONLY}:
-        refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in chosen])
+    with taking_part(own):
+        find(plan, resume, out)
+
+
+def find(plan: StabilityPlan, resume: bool, out: Path) -> NoReturn:
+    """Find what was asked for, which was checked; exits as `find_limits`."""
+    if not tasks_of(plan) and {*plan.engines} <= {*WITH_FRICTION_ONLY}:
+        refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in plan.engines])
     with opening(out):
         out = place_of(out)
         journal = open_part(out, STABILITY)

@@ -85,7 +85,7 @@ def file_of(limit: Limit, folder: Path) -> Path:
     name = f"{limit.case}.{limit.engine}"
     if "/" in name or len(name) > 200:  # two folders may have a file of one name
         digest = hashlib.sha256(name.encode()).hexdigest()[:8]
-        name = f"{Path(limit.case).name}.{limit.engine}-{digest}"[-200:]
+        name = f"{Path(limit.case).name}.{Path(limit.engine).name}-{digest}"[-200:]
     name = name.replace(":", "-")
     return folder / "trajectories" / f"{name}.npz"
 

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.engines import ENGINES
+from adapters.engine_row import EngineRow
+from adapters.engines import ENGINES, OWN
 from reports.run.journal import JOURNAL, Journal, plain
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.machine import about
@@ -31,7 +32,7 @@ from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import Search
 from reports.stability.touching import TOUCHING, LawOf, law_of
-from reports.stability.variants import WITH_FRICTION_ONLY
+from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from reports.stability.vary import case_of_file
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
@@ -83,6 +84,11 @@ class StabilityPlan:
     workers: int
     command: str
 
+    @property
+    def own(self) -> dict[str, EngineRow]:
+        """The rows of engines' own files, `PATH:own`, among `engines`."""
+        return {name: ENGINES[name] for name in self.engines if name.endswith(OWN)}
+
 
 @dataclass(frozen=True)
 class Task:
@@ -94,8 +100,14 @@ class Task:
     engine: str
     form: str
 
-    def __call__(self, folder: Path) -> Limit | MapOf | LawOf:
-        """In the worker: do it; the first failing run at the limit is saved."""
+    def __call__(self, folder: Path, own: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
+        """In the worker: do it, with the rows of engines' own files among the others; the first
+        failing run at the limit is saved."""
+        with taking_part(own):
+            return self.found(folder)
+
+    def found(self, folder: Path) -> Limit | MapOf | LawOf:
+        """What comes of it."""
         if self.kind == "limit":
             return found_limit(self, folder)
         if self.kind == "law":
@@ -126,7 +138,7 @@ def carry_out(
     (folder / "trajectories").mkdir(exist_ok=True)
     files = {
         path: digest_of(path)
-        for path, _, _ in (name.rpartition(":") for name in plan.cases)
+        for path, _, _ in (name.rpartition(":") for name in (*plan.cases, *plan.own))
         if path
     }
     header = about(plan.command, 0) | {"form": plan.form, "files": files}
@@ -135,7 +147,7 @@ def carry_out(
         put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
     wanted = tasks_of(plan)
     tasks: dict[Any, Callable[[], Any]] = {
-        task: partial(task, folder) for task in wanted if task not in done
+        task: partial(task, folder, plan.own) for task in wanted if task not in done
     }
     progress.start(len(tasks), len(wanted))
     with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:

@@ -3,11 +3,13 @@ which a reason is tested."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
 from adapters.engine import Engine
+from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, changed
 from adapters.play import play_once
 from adapters.run import Run
@@ -64,6 +66,19 @@ VARIANTS: dict[str, Variant] = {
         *CHANGED,
     )
 }
+
+
+@contextmanager
+def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
+    """Within it engines' own files, `PATH:own`, are put to the test in this process, as the rows of
+    `ENGINES` are."""
+    ENGINES.update(rows)
+    VARIANTS.update({name: Variant(name, row.make) for name, row in rows.items()})
+    try:
+        yield
+    finally:
+        for name in rows:
+            del ENGINES[name], VARIANTS[name]
 
 
 def played(variant: Variant, scenario: Scenario) -> Run:

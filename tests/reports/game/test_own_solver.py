@@ -13,11 +13,13 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
 
 from adapters.engines import ENGINES
+from adapters.own_engine.engine import TEMPLATES
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.process import SolverProcess
 from reports.check.verdict import check_file
@@ -396,3 +398,27 @@ def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Pa
     engines, picture = (min(times[k]) for k in ("engines, for a frame", "to draw a picture"))
 
     assert engines + picture < 1e3 * FRAME
+
+
+def test_an_engine_in_a_file_flies(tmp_path: Path):
+    """As the reference does, to rounding, under thrust; one that does not model what the game has
+    is refused with its name and what it lacks."""
+    text = TEMPLATES["javascript"].read_text()
+    path, ball = tmp_path / "mine.js", tmp_path / "ball.js"
+    path.write_text(text)
+    ball.write_text(text.replace('models = "disks walls', 'models = "walls'))
+    rows, restitution = own_rows([f"{path}:own"])
+    ENGINES.update(rows)
+    flight = Flight(field_scenario(0, 5), [f"{path}:own", "reference:exercise"])
+    flight.key("w", True)
+    flight.advance(20)
+    mine, reference = flight.flyers
+    refused = crosscheck("play", "--engine", "ball.js", cwd=tmp_path)
+    flight.close()
+
+    assert restitution == 0.9
+    assert not mine.left
+    assert np.abs(mine.state.position - reference.state.position).max() < 1e-12
+    assert mine.state.velocity[0, 0] != field_scenario(0, 5).scene.velocity[0, 0]  # it was thrust
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr == "ball.js: does not model more than one disk\n"

@@ -13,14 +13,19 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
+from adapters.engines import ENGINES, read_row
+from adapters.own_engine.engine import TEMPLATES
 from reports import cli
 from reports.page.links import PAGES
 from reports.run.folders import RUN, begun
 from reports.run.journal import JOURNAL
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
+from reports.stability.limits import QUICK
 from reports.stability.maps import MAPS
 from reports.stability.results import COLUMNS, StabilityPlan, Task, done_before, tasks_of
+from reports.stability.search import Search
+from reports.stability.variants import VARIANTS, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -150,7 +155,7 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
         (["--engine", "bullet"], "engine 'bullet' is not known"),
         (
             ["slow_collision", "--engine", "../solvers/correct/plain.py"],
-            "a file is not driven to its limits: crosscheck check",
+            "a solver of the exercise is not driven to its limits: crosscheck check",
         ),
         (
             ["scenes/still.toml", "--vary", "mass_ratio"],
@@ -271,3 +276,41 @@ def test_every_case_of_the_issue_is_there():
     }
 
     assert wanted <= set(CASES)
+
+
+def with_threshold(folder: Path) -> Path:
+    """An engine's file that bounces below 1 m/s with e times the speed."""
+    text = TEMPLATES["javascript"].read_text()
+    right = "const impulse = -(1 + world.e)"
+    assert right in text
+    path = folder / "slow.js"
+    path.write_text(text.replace(right, "const impulse = -(1 + world.e * Math.min(1, -closing))"))
+    return path
+
+
+@pytest.mark.slow
+def test_an_engine_in_a_file_takes_part(tmp_path: Path):
+    """It works above its threshold and fails below it, as its row says; afterwards it is gone."""
+    name = f"{with_threshold(tmp_path)}:own"
+    with taking_part({name: read_row(name)}):
+        search = Search(CASES["slow_collision"], name, QUICK)
+        works = [search.trial(value, 2).works for value in (2.0, 0.5)]
+
+    assert works == [True, False]
+    assert name not in ENGINES
+    assert name not in VARIANTS
+
+
+@pytest.mark.long
+def test_an_engine_in_a_file_is_driven_to_its_limit(tmp_path: Path):
+    """The command finds its threshold, and keeps its failing run; asked again, it replaces both."""
+    with_threshold(tmp_path)
+    words = ("slow_collision", "--engine", "slow.js", "--out", "limits")
+    done = crosscheck("stability", *words, cwd=tmp_path)
+    [limit] = pd.read_csv(tmp_path / "limits" / "limits.csv").itertuples()
+    kept = sorted(path.name for path in (tmp_path / "limits" / "trajectories").iterdir())
+    again = crosscheck("stability", *words, cwd=tmp_path)
+
+    assert done.returncode == again.returncode == 0, done.stderr + again.stderr
+    assert limit.fails_at < 1 <= limit.works_at * 1.05  # the bracket's width
+    assert "slow_collision.slow.js-own.npz" in kept

@@ -1,0 +1,43 @@
+"""What a scene may have, in the words of the line `models` of an engine's file; a scene that has
+more is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from adapters.engine import Unsupported
+from adapters.friction import Frictionless
+from scenarios.model import Scene
+
+# The word in the line -> what it is called in a sentence.
+FEATURES = {
+    "disks": "more than one disk",
+    "walls": "walls",
+    "gravity": "gravity",
+    "static": "disks that cannot move",
+    "forces": "forces on disks",
+    "rotation": "rotation",
+    "friction": "friction",
+    "wrap": "the wrap at the edges",
+}
+
+
+def must_model(scene: Scene, models: Collection[str], who: str) -> None:
+    """Raise `Unsupported` for a scene that has more than `who` models."""
+    has = {
+        "disks": scene.n > 1,
+        "walls": len(scene.walls) > 0,
+        "gravity": scene.gravity.any(),
+        "static": scene.static.any(),
+        "rotation": scene.angular_velocity.any(),
+        "friction": scene.friction > 0,
+        "wrap": scene.wrap is not None,
+    }
+    if more := [word for word, there in has.items() if there and word not in models]:
+        kind = Frictionless if more == ["friction"] else Unsupported
+        raise kind(refusal(who, more))
+
+
+def refusal(who: str, more: Collection[str]) -> str:
+    """The sentence for what `who` does not model, words of `FEATURES`."""
+    return f"{who} does not model {', '.join(FEATURES[word] for word in more)}"

@@ -1,0 +1,87 @@
+"""Which functions a file defines decides what it is: a solver of the exercise or an engine."""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+
+from adapters.own_solver.file import NotASolver, SolverText
+from adapters.own_solver.restitution import code_of
+
+ENGINE = ("create", "step", "read")
+# Names of the exercise: those that an engine may well have for itself, and those that it has not.
+SHARED = ("integrate", "advance", "initScene")
+EXERCISE = ("sphereSphereCollisionHandling", "performSimStep", "projectObjects")
+HOW = "crosscheck new-engine NAME.js (or NAME.py) writes an engine that works"
+
+
+def is_engine(solver: SolverText) -> bool:
+    """Whether a file is an engine; else it is taken for a solver of the exercise.
+
+    An engine may call functions of its own `integrate` or `advance`, if it has all of `ENGINE`.
+    Raises `NotASolver` if its functions are of both.
+    """
+    names = defined_in(solver.text, solver.kind)
+    whole, theirs = names.issuperset(ENGINE), names.intersection(EXERCISE)
+    if whole and theirs:
+        raise NotASolver(
+            f"{solver.path}: has {listed(ENGINE)}, as an engine has, and {listed(sorted(theirs))},"
+            " as a solver of the exercise has; leave out one or the other"
+        )
+    return whole or bool(
+        names.intersection(ENGINE) and not names.intersection((*EXERCISE, *SHARED))
+    )
+
+
+def must_be_either(solver: SolverText) -> None:
+    """Raise `NotASolver` for a file that defines something, but in whose text no function of either
+    kind occurs."""
+    names = defined_in(solver.text, solver.kind)
+    known = (*ENGINE, *EXERCISE, *SHARED)
+    if names and not any(re.search(rf"\b{name}\b", solver.text) for name in known):
+        raise NotASolver(
+            f"{solver.path}: has neither the functions of the exercise"
+            f" (integrate, sphereSphereCollisionHandling) nor those of an engine"
+            f" ({listed(ENGINE)}); {HOW}"
+        )
+
+
+def defined_in(text: str, kind: str) -> set[str]:
+    """The names that a text defines: of a Python file those of the module, of any other, or one
+    that is no Python, whatever looks like a definition."""
+    if kind == "python":
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of the text, which are for who wrote it
+                return set(names_of(ast.parse(text).body))
+        except (SyntaxError, ValueError, RecursionError, MemoryError):  # said where it is run
+            return set(re.findall(r"^(?:async\s+)?def\s+(\w+)", text, re.MULTILINE))
+    code = code_of(text)
+    functions = re.findall(r"\bfunction\s*\*?\s*(\w+)\s*\(", code)
+    values = re.findall(r"(?<![\w.])(?:(?:const|let|var|class)\s+|globalThis\.)(\w+)", code)
+    return {*functions, *values, *re.findall(r"^\s*(\w+)\s*=(?!=)", code, re.MULTILINE)}
+
+
+def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
+    """The names that statements of a module bind, also those within an `if` or a `try`."""
+    for node in body:
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            yield node.name
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from (alias.asname or alias.name for alias in node.names)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            yield from (x.id for t in targets for x in ast.walk(t) if isinstance(x, ast.Name))
+        else:
+            for part in ("body", "orelse", "finalbody"):
+                yield from names_of(getattr(node, part, ()))
+            for handler in getattr(node, "handlers", ()):
+                yield from names_of(handler.body)
+
+
+def listed(names: Iterable[str]) -> str:
+    """One, two and three."""
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last

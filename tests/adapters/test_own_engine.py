@@ -1,0 +1,405 @@
+"""Somebody's own engine in a file: it is told from a solver, played by what it says it models, and
+every fault of it is a status and one sentence."""
+
+from __future__ import annotations
+
+import re
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.conformance.conform import ask, conform
+from adapters.engine_row import EngineRow
+from adapters.own_engine.engine import TEMPLATES, row_of_file
+from adapters.own_engine.models import FEATURES
+from adapters.own_solver.file import NotASolver
+from adapters.play import play, play_once
+from adapters.run import Run
+from reports.compare.comparison import compare
+from scenarios.catalogue import scenario
+from tests.reports.terminal.command_line import crosscheck
+from tests.solvers.mutants import CORRECT
+
+ROOT = Path(__file__).parents[2]
+ENDS = {"javascript": "ball.js", "python": "ball.py"}
+[EXAMPLE] = re.findall(r"^```js\n(.*?)^```", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)
+
+
+def template(folder: Path, kind: str, *changes: tuple[str, str]) -> Path:
+    """The template of a language in a folder, changed."""
+    text = TEMPLATES[kind].read_text()
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path = folder / ENDS[kind]
+    path.write_text(text)
+    return path
+
+
+def played(path: Path, scene: str = "head_on_equal_e09", patience: float = 5.0) -> Run:
+    """A scene at its middle step size by a file."""
+    question = scenario(scene)
+    return play_once(row_of_file(path, patience).make, "x:own", question, question.dt(4))
+
+
+def missed(row: EngineRow, *probes: str) -> dict[str, str]:
+    """The probes that an engine does not keep, of these or all -> the verdict."""
+    asked = [ask("x", "own", each, row) for each in probes] or conform("x:own", row)
+    return {one.probe: one.verdict for one in asked if one.verdict != "keeps"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ENDS)
+def test_the_template_keeps_every_probe(kind: str, tmp_path: Path):
+    """And one with the sign of the impulse turned departs from the scene."""
+    wrong = (
+        ("d.u += sign * nx * impulse", "d.u -= sign * nx * impulse"),
+        ("d.v += sign * ny * impulse", "d.v -= sign * ny * impulse"),
+    )
+
+    assert missed(row_of_file(template(tmp_path, kind))) == {}
+    faults = missed(row_of_file(template(tmp_path, kind, *wrong)))
+    assert faults.keys() >= {"restitution_2", "restitution_wall", "impulse_is_reported"}
+    assert set(faults.values()) == {"departs"}
+
+
+@pytest.mark.slow
+def test_a_template_in_a_scene_is_the_reference(tmp_path: Path):
+    """It plays a collision of two as the exercise's reference solver does, to rounding, in both
+    languages, and reports the same collisions."""
+    runs = [played(template(tmp_path, kind)) for kind in ENDS]
+    runs.append(played(CORRECT[0].parent / "plain.js"))
+    first, *others = runs
+
+    assert [one.status for one in runs] == ["ok"] * 3
+    assert first.trajectory is not None
+    assert len(first.trajectory.collisions)
+    for one in others:
+        assert one.trajectory is not None
+        assert np.abs(one.trajectory.position - first.trajectory.position).max() < 1e-12
+        assert (one.trajectory.collisions.t == first.trajectory.collisions.t).all()
+
+
+@pytest.mark.slow
+def test_the_example_of_contributing_plays(tmp_path: Path):
+    """A ball in pixels, y down, bounces as the template does; it says why it refuses a box."""
+    ball = tmp_path / "pixels.js"
+    ball.write_text(EXAMPLE)
+    run = played(ball, "bouncing_ball_e09")
+    other = played(template(tmp_path, "javascript"), "bouncing_ball_e09")
+
+    assert run.status == other.status == "ok"
+    assert run.trajectory is not None
+    assert other.trajectory is not None
+    first = slice(0, 30)  # up to the first bounce: then the overlap is corrected otherwise
+    off = np.abs(run.trajectory.position[first] - other.trajectory.position[first])
+    assert off.max() < 1e-12
+    assert run.trajectory.collisions.t[0] == other.trajectory.collisions.t[0]
+    assert missed(row_of_file(ball), "free_flight", "load_forgets", "same_instant") == {}
+    assert played(ball, "wall_to_wall").reason == (
+        "pixels.js refuses the scene: it has only a floor at y = 0, and gravity down"
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "words", "reason"),
+    [
+        ("wall_to_wall", "disks", "ball.js does not model walls"),
+        ("free_fall", "disks walls", "ball.js does not model gravity"),
+        ("spinning_disks_meet", "disks rotation", "ball.js does not model friction"),
+        ("ship_thrust", "disks rotation wrap", "ball.js does not model forces on disks"),
+        ("asteroids", "walls", "ball.js does not model more than one disk, rotation, the wrap at"),
+    ],
+)
+def test_a_scene_with_more_is_refused_by_name(scene: str, words: str, reason: str, tmp_path: Path):
+    """What the line `models` leaves out is named."""
+    line = (f'models = "{" ".join(FEATURES)}"', f'models = "{words}"')
+    path = template(
+        tmp_path,
+        "javascript",
+        ("static forces rotation wrap", "static forces rotation friction wrap"),
+    )
+    path.write_text(path.read_text().replace(*line))
+    run = played(path, scene)
+
+    assert (run.status, run.reason.startswith(reason)) == ("unsupported", True), run.reason
+
+
+QUICK = 3  # of the faults that the fast suite plays
+JS, PY = "javascript", "python"
+FAULTS = [  # language, what is written instead, status, what the sentence says
+    (
+        JS,
+        "d.x += d.u * dt",
+        "d.x = 0 / 0",
+        "diverged",
+        'read returned ["NaN","NaN"] as position of disk 0; asked are finite numbers',
+    ),
+    (
+        PY,
+        "d.x += d.u * dt",
+        "d.x = float('nan')",
+        "diverged",
+        "read returned [nan, nan] as position of disk 0; asked are finite numbers",
+    ),
+    (
+        JS,
+        "disks.map((d) => [d.u, d.v])",
+        "[[0, 0]]",
+        "error",
+        "read returned [[0,0]] as velocity; asked is [x, y] for each of 2 disks",
+    ),
+    (
+        PY,
+        "[[d.u, d.v] for d in world.disks]",
+        "[[0, 0]]",
+        "error",
+        "read returned [[0, 0]] as velocity; asked is [x, y] for each of 2 disks",
+    ),
+    (
+        JS,
+        "disks.map((d) => [d.u, d.v])",
+        "disks.map((d) => [d.u])",
+        "error",
+        "as velocity of disk 0; asked is [x, y] for each of 2 disks",
+    ),
+    (
+        PY,
+        "[[d.u, d.v] for d in world.disks]",
+        "[[1.0], [1.0, 2.0]]",
+        "error",
+        "read returned [[1.0], [1.0, 2.0]] as velocity; asked is",
+    ),
+    (
+        JS,
+        "disks.map((d) => [d.u, d.v])",
+        "disks.map(() => ['1', '2'])",
+        "error",
+        'read returned ["1","2"] as velocity of disk 0',
+    ),
+    (
+        PY,
+        "[[d.u, d.v] for d in world.disks]",
+        "[['1', '2']] * 2",
+        "error",
+        "read returned [['1', '2'], ['1', '2']] as velocity",
+    ),
+    (
+        JS,
+        "velocity: disks.map((d) => [d.u, d.v]),",
+        "",
+        "error",
+        "it has no velocity; asked is [x, y] for each of 2 disks",
+    ),
+    (
+        PY,
+        '"velocity": [[d.u, d.v] for d in world.disks],',
+        "",
+        "error",
+        "it has no velocity; asked is [x, y] for each of 2 disks",
+    ),
+    (
+        JS,
+        "function step(",
+        "async function step(",
+        "error",
+        "step returned a Promise; asked is a plain function",
+    ),
+    (
+        PY,
+        "    world.heard = []\n",
+        "    world.heard = []\n    yield\n",
+        "unsupported",
+        "step is an async def, or has a yield: it runs nothing",
+    ),
+    (
+        JS,
+        "world.heard = [];\n",
+        "world.heard = []; for (;;);\n",
+        "timeout",
+        "step does not come back within 1 s in one call",
+    ),
+    (
+        PY,
+        "    world.heard = []\n",
+        "    while True: pass\n",
+        "timeout",
+        "step does not come back within 1 s in one call",
+    ),
+    (
+        JS,
+        "world.heard = [];\n",
+        "world.heard = []; nothing.x = 1;\n",
+        "error",
+        "step threw ReferenceError: nothing is not defined (line 18,",
+    ),
+    (
+        PY,
+        "    world.heard = []\n",
+        "    world.heard = [1 / 0]\n",
+        "error",
+        "step raised ZeroDivisionError: division by zero (line ",
+    ),
+    (
+        PY,
+        "    world.heard = []\n",
+        "    import os; os.abort()\n",
+        "crashed",
+        "step was called: its process was ended by SIGABRT",
+    ),
+    (
+        PY,
+        "    world.heard = []\n",
+        "    raise SystemExit(3)\n",
+        "error",
+        "step ends the process (SystemExit: 3)",
+    ),
+    (
+        JS,
+        "world.heard.push([a.i, j, impulse])",
+        "world.heard.push([a.i, 7, impulse])",
+        "error",
+        "collisions returned [0,7,",
+    ),
+    (
+        PY,
+        "world.heard.append([a.i, j, impulse])",
+        "world.heard.append(impulse)",
+        "error",
+        "; asked are rows [i, j] or [i, j, impulse]",
+    ),
+    (JS, "return world.heard", "return 3", "error", "collisions returned 3; asked are rows"),
+    (PY, "return world.heard", "return None", "error", "collisions returned None; asked are rows"),
+    (
+        JS,
+        '"disks walls gravity',
+        '"balls walls gravity',
+        "unsupported",
+        "models has the word 'balls'; models must be a text with some of",
+    ),
+    (PY, 'models = "', 'modelled = "', "unsupported", "has no line models; models must be a text"),
+    (
+        JS,
+        "function read(",
+        "function reads(",
+        "unsupported",
+        "has no function read; crosscheck new-engine NAME",
+    ),
+    (
+        PY,
+        "def read(",
+        "def reads(",
+        "unsupported",
+        "has no function read; crosscheck new-engine NAME",
+    ),
+    (
+        JS,
+        "const disks = scene",
+        "scene.x.y; const disks = scene",
+        "error",
+        "create threw TypeError: ",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new", "status", "says"),
+    [*FAULTS[:QUICK], *(pytest.param(*each, marks=pytest.mark.slow) for each in FAULTS[QUICK:])],
+)
+def test_a_fault_is_a_status_and_a_sentence(
+    kind: str, old: str, new: str, status: str, says: str, tmp_path: Path
+):
+    """It names the file, the function, what came and what is asked."""
+    path = template(tmp_path, kind, (old, new))
+    row = row_of_file(path, patience=1.0)
+    question = scenario("head_on_equal_e09")
+    with closing(row.make()) as engine:
+        engine.limit = 1.0  # type: ignore[attr-defined]
+        run = play(engine, "x:own", question, question.dt(4))
+
+    assert (run.status, says in run.reason, path.name in run.reason) == (status, True, True), (
+        run.reason
+    )
+
+
+@pytest.mark.slow
+def test_who_reports_no_collisions_is_not_said_to_miss_them(tmp_path: Path):
+    """They are not judged, also not those of an engine beside it; and the probes do not ask. One
+    that reports an empty list is said to miss them."""
+    path = template(tmp_path, "javascript", ("function collisions(", "function hits("))
+    silent, verdicts = played(path), missed(row_of_file(path), "collisions_are_reported")
+    other = played(template(tmp_path, "javascript"))
+    nothing = template(tmp_path, "javascript", ("return world.heard", "return []"))
+    table = compare(scenario("head_on_equal_e09"), [silent, replace(other, profile="other")]).table
+    notes = {
+        (row.profile, row.versus): row.note
+        for row in table[table.metric == "collisions_missed"].itertuples()
+    }
+    empty = compare(scenario("head_on_equal_e09"), [played(nothing)]).table
+
+    assert silent.silent
+    assert not other.silent
+    assert verdicts == {"collisions_are_reported": "not asked"}
+    assert notes["own", "truth"] == "not judged: an engine reports no collisions"
+    assert notes["own", "x:other"] == "not judged: an engine reports no collisions"
+    assert "1 of 1 collisions judged" in notes["other", "truth"]
+    assert empty[empty.metric == "collisions_missed"].value.max() == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("a.js", "const create = () => 0; function step() {} let read = () => 0;", "engine"),
+        ("a.py", "from math import hypot as step, pi as create\nread = 3", "engine"),
+        ("a.py", "if True:\n    def create(s, dt): pass", "engine"),
+        ("a.js", "function create() {} function integrate() {}", "solver"),  # a helper of a solver
+        ("a.js", "create = step = read = 1; function integrate() {}\nstep = read = 1", "solver"),
+        ("a.js", "// function create() {}\nfunction integrate() {}", "solver"),
+        (
+            "a.py",
+            "def create(): pass\ndef step(): pass\ndef read(): pass\ndef advance(): 0",
+            "engine",
+        ),
+        ("a.py", "def advance(disks, world, dt, count): pass", "solver"),
+        ("a.js", "function integrate( {", "solver"),  # what is no JavaScript is said where it runs
+        ("a.js", "function hello() {}", "has neither the functions of the exercise"),
+        ("a.py", "x = 1", "has neither the functions of the exercise"),
+        (
+            "a.js",
+            "let create = 1; let step = 1; let read = 1; function projectObjects() {}",
+            "has create, step and read, as an engine has, and projectObjects, as a solver of the",
+        ),
+    ],
+)
+def test_the_functions_of_a_file_decide_what_it_is(name: str, text: str, says: str, tmp_path: Path):
+    """An engine, a solver of the exercise, or a refusal that says what it has."""
+    path = tmp_path / name
+    path.write_text(text)
+    try:
+        row = row_of_file(path)
+        found = "solver" if row.exercise else "engine"
+    except NotASolver as refusal:
+        found = str(refusal)
+
+    assert says in found
+
+
+def test_new_engine_writes_what_works_and_overwrites_nothing(tmp_path: Path):
+    """The name decides the language; a file that is there, or another ending, is refused."""
+    made = [crosscheck("new-engine", name, cwd=tmp_path) for name in ENDS.values()]
+    again = crosscheck("new-engine", "ball.js", cwd=tmp_path)
+    other = crosscheck("new-engine", "ball.c", cwd=tmp_path)
+    checked = crosscheck("check", "ball.py", cwd=tmp_path)
+
+    assert [one.returncode for one in made] == [0, 0]
+    assert "--engine ball.js" in made[0].stdout
+    assert all(not row_of_file(tmp_path / name).exercise for name in ENDS.values())
+    assert "--engine ball.py" in (tmp_path / "ball.py").read_text()
+    assert (again.returncode, again.stderr) == (2, "ball.js: exists; name another file\n")
+    assert (other.returncode, "name a .js or a .py file" in other.stderr) == (2, True)
+    assert checked.returncode == 2
+    assert "is an engine (create, step, read), and check is for solvers" in checked.stderr
+    assert "crosscheck run bouncing_ball_e09 --engine ball.py" in checked.stderr
