@@ -41,9 +41,13 @@ class Matched:
     @property
     def first_wrong(self) -> tuple[float, str] | None:
         """Time and description of the first missed or spurious collision, or None."""
-        wrong = [(t, f"missed {who(i, j)}") for t, i, j in self.missed]
-        wrong += [(t, f"spurious {who(i, j)}") for t, i, j in self.spurious]
-        return min(wrong) if wrong else None
+        wrong = (*self.missed, *self.spurious)
+        if not wrong:
+            return None
+        first = min(t for t, _, _ in wrong)
+        words = [f"missed {who(i, j)}" for t, i, j in self.missed if t == first]
+        words += [f"spurious {who(i, j)}" for t, i, j in self.spurious if t == first]
+        return first, min(words)
 
 
 def who(i: int, j: int) -> str:

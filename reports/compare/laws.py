@@ -116,7 +116,7 @@ def penetration(trajectory: Trajectory, scene: Scene) -> Array:
     worst = np.zeros(len(trajectory))
     for i in range(scene.n):
         if i + 1 < scene.n:
-            gap = np.linalg.norm(x[:, i + 1 :] - x[:, i, None], axis=2) - (r[i] + r[i + 1 :])
+            gap = lengths(x[:, i + 1 :] - x[:, i, None]) - (r[i] + r[i + 1 :])
             gap[:, scene.static[i + 1 :] & scene.static[i]] = 0.0
             worst = np.maximum(worst, (-gap / np.minimum(r[i], r[i + 1 :])).max(axis=1))
         if not scene.static[i]:
@@ -128,8 +128,7 @@ def penetration(trajectory: Trajectory, scene: Scene) -> Array:
 
 def distance_to_segment(x: Array, start: Array, end: Array) -> Array:
     """(k,) m from points x (k, 2) to the segment."""
-    distance: Array = np.linalg.norm(x - nearest_on_segment(x, start, end), axis=1)
-    return distance
+    return lengths(x - nearest_on_segment(x, start, end))
 
 
 def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
