@@ -76,10 +76,8 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     found = partner >= 0
     return Matched(
         delay=mine.t[found] - its.t[partner[found]],
-        missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
-        spurious=[
-            (float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)
-        ],
+        missed=listed(its, lost),
+        spurious=listed(mine, extra),
         judged=int(judged),
     )
 
@@ -92,6 +90,11 @@ class ByPair(NamedTuple):
     t: Array
     i: np.ndarray
     j: np.ndarray
+
+
+def listed(collisions: ByPair, chosen: np.ndarray) -> list[tuple[float, int, int]]:
+    """(time s, i, j) of those chosen, in order of pairs."""
+    return list(zip(*(column[chosen].tolist() for column in collisions[1:])))
 
 
 def pair_keys(collisions: Collisions) -> np.ndarray:

@@ -172,7 +172,7 @@ def velocities(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray
     gravity; 0 of a wall."""
     disks = np.stack([pairs.i, pairs.other], axis=1)
     falling = np.where(scene.static[disks, None], 0.0, scene.gravity)
-    v = trajectory.velocity[k[:, None], disks]
+    v: Array = trajectory.velocity[k[:, None], disks]
     v = v + falling * (pairs.when - trajectory.t[k])[:, None, None]
     v[pairs.j < 0, 1] = 0.0
     return v
@@ -193,7 +193,8 @@ def is_rounding(trajectory: Trajectory, scene: Scene, read: Pairs, rounding: flo
 
 def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
     """(m,) whether the second of each pair is a disk that moves."""
-    return (pairs.j >= 0) & ~scene.static[pairs.other]
+    moving: np.ndarray = (pairs.j >= 0) & ~scene.static[pairs.other]
+    return moving
 
 
 def speeds_along_normal(
