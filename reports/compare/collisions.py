@@ -41,9 +41,13 @@ class Matched:
     @property
     def first_wrong(self) -> tuple[float, str] | None:
         """Time and description of the first missed or spurious collision, or None."""
-        wrong = [(t, f"missed {who(i, j)}") for t, i, j in self.missed]
-        wrong += [(t, f"spurious {who(i, j)}") for t, i, j in self.spurious]
-        return min(wrong) if wrong else None
+        wrong = (*self.missed, *self.spurious)
+        if not wrong:
+            return None
+        first = min(t for t, _, _ in wrong)
+        words = [f"missed {who(i, j)}" for t, i, j in self.missed if t == first]
+        words += [f"spurious {who(i, j)}" for t, i, j in self.spurious if t == first]
+        return first, min(words)
 
 
 def who(i: int, j: int) -> str:
@@ -72,10 +76,8 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
     found = partner >= 0
     return Matched(
         delay=mine.t[found] - its.t[partner[found]],
-        missed=[(float(its.t[k]), int(its.i[k]), int(its.j[k])) for k in np.flatnonzero(lost)],
-        spurious=[
-            (float(mine.t[k]), int(mine.i[k]), int(mine.j[k])) for k in np.flatnonzero(extra)
-        ],
+        missed=listed(its, lost),
+        spurious=listed(mine, extra),
         judged=int(judged),
     )
 
@@ -88,6 +90,11 @@ class ByPair(NamedTuple):
     t: Array
     i: np.ndarray
     j: np.ndarray
+
+
+def listed(collisions: ByPair, chosen: np.ndarray) -> list[tuple[float, int, int]]:
+    """(time s, i, j) of those chosen, in order of pairs."""
+    return list(zip(*(column[chosen].tolist() for column in collisions[1:])))
 
 
 def pair_keys(collisions: Collisions) -> np.ndarray:

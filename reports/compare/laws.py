@@ -114,24 +114,20 @@ def energy(trajectory: Trajectory, scene: Scene) -> Array:
 def penetration(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) largest overlap of two disks, or of a disk and a wall, in radii of the smaller disk; 0
     without overlap."""
-    x, r = trajectory.position, scene.radius
+    r, moving = scene.radius, ~scene.static
+    x, y = np.ascontiguousarray(np.moveaxis(trajectory.position, 2, 0))
     worst = np.zeros(len(trajectory))
-    for i in range(scene.n):
-        if i + 1 < scene.n:
-            gap = np.linalg.norm(x[:, i + 1 :] - x[:, i, None], axis=2) - (r[i] + r[i + 1 :])
-            gap[:, scene.static[i + 1 :] & scene.static[i]] = 0.0
-            worst = np.maximum(worst, (-gap / np.minimum(r[i], r[i + 1 :])).max(axis=1))
-        if not scene.static[i]:
-            for start, end in scene.walls:
-                distance = distance_to_segment(x[:, i], start, end)
-                worst = np.maximum(worst, 1 - distance / r[i])
+    for i in range(scene.n - 1):
+        across, up = x[:, i + 1 :] - x[:, i, None], y[:, i + 1 :] - y[:, i, None]
+        gap = np.sqrt(across**2 + up**2) - (r[i] + r[i + 1 :])
+        gap[:, scene.static[i + 1 :] & scene.static[i]] = 0.0
+        worst = np.maximum(worst, (-gap / np.minimum(r[i], r[i + 1 :])).max(axis=1))
+    points = trajectory.position[:, moving].reshape(-1, 2)
+    for start, end in scene.walls:
+        distance = lengths(points - nearest_on_segment(points, start, end))
+        inside = 1 - distance.reshape(len(x), -1) / r[moving]
+        worst = np.maximum(worst, inside.max(axis=1, initial=0.0))
     return worst
-
-
-def distance_to_segment(x: Array, start: Array, end: Array) -> Array:
-    """(k,) m from points x (k, 2) to the segment."""
-    distance: Array = np.linalg.norm(x - nearest_on_segment(x, start, end), axis=1)
-    return distance
 
 
 def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:

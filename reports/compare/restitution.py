@@ -59,110 +59,170 @@ def effective_restitution(
     whenever it comes nearer at any speed at all.
     """
     t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
+    slowest = max(slowest, 0.0)
     # A collision at the instant of a sample, at the end of its step, belongs to the interval that
     # ends there.
     before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
-    busy: dict[tuple[int, int], int] = {}
-    for k, i, j in zip(before, collisions.i, collisions.j):
-        for disk in (i, j):
-            busy[k, disk] = busy.get((k, disk), 0) + 1
-    values, times, below, unfinished = [], [], 0, 0
-    for k, i, j, when in zip(before, collisions.i, collisions.j, collisions.t):
-        disks = (i, j) if j >= 0 else (i,)
-        alone = all(busy[k, disk] == 1 and (k + 1, disk) not in busy for disk in disks)
-        if not (alone and 0 <= k < len(t) - 1) or scene.static[i]:
-            continue
-        earlier, later = around(trajectory, scene, (k, k + 1), when)
-        moving = [disk for disk in disks if not scene.static[disk]]
-        if is_rounding(earlier, later, moving, rounding):
-            below += 1
-            continue
-        after = k + 1
-        while after < len(t) and approach(trajectory, scene, (i, j), after, when, rounding):
-            after = len(t) if any((after + 1, disk) in busy for disk in disks) else after + 1
-        if after == len(t):
-            unfinished += 1
-            continue
-        later = around(trajectory, scene, (after, after), when)[1]
-        turned = np.abs(spin[after] - spin[k]) * scene.radius
-        closing, separating = speeds_along_normal(earlier, later, scene, int(i), int(j), turned)
-        if closing > max(slowest, 0.0) * (after - k):
-            values.append(separating / closing)
-            times.append(when)
-        elif closing > max(slowest, 0.0):
-            unfinished += 1
-    return Restitutions(np.array(values), np.array(times), below, unfinished)
+    every = Pairs(before, collisions.i, collisions.j, collisions.t)
+    count = in_intervals(every, len(t), scene.n)
+    read = every.of((before >= 0) & (before < len(t) - 1) & ~scene.static[every.i])
+    read = read.of(is_alone(read, count))
+    noise = is_rounding(trajectory, scene, read, rounding)
+    read = read.of(~noise)
+    after = first_apart(trajectory, scene, read, count, rounding)
+    over = after < len(t)
+    read, after = read.of(over), after[over]
+    turned = np.abs(spin[after] - spin[read.k]) * scene.radius
+    closing, separating = speeds_along_normal(
+        velocities(trajectory, scene, read, read.k),
+        velocities(trajectory, scene, read, after),
+        scene,
+        read,
+        turned,
+    )
+    fast = closing > slowest * (after - read.k)
+    late = (closing > slowest) & ~fast
+    return Restitutions(
+        values=separating[fast] / closing[fast],
+        times=read.when[fast],
+        below=int(noise.sum()),
+        unfinished=int((~over).sum() + late.sum()),
+    )
+
+
+class Pairs(NamedTuple):
+    """m collisions.
+
+    Attributes:
+        k: (m,) the last sample before each.
+        i: (m,) a disk.
+        j: (m,) a disk, or a wall (-1: the first).
+        when: (m,) s.
+    """
+
+    k: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    when: Array
+
+    def of(self, chosen: np.ndarray) -> Pairs:
+        """Those that a mask or indices choose."""
+        return Pairs(*(column[chosen] for column in self))
+
+    @property
+    def other(self) -> np.ndarray:
+        """(m,) the second disk; the first again where there is a wall instead."""
+        return np.where(self.j >= 0, self.j, self.i)
+
+
+def in_intervals(every: Pairs, samples: int, n: int) -> np.ndarray:
+    """(samples + 2, n) collisions of each disk: row k + 1 of the interval after sample k, row 0 of
+    the time before the first."""
+    count = np.zeros((samples + 2, n), np.int64)
+    np.add.at(count, (every.k + 1, every.i), 1)
+    disks = every.of(every.j >= 0)
+    np.add.at(count, (disks.k + 1, disks.j), 1)
+    return count
+
+
+def is_alone(read: Pairs, count: np.ndarray) -> np.ndarray:
+    """(m,) whether neither disk has another collision in the same interval or the next."""
+    one, two = (
+        (count[read.k + 1, disk] == 1) & (count[read.k + 2, disk] == 0)
+        for disk in (read.i, read.other)
+    )
+    alone: np.ndarray = one & two
+    return alone
+
+
+def first_apart(
+    trajectory: Trajectory, scene: Scene, read: Pairs, count: np.ndarray, rounding: float
+) -> np.ndarray:
+    """(m,) the first sample after each collision at which the two do not approach; the number of
+    samples if there is none before another collision of either."""
+    samples, after = len(trajectory), read.k + 1
+    left = np.arange(len(after))  # those that approach at every sample so far
+    while len(left):
+        left = left[approach(trajectory, scene, read.of(left), after[left], rounding)]
+        pairs, following = read.of(left), after[left] + 1
+        again = (count[following + 1, pairs.i] > 0) | (count[following + 1, pairs.other] > 0)
+        after[left] = np.where(again, samples, following)
+        left = left[after[left] < samples]
+    return after
 
 
 def approach(
-    trajectory: Trajectory,
-    scene: Scene,
-    pair: tuple[int, int],
-    k: int,
-    when: float,
-    rounding: float,
-) -> bool:
-    """Whether the two of a pair approach in sample k, by more than `FLOOR` roundings, after a
-    collision at `when` s."""
-    i, j = pair
-    x, v = trajectory.position[k], around(trajectory, scene, (k, k), when)[1]
-    other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
-    way = laws.nearer_way(x[i] - other, scene)
-    others = v[j] if j >= 0 else np.zeros(2)
-    floor = FLOOR * rounding * (laws.lengths(v[i]) + laws.lengths(others))
-    return bool(way @ (v[i] - others) < -floor * laws.lengths(way))
+    trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray, rounding: float
+) -> np.ndarray:
+    """(m,) whether the two of each pair approach in sample k, (m,), by more than `FLOOR` roundings,
+    after their collision."""
+    x, other = (trajectory.position[k, disk] for disk in (pairs.i, pairs.other))
+    for wall in np.unique(pairs.j[pairs.j < 0]):
+        at = pairs.j == wall
+        other[at] = laws.nearest_on_segment(x[at], *scene.walls[-1 - wall])
+    way = laws.nearer_way(x - other, scene)
+    v = velocities(trajectory, scene, pairs, k)
+    floor = FLOOR * rounding * laws.lengths(v).sum(axis=1)
+    nearing: np.ndarray = np.vecdot(way, v[:, 0] - v[:, 1]) < -floor * laws.lengths(way)
+    return nearing
 
 
-def around(
-    trajectory: Trajectory, scene: Scene, samples: tuple[int, int], when: float
-) -> tuple[Array, Array]:
-    """(n, 2) m/s just before and just after `when` s, from one sample before it, one after it, and
-    gravity."""
-    t, velocity, (k, m) = trajectory.t, trajectory.velocity, samples
-    falling = np.where(scene.static[:, None], 0.0, scene.gravity)
-    return velocity[k] + falling * (when - t[k]), velocity[m] - falling * (t[m] - when)
+def velocities(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
+    """(m, 2, 2) m/s of both of each pair at the time of their collision, from sample k, (m,), and
+    gravity; 0 of a wall."""
+    disks = np.stack([pairs.i, pairs.other], axis=1)
+    falling = np.where(scene.static[disks, None], 0.0, scene.gravity)
+    v: Array = trajectory.velocity[k[:, None], disks]
+    v = v + falling * (pairs.when - trajectory.t[k])[:, None, None]
+    v[pairs.j < 0, 1] = 0.0
+    return v
 
 
-def is_rounding(earlier: Array, later: Array, moving: list[int], rounding: float) -> bool:
-    """Whether the change of a disk that moves, or that of both to each other, is below the
+def is_rounding(trajectory: Trajectory, scene: Scene, read: Pairs, rounding: float) -> np.ndarray:
+    """(m,) whether the change of a disk that moves, or that of both to each other, is below the
     floor."""
-    change = later[moving] - earlier[moving]
-    speed = laws.lengths(earlier[moving]) + laws.lengths(later[moving])
-    between = change[0] - change[-1] if len(moving) > 1 else change[0]
-    floor = FLOOR * rounding
-    return bool(
-        (laws.lengths(change) <= floor * speed).any()
-        or laws.lengths(between) <= floor * speed.sum()
-    )
+    earlier, later = (velocities(trajectory, scene, read, k) for k in (read.k, read.k + 1))
+    moving = np.stack([np.ones(len(read.k), bool), second_moves(scene, read)], axis=1)
+    change = np.where(moving[..., None], later - earlier, 0.0)
+    speed = np.where(moving, laws.lengths(earlier) + laws.lengths(later), 0.0)
+    floor, between = FLOOR * rounding, laws.lengths(change[:, 0] - change[:, 1])
+    alone = (moving & (laws.lengths(change) <= floor * speed)).any(axis=1)
+    below: np.ndarray = alone | (between <= floor * speed.sum(axis=1))
+    return below
+
+
+def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
+    """(m,) whether the second of each pair is a disk that moves."""
+    moving: np.ndarray = (pairs.j >= 0) & ~scene.static[pairs.other]
+    return moving
 
 
 def speeds_along_normal(
-    earlier: Array, later: Array, scene: Scene, i: int, j: int, turned: Array
-) -> tuple[float, float]:
-    """m/s at which disk i and disk or wall j close before and part after a collision; `turned` (n,)
-    m/s by friction.
+    earlier: Array, later: Array, scene: Scene, pairs: Pairs, turned: Array
+) -> tuple[Array, Array]:
+    """(m,) m/s at which the two of each pair close before and part after a collision; `turned`
+    (m, n) m/s by friction.
 
     The normal is that of the change of their velocity to each other, whichever of the two is named
-    first. (nan, nan) if the change is not that of one frictionless collision.
+    first. nan and nan if the change is not that of one frictionless collision.
     """
+    number, both, wall = np.arange(len(pairs.k)), second_moves(scene, pairs), pairs.j < 0
     change = later - earlier
-    one, two = (change[i], change[j]) if j >= 0 else (change[i], np.zeros(2))
+    one, two = change[:, 0], change[:, 1]
+    slid = turned[number, pairs.i] > CLEAN * laws.lengths(one)
+    slid |= both & (turned[number, pairs.other] > CLEAN * laws.lengths(two))
+    mass = laws.moving_mass(scene)
+    kicks = mass[pairs.i, None] * one, mass[pairs.other, None] * two
+    strongest = np.maximum(*map(laws.lengths, kicks))
+    unreported = both & (laws.lengths(kicks[0] + kicks[1]) > CLEAN * strongest)
+    span = np.diff(scene.walls[-1 - pairs.j[wall]], axis=1)[:, 0]
+    slack = CLEAN * laws.lengths(span) * laws.lengths(one[wall])
+    unreported[wall] = np.abs(np.vecdot(one[wall], span)) > slack
     between = one - two
-    normal = between / (np.linalg.norm(between) or 1.0)
-    if j >= 0 and not scene.static[j]:
-        kicks = scene.mass[i] * one, scene.mass[j] * two
-        unreported = np.linalg.norm(kicks[0] + kicks[1]) > CLEAN * max(map(np.linalg.norm, kicks))
-        slid = (turned[[i, j]] > CLEAN * laws.lengths(change[[i, j]])).any()
-    elif j < 0:
-        start, end = scene.walls[-1 - j]
-        slack = CLEAN * np.linalg.norm(end - start) * np.linalg.norm(one)
-        unreported = abs(one @ (end - start)) > slack
-        slid = turned[i] > CLEAN * np.linalg.norm(one)
-    else:
-        unreported, slid = False, turned[i] > CLEAN * np.linalg.norm(one)
-    if unreported or slid:
-        return np.nan, np.nan
-    before, after = (
-        (earlier[i] - earlier[j], later[i] - later[j]) if j >= 0 else (earlier[i], later[i])
+    length = np.sqrt(np.vecdot(between, between))
+    normal = between / np.where(length == 0.0, 1.0, length)[:, None]
+    closing, separating = (
+        sign * np.vecdot(v[:, 0] - v[:, 1], normal) for sign, v in ((-1, earlier), (1, later))
     )
-    return float(-before @ normal), float(after @ normal)
+    strange = unreported | slid
+    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -207,7 +208,7 @@ def convergence(comparison: Comparison) -> Drawing:
     return Drawing(title, caption, figure)
 
 
-def first_order(lines: Iterable[ChartLine], steps: list[float]) -> list[dict[str, Any]]:
+def first_order(lines: Sequence[ChartLine], steps: list[float]) -> list[dict[str, Any]]:
     """A guide with slope 1 through the middle of what is shown; none where there is nothing to
     guide."""
     shown = np.concatenate([line.y for line in lines])
@@ -373,9 +374,10 @@ def thinned(line: ChartLine) -> ChartLine:
     return ChartLine(line.run, line.x[order], line.y[order])
 
 
-def shortened(values: Iterable[float], digits: int = 4) -> list[float | None]:
+def shortened(values: Array | Sequence[float], digits: int = 4) -> list[float | None]:
     """Numbers to so many significant digits, which is finer than a pixel; None for nan."""
-    return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in values]
+    listed = np.asarray(values, float).tolist()
+    return [float(f"{v:.{digits}g}") if isfinite(v) else None for v in listed]
 
 
 CHARTS: dict[str, Chart] = {

@@ -223,8 +223,9 @@ def load_trajectory(file: Path | BinaryIO) -> Trajectory:
         nullcontext(file) if not isinstance(file, Path) else opened(file) as there,
         np.load(there) as saved,
     ):
+        columns = {name: saved[key] for name, key in COLLISIONS.items()}
         collisions = Collisions(
-            **{name: frozen(saved[key], saved[key].dtype) for name, key in COLLISIONS.items()}
+            **{name: frozen(column, column.dtype) for name, column in columns.items()}
         )
         t, position, velocity, angle, angular_velocity = (
             frozen(saved[name]) for name in ("t", *STATE)

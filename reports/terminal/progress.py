@@ -119,7 +119,7 @@ class Progress:
         """From now on count to `total`, of which some may be `missing` only."""
         self.counted, self.since = 0, perf_counter()
         self.reported, self.missing = self.since, missing
-        what = what or "starting workers (the first run compiles: some 20 s more)"
+        what = what or "starting workers (the first run compiles: some 40 s more)"
         self.begin(what, total, total - missing)
 
     def done(self, what: str, status: str = "ok", reason: str = "") -> None:
