@@ -329,6 +329,8 @@ def said_of(row: Mapping[Any, Any]) -> str:
     name = f"{row['engine']}:{row['profile']}"
     step = f", dt {style.number(row['dt_s'])} s" if np.isfinite(row["dt_s"]) else ""
     lines = [f"{name}{step}", f"error {style.number(row['error'])} radii"]
+    if row["scenario"] == POOLED:
+        lines[0] += f", over {counted(int(row['of']), 'scene')}"  # fewer, if it was not asked all
     part = row["cost"] - row.get("bare", np.nan) if row["scenario"] == POOLED else row["idle"]
     if part > 0:
         lines.append(

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 import pandas as pd
 
+from adapters.engines import OWN
 from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.compare.view import NOT_JUDGED
@@ -24,7 +25,8 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 
     error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
     cost is µs of engine time per simulated second, nan without one; step_size counts from the
-    coarsest, dt_s is its length, middle says whether it is the one in the middle of the ladder.
+    coarsest, dt_s is its length, middle says whether it is the one in the middle of the ladder. A
+    scene that a solver's own file refuses was not asked of it, and has no row of it.
     """
     rows = []
     for comparison in comparisons:
@@ -38,6 +40,8 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
         found = dict(zip(keys, judged.value.to_numpy(float)))
         steps = sorted({run.dt for run in comparison.runs}, reverse=True)
         for run in comparison.runs:
+            if run.name.endswith(OWN) and run.status == "unsupported":
+                continue
             error, angle = (
                 float(found.get((run.name, run.dt, each), np.inf)) for each in (ERROR, ANGLE)
             )
@@ -69,10 +73,9 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
     lines = []
     for k, name in enumerate(names):
         mine = middle[middle.name == name].set_index("scenario")
-        medians = [
-            float(mine[column_of(answer)].reindex(answer.scenes).fillna(np.inf).median())
-            for answer in answers
-        ]
+        errors = [mine[column_of(answer)].reindex(answer.scenes) for answer in answers]
+        asked = [each.dropna() if name.endswith(OWN) else each.fillna(np.inf) for each in errors]
+        medians = [float(each.median()) for each in asked]
         y: Array = np.where(np.isfinite(medians), medians, np.nan)
         x = np.arange(len(answers), dtype=np.float64) + (k - (len(names) - 1) / 2) * 0.7 / max(
             len(names), 1

@@ -559,3 +559,5 @@ def test_a_scene_that_a_file_refuses_is_not_counted_as_not_played(comparisons: l
     assert asked[name][-1].text == "0 of 1"
     assert crashed[name][-1].text == "2 of 2"
     assert not overview.unasked("pymunk:matched", {"pymunk:matched": ("refused", "")})
+    assert name not in set(scores(refusals("unsupported")).name)
+    assert set(scores(refusals("crashed")).error[lambda e: np.isinf(e)]) == {np.inf}
