@@ -218,6 +218,23 @@ def replay(
 
 
 @app.command()
+def bits(
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write the table of this machine, a CSV."),
+    ] = None,
+) -> None:
+    """Compare the bits of all engines here with those kept in reports/bits.csv.
+
+    Every scene is played through every engine at its middle step size. The exit status is 1 if an
+    engine has other bits.
+    """
+    from reports.commands.bits import compare_bits
+
+    compare_bits(out)
+
+
+@app.command()
 def diff(
     before: Annotated[Path, typer.Argument(metavar="OUT_A", help="The folder of a run.")],
     after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
