@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
+from math import ceil
 
 from adapters.advance import advance
 from adapters.engine import Engine, NotStarted, Unsupported
@@ -51,7 +52,10 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         run = replace(run, settings=engine.settings(), versions=engine.versions())
         states.append(engine.read())
         watch(states[0])
+        quiet = quiet_from(scenario)
         for k in range(scenario.intervals):
+            if k == quiet and hasattr(engine, "expect"):
+                engine.expect(substeps, scenario.intervals - k)
             seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
             if fault := fault_of(state, farthest):
@@ -71,3 +75,9 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         collisions = collisions_of(engine, scenario.scene, dt)
         run = replace(run, trajectory=gather(scenario, states, collisions))
     return replace(run, seconds=seconds)
+
+
+def quiet_from(scenario: Scenario) -> int:
+    """The first sample interval from which on no thrust acts."""
+    last = max((thrust.stop for thrust in scenario.thrusts), default=0.0)
+    return ceil(last / scenario.sample_interval - 1e-9)  # less is rounding of a stop

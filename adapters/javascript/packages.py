@@ -127,7 +127,7 @@ def fetch() -> None:
                 timeout=FETCHING,
             )
             if done.returncode:
-                raise NotInstalled(not_fetched(done.stderr))
+                raise NotInstalled(not_fetched(str(done.stderr)))
             for package in pinned()["played"]:
                 text_of(package, beside)
             if there.exists():  # what was there is not what is pinned, or somebody was sooner

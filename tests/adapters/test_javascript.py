@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from math import atan, pi, sin
@@ -18,6 +19,7 @@ import pytest
 
 from adapters.conformance.conform import ask, conform
 from adapters.conformance.probe import history, loaded, plain
+from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
 from adapters.javascript import packages
 from adapters.javascript.engine import IDLE, JavaScriptEngine
@@ -185,6 +187,56 @@ def test_the_time_in_v8_is_a_part_of_that_of_a_step():
         first = engine.inside
         engine.step(1)
         assert 0 < engine.inside - first < first
+
+
+@fetched
+@pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
+def test_steps_played_ahead_give_the_bits_and_collisions_of_steps_one_by_one(name):
+    """The readings that `play` expects come from one exchange, or from one each."""
+    with loaded(FETCHED[name], plain()) as singly, loaded(FETCHED[name], plain()) as ahead:
+        ahead.expect(3, 20)
+        for _ in range(20):
+            singly.step(3)
+            ahead.step(3)
+            assert ahead.read().position.tobytes() == singly.read().position.tobytes()
+            # none from a step that has been played ahead
+            assert repr(ahead.collisions()) == repr(singly.collisions())
+        assert ahead.collisions()
+        ahead.step(7)
+        singly.step(7)
+        assert ahead.read().angle.tobytes() == singly.read().angle.tobytes()
+
+
+@fetched
+def test_steps_other_than_those_that_were_expected_are_refused():
+    """What has been played cannot be taken back."""
+    with loaded(FETCHED["planck:matched"], plain()) as engine:
+        engine.expect(3, 20)
+        engine.step(3)
+        with pytest.raises(ValueError, match="steps were expected"):
+            engine.step(2)
+        engine.apply_force(0, np.array([1.0, 0.0]), 0.0)
+        with pytest.raises(ValueError, match="steps were expected"):
+            engine.step(3)
+
+
+@fetched
+def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
+    """Rapier cuts the speed of this disk after 9 s: the samples before are kept."""
+    one = scenario("free_fall")
+    scene = replace(one.scene, gravity=np.array([0.0, -50.0]), walls=np.zeros((0, 2, 2)))
+    long = replace(one, scene=scene, duration=12.0, sample_interval=0.5, truth=None)
+    row = FETCHED["rapier2d:matched"]
+    run = play_once(row.make, "rapier2d:matched", long, 0.05)
+    assert run.status == "unsupported"
+    assert "cuts it" in run.reason
+    read = 0
+    with loaded(row, scene, dt=0.05) as engine, suppress(Unsupported):
+        while read < 24:
+            engine.step(10)
+            engine.read()
+            read += 1
+    assert 0 < len(run.trajectory) - 1 == read < 24
 
 
 @fetched
