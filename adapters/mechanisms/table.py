@@ -9,7 +9,7 @@ what the engine plays, mostly to rounding.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -62,7 +62,7 @@ class Mechanism:
 def mechanisms_of(
     name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float
 ) -> list[Mechanism]:
-    """The mechanisms of an engine in `MECHANISMS`, in this scene at this dt; `settings` are those
+    """The mechanisms of an engine in `KNOWN`, in this scene at this dt; `settings` are those
     it reported once loaded."""
     # What cannot be read back is as it was asked for.
     resolved = {
@@ -73,7 +73,7 @@ def mechanisms_of(
     single = (
         [Mechanism(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
     )
-    return [flight, *MECHANISMS[name](resolved, scene, dt), *single]
+    return [flight, *KNOWN[name](resolved, scene, dt), *single]
 
 
 def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
@@ -251,6 +251,47 @@ def _box2d_v3_shipped(reported: Mapping[str, Any], scene: Scene, _dt: float) -> 
     ]
 
 
+def _planck(reported: Mapping[str, Any], scene: Scene, dt: float, profile: str) -> list[Mechanism]:
+    """Those of Box2D 2.3 in float64, whose compiled-in numbers are settings here."""
+    made = partial(_javascript, "planck", profile)
+    still = {"continuous": False, "bullet": False}
+    unswept = made(**still, **{f"elastic_{name}": value for name, value in still.items()})
+    velocity, position = reported["velocity, position iterations"].split(",")
+    impulse = {
+        "order": BOX2D,
+        "iterations": int(velocity),
+        "touching": True,
+        "cap": reported["maxTranslation"],
+    }
+    correction = {
+        "correction_share": 0.2 if int(position) else 0.0,  # Settings.baumgarte
+        "correction_iterations": int(position),
+        "slop": reported["linearSlop"],
+        "correction_most": reported["maxLinearCorrection"],
+    }
+    uncorrected = made(position_iterations=0, elastic_position_iterations=0)
+    common = [
+        Mechanism(RESTITUTION, {"threshold": reported["velocityThreshold"]}),
+        Mechanism(IMPULSE, impulse),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
+    ]
+    swept = Mechanism(SWEPT, without=unswept)
+    if profile == "matched":
+        rubbed = _box2d_friction(reported) if scene.friction else []
+        return [*common, *rubbed, *([swept] if reported["continuous collision"] else [])]
+    return [
+        *common,
+        *_box2d_friction(reported, None if scene.friction else made(friction=0.0)),
+        Mechanism(SKIN, {"skin": 2 * reported["linearSlop"]}, (IMPULSE, POSITION_CORRECTION)),
+        replace(swept, without=partial(unswept, sleeping=False)),
+    ]
+
+
+def _javascript(name: str, profile: str, **changed: Any) -> Callable[[], Engine]:
+    """Makes the engine of a row of `FETCHED` with these changes."""
+    return partial(row_of(f"{name}:{profile}").make, **changed)
+
+
 MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism]]] = {
     "reference:exercise": _exercise,
     "reference:lesson": _lesson,
@@ -262,3 +303,8 @@ MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism
     "box2d_v3:matched": _box2d_v3_matched,
 }
 """The engines whose mechanisms are known."""
+KNOWN = MECHANISMS | {
+    "planck:shipped": partial(_planck, profile="shipped"),
+    "planck:matched": partial(_planck, profile="matched"),
+}
+"""And those that are fetched."""
