@@ -30,8 +30,11 @@ NAMES = (
     "position correction",
     "float32",
     "CCD, sleep",
+    "friction of the air",
+    "polygons for disks",
 )
-FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT = NAMES
+FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT, AIR, SIDES = NAMES
+MANY_SIDES = 400  # of matter's disks, which are polygons: what is left of them at 400 is residual
 # Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved
 # out of it.
 END_OF_STEP: dict[str, Any] = {
@@ -318,6 +321,24 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
     ]
 
 
+def _matter(
+    _reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str
+) -> list[Mechanism]:
+    """Those that matter can be played without; the reference has none of them.
+
+    Not known: the rest of the polygons, its contacts below the resting threshold, and the place of
+    its position correction.
+    """
+    made = partial(_javascript, "matter", profile)
+    smooth = Mechanism(FRICTION, without=made(friction=0))
+    return [
+        *([Mechanism(AIR, without=made(friction_air=0))] if profile == "shipped" else []),
+        *([smooth] if profile == "shipped" or scene.friction else []),
+        Mechanism(POSITION_CORRECTION, without=made(position_iterations=0)),
+        Mechanism(SIDES, without=made(sides=MANY_SIDES)),
+    ]
+
+
 def _javascript(name: str, profile: str, **changed: Any) -> Callable[[], Engine]:
     """Makes the engine of a row of `FETCHED` with these changes."""
     return partial(row_of(f"{name}:{profile}").make, **changed)
@@ -337,6 +358,8 @@ MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism
 KNOWN = MECHANISMS | {
     "planck:shipped": partial(_planck, profile="shipped"),
     "planck:matched": partial(_planck, profile="matched"),
+    "matter:shipped": partial(_matter, profile="shipped"),
+    "matter:matched": partial(_matter, profile="matched"),
     "rapier2d:shipped": partial(_rapier, profile="shipped"),
     "rapier2d:matched": partial(_rapier, profile="matched"),
 }
