@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import cos, sin
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,10 +21,37 @@ def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: floa
         for thrust, share in acting:
             force, torque = world_force(thrust, engine) * share, thrust.torque * share
             engine.apply_force(thrust.disk, force, torque)
-        started = perf_counter()
-        engine.step(step)
-        seconds += perf_counter() - started
+        seconds += timed(engine, step)
     return seconds
+
+
+def timed(engine: Engine, count: int) -> float:
+    """Advance `count` steps; the seconds inside `step`."""
+    started = perf_counter()
+    engine.step(count)
+    return perf_counter() - started
+
+
+class Foreseen(NamedTuple):
+    """What a thrust does during one step, whoever applies it."""
+
+    step: int  # from 0
+    disk: int
+    force: list[float]  # N, in `frame`
+    torque: float  # N m
+    frame: str  # world, or body: turned by the angle of the disk at the start of the step
+
+
+def thrusts_by_step(thrusts: Sequence[Thrust], count: int, dt: float) -> list[Foreseen]:
+    """All that acts during `count` steps from the start."""
+    found, first = list[Foreseen](), 0
+    for step, acting in thrust_steps(thrusts, 0, count, dt):
+        found += [
+            Foreseen(first, t.disk, (share * t.force).tolist(), share * t.torque, t.frame)
+            for t, share in acting
+        ]
+        first += step
+    return found
 
 
 def thrust_steps(

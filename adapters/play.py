@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
-from math import ceil
 
-from adapters.advance import advance
+from adapters.advance import advance, thrusts_by_step, timed
 from adapters.engine import Engine, NotStarted, Unsupported
 from adapters.first_collisions import collisions_of
 from adapters.run import Run, gather, run_of, substeps_of
@@ -52,11 +51,15 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         run = replace(run, settings=engine.settings(), versions=engine.versions())
         states.append(engine.read())
         watch(states[0])
-        quiet = quiet_from(scenario)
+        expect = getattr(engine, "expect", None)
+        if expect is not None:
+            acting = thrusts_by_step(scenario.thrusts, scenario.intervals * substeps, dt)
+            expect(substeps, scenario.intervals, acting)
         for k in range(scenario.intervals):
-            if k == quiet and hasattr(engine, "expect"):
-                engine.expect(substeps, scenario.intervals - k)
-            seconds += advance(engine, scenario, k * substeps, substeps, dt)
+            if expect is not None:
+                seconds += timed(engine, substeps)
+            else:
+                seconds += advance(engine, scenario, k * substeps, substeps, dt)
             state = engine.read()
             if fault := fault_of(state, farthest):
                 reason = f"{fault} at {(k + 1) * scenario.sample_interval:g} s"
@@ -75,9 +78,3 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         collisions = collisions_of(engine, scenario.scene, dt)
         run = replace(run, trajectory=gather(scenario, states, collisions))
     return replace(run, seconds=seconds)
-
-
-def quiet_from(scenario: Scenario) -> int:
-    """The first sample interval from which on no thrust acts."""
-    last = max((thrust.stop for thrust in scenario.thrusts), default=0.0)
-    return ceil(last / scenario.sample_interval - 1e-9)  # less is rounding of a stop

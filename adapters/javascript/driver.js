@@ -78,17 +78,24 @@ const crosscheck = (() => {
 
   // `times` readings, each after `count` steps, or those before something is thrown, which is told; fewer if they take
   // too long.
-  function ahead({ count, times }) {
-    const readings = [], began = Date.now();
+  function ahead({ count, times, thrusts }) {
+    const readings = [], began = Date.now(), acting = Map.groupBy(thrusts, ([when]) => when);
     let thrown = {};
     try {
       while (readings.length < times && Date.now() - began < LONGEST) {
-        step({ count, forces: [] });
+        for (let k = 0; k < count; k++) step({ count: 1, forces: (acting.get(steps) || []).map(inWorld) });
         readings.push(reading());
       }
     }
     catch (error) { thrown = told(error); }
     return { thrown, ...handed(readings) };
+  }
+
+  // A thrust of this step; that of a body's frame is turned by the angle of the disk.
+  function inWorld([, disk, [x, y], torque, frame]) {
+    if (frame === "world") return [disk, x, y, torque];
+    const angle = world.read(disk)[4], c = Math.cos(angle), s = Math.sin(angle);
+    return [disk, c * x - s * y, s * x + c * y, torque];
   }
 
   // Where everything is.

@@ -6,10 +6,12 @@ from __future__ import annotations
 import os
 from base64 import b64decode
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from adapters.advance import Foreseen
 from adapters.engine import ContactImpulse, Unsupported
 from adapters.float32 import must_fit, rounding
 from adapters.javascript.v8 import Packaged
@@ -103,10 +105,11 @@ class JavaScriptEngine:
             acting = np.array([*force, torque], float)
             self.forces[disk] = self.forces.get(disk, np.zeros(3)) + acting
 
-    def expect(self, count: int, times: int) -> None:
-        """The next `times` calls are `step(count)`, each followed by `read`, and no force acts: all
-        of them are played in as few exchanges as can be, of some tenths of a second each."""
-        self.expected = (count, times)
+    def expect(self, count: int, times: int, thrusts: Sequence[Foreseen] = ()) -> None:
+        """The next `times` calls are `step(count)`, each followed by `read`, and only `thrusts`
+        act: all of them are played in as few exchanges as can be, of some tenths of a second
+        each."""
+        self.expected, self.thrusts = (count, times), thrusts
 
     def step(self, count: int = 1) -> None:
         """One exchange with the process for all the steps, or none if they have been played ahead.
@@ -129,7 +132,10 @@ class JavaScriptEngine:
         """The reading after the steps that come next, which are played now or have been."""
         count, times = self.expected
         if not self.ahead and not self.thrown:
-            answer = self.do("ahead", {"count": count, "times": times})
+            thrusts = [
+                thrust for thrust in self.thrusts if not self.scene.static[thrust.disk]
+            ]  # nothing moves a static disk
+            answer = self.do("ahead", {"count": count, "times": times, "thrusts": thrusts})
             self.inside += self.seconds
             self.ahead.extend(self.readings(answer))
             self.thrown = answer["thrown"]

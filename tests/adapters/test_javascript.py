@@ -17,6 +17,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from adapters.advance import advance
 from adapters.conformance.conform import ask, conform
 from adapters.conformance.probe import history, loaded, plain, scene_of
 from adapters.engine import Unsupported
@@ -211,6 +212,26 @@ def test_steps_played_ahead_give_the_bits_and_collisions_of_steps_one_by_one(nam
         ahead.step(7)
         singly.step(7)
         assert ahead.read().angle.tobytes() == singly.read().angle.tobytes()
+
+
+@fetched
+@pytest.mark.parametrize("name", ["planck:matched", "matter:matched", "rapier2d:matched"])
+def test_thrusts_played_ahead_act_as_forces_applied_step_by_step(name):
+    """In the frame of the world and of the body, of which V8 rounds the cosine by itself."""
+    one = scenario("body_frame_thrust")
+    one = replace(one, duration=40 * one.sample_interval)
+    dt, substeps = one.dt(4), 4
+    assert {thrust.frame for thrust in one.thrusts} == {"body"}
+    world = [replace(one.thrusts[0], frame="world", start=dt / 3, stop=9.5 * dt)]
+    one = replace(one, thrusts=[*one.thrusts, *world])
+    ahead = play_once(FETCHED[name].make, name, one, dt).trajectory
+    with loaded(FETCHED[name], one.scene, dt=dt) as engine:
+        for k in range(one.intervals):
+            advance(engine, one, k * substeps, substeps, dt)
+        last = engine.read()
+    assert ahead.velocity[-1] == pytest.approx(last.velocity, rel=1e-6, abs=1e-9)
+    assert ahead.angle[-1] == pytest.approx(last.angle, rel=1e-6, abs=1e-9)
+    assert np.abs(last.velocity - one.scene.velocity).max() > 1e-3  # they do act
 
 
 @fetched
