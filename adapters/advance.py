@@ -13,6 +13,25 @@ from adapters.engine import Engine
 from scenarios.model import Array, Scenario, Thrust
 
 
+def advanced(engine: Engine, scenario: Scenario, substeps: int, dt: float) -> Iterator[float]:
+    """Advance an engine that has just been loaded by a sample interval whenever the next is asked
+    for; yields the seconds inside `step`.
+
+    To an engine for which a call is expensive it is said beforehand what comes, if it has the
+    method `expect(count, times, thrusts)`: `step(count)` so many times, a `read` after each, and no
+    `apply_force`: it applies the `thrusts`, rows of `Foreseen`, by itself.
+    """
+    expect = getattr(engine, "expect", None)
+    if expect is not None:
+        steps = scenario.intervals * substeps
+        expect(substeps, scenario.intervals, thrusts_by_step(scenario.thrusts, steps, dt))
+    for k in range(scenario.intervals):
+        if expect is not None:
+            yield timed(engine, substeps)
+        else:
+            yield advance(engine, scenario, k * substeps, substeps, dt)
+
+
 def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
     """Advance `count` steps from step number `first`, applying the thrusts that are on; the seconds
     inside `step`."""

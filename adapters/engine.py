@@ -34,12 +34,7 @@ class ContactImpulse(NamedTuple):
 
 
 class Engine(Protocol):
-    """The protocol: `load` once, then `step` and `read` any number of times, then `close`.
-
-    An engine to which a call is expensive may also have `expect(count, times, thrusts)`: after it
-    `play` calls `step(count)` and `read` so many times, and `apply_force` never: the engine applies
-    what `thrusts` says, rows of `adapters.advance.Foreseen`.
-    """
+    """The protocol: `load` once, then `step` and `read` any number of times, then `close`."""
 
     # Whether collisions are logged; set before `load`. Off where speed is measured, because logging
     # in Python takes longer than a whole step of some engines.

@@ -12,7 +12,7 @@ from typing import Any
 
 from py_mini_racer import JSEvalException, JSOOMException, JSTimeoutException, MiniRacer
 
-from adapters.javascript.packages import NotInstalled, text_of, version_of
+from adapters.npm_packages import NotInstalled, text_of, version_of
 from adapters.own_solver.file import SolverFailed
 
 HERE = Path(__file__).parent

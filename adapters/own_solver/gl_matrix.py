@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from adapters.javascript.packages import HOW, file_of
+from adapters.npm_packages import HOW, file_of
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")

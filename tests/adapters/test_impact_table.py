@@ -11,7 +11,7 @@ from adapters.conformance import impact_table
 from adapters.conformance.impact_table import COLUMNS, README, in_markdown, kept, row_of_table
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, changed
-from adapters.javascript.packages import missing
+from adapters.npm_packages import missing
 
 ROWS = ENGINES | FETCHED
 TABLE = kept().set_index("engine")

@@ -17,14 +17,14 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from adapters import npm_packages as packages
 from adapters.advance import advance
 from adapters.conformance.conform import ask, conform
 from adapters.conformance.probe import history, loaded, plain, scene_of
 from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
-from adapters.javascript import packages
 from adapters.javascript.engine import IDLE, JavaScriptEngine
-from adapters.javascript.packages import NotInstalled, fetch, integrity, missing, pinned, text_of
+from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.play import play_once

@@ -1,5 +1,5 @@
 """Fetches the JavaScript engines, and the gl-matrix of solvers' files, once into the user's cache,
-and reads no file but those that package.json names by version and SHA-512.
+and reads no file but those that javascript/package.json names by version and SHA-512.
 
 No engine's source is in this repository. npm comes with the extra `js`; what `npm ci` fetches is
 held to the hashes of package-lock.json by npm, and the one file of a package that is played to that
@@ -23,7 +23,8 @@ from typing import Any
 from adapters.engine import Unsupported
 from scenarios.truth.cache import folder
 
-PINNED, LOCKED = (Path(__file__).parent / name for name in ("package.json", "package-lock.json"))
+HERE = Path(__file__).parent / "javascript"
+PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
 HOW = "uv run --extra js crosscheck ..."
 NPM_CI = (
     "ci",
