@@ -5,11 +5,31 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import cos, sin
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from adapters.engine import Engine
 from scenarios.model import Array, Scenario, Thrust
+
+
+def advanced(engine: Engine, scenario: Scenario, substeps: int, dt: float) -> Iterator[float]:
+    """Advance an engine that has just been loaded by a sample interval whenever the next is asked
+    for; yields the seconds inside `step`.
+
+    To an engine for which a call is expensive it is said beforehand what comes, if it has the
+    method `expect(count, times, thrusts)`: `step(count)` so many times, a `read` after each, and no
+    `apply_force`: it applies the `thrusts`, rows of `Foreseen`, by itself.
+    """
+    expect = getattr(engine, "expect", None)
+    if expect is not None:
+        steps = scenario.intervals * substeps
+        expect(substeps, scenario.intervals, thrusts_by_step(scenario.thrusts, steps, dt))
+    for k in range(scenario.intervals):
+        if expect is not None:
+            yield timed(engine, substeps)
+        else:
+            yield advance(engine, scenario, k * substeps, substeps, dt)
 
 
 def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
@@ -20,10 +40,37 @@ def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: floa
         for thrust, share in acting:
             force, torque = world_force(thrust, engine) * share, thrust.torque * share
             engine.apply_force(thrust.disk, force, torque)
-        started = perf_counter()
-        engine.step(step)
-        seconds += perf_counter() - started
+        seconds += timed(engine, step)
     return seconds
+
+
+def timed(engine: Engine, count: int) -> float:
+    """Advance `count` steps; the seconds inside `step`."""
+    started = perf_counter()
+    engine.step(count)
+    return perf_counter() - started
+
+
+class Foreseen(NamedTuple):
+    """What a thrust does during one step, whoever applies it."""
+
+    step: int  # from 0
+    disk: int
+    force: list[float]  # N, in `frame`
+    torque: float  # N m
+    frame: str  # world, or body: turned by the angle of the disk at the start of the step
+
+
+def thrusts_by_step(thrusts: Sequence[Thrust], count: int, dt: float) -> list[Foreseen]:
+    """All that acts during `count` steps from the start."""
+    found, first = list[Foreseen](), 0
+    for step, acting in thrust_steps(thrusts, 0, count, dt):
+        found += [
+            Foreseen(first, t.disk, (share * t.force).tolist(), share * t.torque, t.frame)
+            for t, share in acting
+        ]
+        first += step
+    return found
 
 
 def thrust_steps(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 
-from adapters.advance import advance
+from adapters.advance import advanced
 from adapters.engine import Engine, NotStarted, Unsupported
 from adapters.first_collisions import collisions_of
 from adapters.run import Run, gather, run_of, substeps_of
@@ -51,8 +51,8 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         run = replace(run, settings=engine.settings(), versions=engine.versions())
         states.append(engine.read())
         watch(states[0])
-        for k in range(scenario.intervals):
-            seconds += advance(engine, scenario, k * substeps, substeps, dt)
+        for k, spent in enumerate(advanced(engine, scenario, substeps, dt)):
+            seconds += spent
             state = engine.read()
             if fault := fault_of(state, farthest):
                 reason = f"{fault} at {(k + 1) * scenario.sample_interval:g} s"

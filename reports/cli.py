@@ -106,7 +106,8 @@ Timings = Annotated[
         min=0,
         max=3600,
         metavar="SECONDS",
-        help="How long the timing of the engines after the run may take; 0: none.",
+        help="How long the timing of the engines after the run may take, twice as long with"
+        " JavaScript engines; 0: none.",
     ),
 ]
 Resume = Annotated[

@@ -25,7 +25,7 @@ LAYERS = {
         "engine",
         "advance engine_row first_collisions float32 friction library_versions run runaway",
         "play",
-        "reference pymunk box2d box2d_v3 event_driven",
+        "reference pymunk box2d box2d_v3 event_driven npm_packages",
         "own_solver",
         "javascript own_engine",
         "engines",

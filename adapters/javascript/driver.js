@@ -1,6 +1,6 @@
 "use strict";
-// Plays a JavaScript engine for adapters/javascript/v8.py: many steps in a call, arrays back, in JSON. An engine's file
-// gives `play({ shipped, matched, world })`; its `world(scene, chosen, hear)` builds a world and returns
+// Plays a JavaScript engine for adapters/javascript/v8.py: many steps and many readings in a call, whose numbers are
+// handed back in one Float64Array. An engine's file gives `play({ shipped, matched, world })`; its `world(scene, chosen, hear)` builds a world and returns
 //   step()                       one step of scene.dt
 //   force(i, x, y, torque)       N, N m, on disk i during the next step
 //   read(i)                      [x, y, u, v, angle, spin] of disk i, SI
@@ -51,7 +51,9 @@ if (typeof atob === "undefined") {
 class Refused extends Error {}
 
 const crosscheck = (() => {
-  let engine, world, scene, steps, log;
+  const WIDTH = 6;  // numbers of a disk in a reading
+  const LONGEST = 200;  // ms after which a call that plays ahead hands back what it has
+  let engine, world, scene, steps, log, numbers;
 
   function load(given) {
     if (world && world.free) world.free();
@@ -59,15 +61,9 @@ const crosscheck = (() => {
     steps = 0;
     log = [];
     const chosen = { ...engine[given.profile], ...given.changed };
-    const hear = given.listening ? (i, j, impulse) => { log.push([steps, i, j, isNaN(impulse) ? null : impulse]); } : null;
+    const hear = given.listening ? (i, j, impulse) => { log.push(steps, i, j, impulse); } : null;
     world = engine.world(scene, chosen, hear);
-    return { settings: world.settings(), rows: rows() };
-  }
-
-  function rows() {
-    const all = [];
-    for (let i = 0; i < scene.n; i++) all.push(world.read(i));
-    return all;
+    return { settings: world.settings(), ...look() };
   }
 
   function step({ count, forces }) {
@@ -80,6 +76,49 @@ const crosscheck = (() => {
     return null;
   }
 
+  // `times` readings, each after `count` steps, or those before something is thrown, which is told; fewer if they take
+  // too long.
+  function ahead({ count, times, thrusts }) {
+    const readings = [], began = Date.now(), acting = Map.groupBy(thrusts, ([when]) => when);
+    let thrown = {};
+    try {
+      while (readings.length < times && Date.now() - began < LONGEST) {
+        for (let k = 0; k < count; k++) step({ count: 1, forces: (acting.get(steps) || []).map(inWorld) });
+        readings.push(reading());
+      }
+    }
+    catch (error) { thrown = told(error); }
+    return { thrown, ...handed(readings) };
+  }
+
+  // A thrust of this step; that of a body's frame is turned by the angle of the disk.
+  function inWorld([, disk, [x, y], torque, frame]) {
+    if (frame === "world") return [disk, x, y, torque];
+    const angle = world.read(disk)[4], c = Math.cos(angle), s = Math.sin(angle);
+    return [disk, c * x - s * y, s * x + c * y, torque];
+  }
+
+  // Where everything is.
+  function look() {
+    return handed([reading()]);
+  }
+
+  function reading() {
+    const rows = new Float64Array(WIDTH * scene.n);
+    for (let i = 0; i < scene.n; i++) rows.set(world.read(i), WIDTH * i);
+    return rows;
+  }
+
+  // Puts the readings and the collisions since the last time into `numbers`, and says how many readings there are.
+  function handed(readings) {
+    const each = WIDTH * scene.n;
+    numbers = new Float64Array(each * readings.length + log.length);
+    readings.forEach((rows, k) => numbers.set(rows, each * k));
+    numbers.set(log, each * readings.length);
+    log = [];
+    return { readings: readings.length };
+  }
+
   // As the exercise's projectObjects: beyond an edge of the box, onto the opposite one.
   function wrap() {
     const [[left, bottom], [right, top]] = scene.wrap;
@@ -90,23 +129,19 @@ const crosscheck = (() => {
     }
   }
 
-  // Where everything is, and the collisions since the last time.
-  function look() {
-    const heard = log;
-    log = [];
-    return { rows: rows(), collisions: heard };
+  function told(error) {
+    if (error instanceof Refused) return { refused: error.message };
+    return { failed: `${error && error.message !== undefined ? `${error.name}: ${error.message}` : error}` };
   }
 
-  const commands = { load, step, look };
+  const commands = { load, step, look, ahead };
   return {
     play: (given) => { engine = given; },
     do: (name, argument) => {
       try { return JSON.stringify({ done: commands[name](argument) }); }
-      catch (error) {
-        if (error instanceof Refused) return JSON.stringify({ refused: error.message });
-        return JSON.stringify({ failed: `${error && error.message !== undefined ? `${error.name}: ${error.message}` : error}` });
-      }
+      catch (error) { return JSON.stringify(told(error)); }
     },
+    numbers: () => numbers,
     ready: () => engine !== undefined,
   };
 })();

@@ -1,13 +1,17 @@
 """A JavaScript engine behind the protocol: one exchange with its process for any number of
-steps."""
+steps, and for all the readings that are expected."""
 
 from __future__ import annotations
 
 import os
+from base64 import b64decode
+from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from adapters.advance import Foreseen
 from adapters.engine import ContactImpulse, Unsupported
 from adapters.float32 import must_fit, rounding
 from adapters.javascript.v8 import Packaged
@@ -81,6 +85,8 @@ class JavaScriptEngine:
             )
         self.scene, self.forces = scene, dict[int, Array]()
         self.log: list[ContactImpulse] = []
+        self.steps, self.expected = 0, (0, 0)
+        self.ahead, self.thrown = deque[Array](), dict[str, str]()
         answer = self.do(
             "load",
             {
@@ -90,7 +96,7 @@ class JavaScriptEngine:
                 "listening": self.listening,
             },
         )
-        self.rows: Array | None = np.array(answer["rows"], float)
+        self.rows: Array | None = self.readings(answer)[0]
         self.resolved: list[tuple[str, Any, Any]] = answer["settings"]
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
@@ -99,23 +105,63 @@ class JavaScriptEngine:
             acting = np.array([*force, torque], float)
             self.forces[disk] = self.forces.get(disk, np.zeros(3)) + acting
 
+    def expect(self, count: int, times: int, thrusts: Sequence[Foreseen] = ()) -> None:
+        """The next `times` calls are `step(count)`, each followed by `read`, and only `thrusts`
+        act: all of them are played in as few exchanges as can be, of some tenths of a second
+        each."""
+        self.expected, self.thrusts = (count, times), thrusts
+
     def step(self, count: int = 1) -> None:
-        """One exchange with the process for all the steps."""
+        """One exchange with the process for all the steps, or none if they have been played ahead.
+
+        Raises:
+            ValueError: other steps were expected, and have been played.
+        """
         forces = [[disk, *acting.tolist()] for disk, acting in self.forces.items()]
-        self.forces, self.rows = {}, None
+        self.steps += count
+        if self.expected[1] and self.expected[0] == count and not forces:
+            self.rows = self.next_expected()
+            return
+        if self.ahead:
+            raise ValueError("steps were expected that have been played, and do not come")
+        self.forces, self.rows, self.expected = {}, None, (0, 0)
         self.do("step", {"count": count, "forces": forces})
         self.inside += self.seconds
+
+    def next_expected(self) -> Array:
+        """The reading after the steps that come next, which are played now or have been."""
+        count, times = self.expected
+        if not self.ahead and not self.thrown:
+            thrusts = [
+                thrust for thrust in self.thrusts if not self.scene.static[thrust.disk]
+            ]  # nothing moves a static disk
+            answer = self.do("ahead", {"count": count, "times": times, "thrusts": thrusts})
+            self.inside += self.seconds
+            self.ahead.extend(self.readings(answer))
+            self.thrown = answer["thrown"]
+        if not self.ahead:
+            if "refused" in self.thrown:
+                raise Unsupported(self.thrown["refused"])
+            raise SolverFailed("error", self.thrown["failed"])
+        self.expected = (count, times - 1)
+        return self.ahead.popleft()
 
     def look(self) -> Array:
         """(n, 6) x, y, u, v, angle, spin; collisions are noted, too."""
         if self.rows is None:
-            answer = self.do("look")
-            self.rows = np.array(answer["rows"], float)
-            self.log += [
-                ContactImpulse(step, i, j, np.nan if impulse is None else impulse)
-                for step, i, j, impulse in answer["collisions"]
-            ]
+            self.rows = self.readings(self.do("look"))[0]
         return self.rows
+
+    def readings(self, answer: dict[str, Any]) -> Array:
+        """(readings, n, 6) of what the driver hands back; the collisions behind them are noted."""
+        numbers = np.frombuffer(b64decode(answer["numbers"]))
+        shape = (answer["readings"], self.scene.n, 6)
+        rows, heard = np.split(numbers, [np.prod(shape)])
+        self.log += [
+            ContactImpulse(int(step), int(i), int(j), float(impulse))
+            for step, i, j, impulse in heard.reshape(-1, 4)
+        ]
+        return rows.reshape(shape)
 
     def read(self) -> State:
         """All disks in one exchange; what is static stays as the scene has it."""
@@ -131,7 +177,7 @@ class JavaScriptEngine:
     def collisions(self) -> list[ContactImpulse]:
         """From the engine's own events."""
         self.look()
-        return self.log
+        return [one for one in self.log if one.step < self.steps]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
         """As the engine's file reads them back."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 
 from py_mini_racer import JSEvalException, JSOOMException, JSTimeoutException, MiniRacer
 
-from adapters.javascript.packages import NotInstalled, text_of, version_of
+from adapters.npm_packages import NotInstalled, text_of, version_of
 from adapters.own_solver.file import SolverFailed
 
 HERE = Path(__file__).parent
@@ -61,7 +62,8 @@ class PackagedEngine:
             sleep(0.002)
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """What the driver answers to a command, with the `seconds` in V8; raises `SolverFailed`."""
+        """What the driver answers to a command, with the `seconds` in V8, and the `numbers` that it
+        hands back, float64 in base64; raises `SolverFailed`."""
         code = f'crosscheck.do("{command}", {json.dumps(argument)})'
         began = perf_counter()
         try:
@@ -74,7 +76,12 @@ class PackagedEngine:
             raise SolverFailed("refused", answer["refused"])
         if "failed" in answer:
             raise SolverFailed("error", answer["failed"])
-        return {"done": answer["done"], "seconds": seconds}
+        done = answer["done"]
+        if done and "readings" in done:
+            numbers = self.v8.eval("crosscheck.numbers()")
+            assert isinstance(numbers, memoryview)
+            done["numbers"] = b64encode(numbers).decode("ascii")
+        return {"done": done, "seconds": seconds}
 
     def versions(self) -> dict[str, str]:
         """What decides the numbers."""

@@ -75,6 +75,7 @@ class Parameters(NamedTuple):
 
     order: np.ndarray  # the stages of a step, as places in STAGES
     drift: float = 0.0  # of a h2, by which `move` goes farther than v h
+    summed: bool = True  # of `move`: the moves of a step are added up, and then to the position
     threshold: float = 0.0  # m/s: closing speeds up to which a collision is inelastic
     project: bool = True  # of `pairs`: an overlap is undone at once
     project_walls: bool = True  # of `walls`
@@ -180,15 +181,21 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
     """x += v h + drift a h2, and what `nudge` adds; the angle alike.
 
     As in Box2D 3.1 the moves of a step are added up before they are added to the position, so that
-    the moves are rounded, not the position.
+    the moves are rounded, not the position; unless not `summed`, as in Rapier, where each move
+    rounds the position.
     """
     v, moved, more = disks.velocity, kept.moved, on.drift * h * h
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
             for axis in range(2):
                 acceleration = world.gravity[axis] + disks.force[i, axis] / disks.mass[i]
-                moved[i, axis] += (v[i, axis] + kept.nudge[i, axis]) * h + more * acceleration
-                disks.position[i, axis] = kept.start[i, axis] + moved[i, axis]
+                by = (v[i, axis] + kept.nudge[i, axis]) * h + more * acceleration
+                if on.summed:
+                    moved[i, axis] += by
+                    disks.position[i, axis] = kept.start[i, axis] + moved[i, axis]
+                else:
+                    disks.position[i, axis] += by
+                    moved[i, axis] = disks.position[i, axis] - kept.start[i, axis]
                 kept.nudge[i, axis] = 0.0
             kept.turned[i] += atan(disks.angular_velocity[i] * h)  # as b2IntegrateRotation does
             disks.angle[i] += (

@@ -30,8 +30,11 @@ NAMES = (
     "position correction",
     "float32",
     "CCD, sleep",
+    "friction of the air",
+    "polygons for disks",
 )
-FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT = NAMES
+FLIGHT, RESTITUTION, IMPULSE, FRICTION, SKIN, POSITION_CORRECTION, DIGITS, SWEPT, AIR, SIDES = NAMES
+MANY_SIDES = 400  # of matter's disks, which are polygons: what is left of them at 400 is residual
 # Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved
 # out of it.
 END_OF_STEP: dict[str, Any] = {
@@ -40,6 +43,10 @@ END_OF_STEP: dict[str, Any] = {
     "project": False,
     "project_walls": False,
 }
+
+
+# Of those in float32: each move of a substep rounds the position.
+ROUNDED_MOVES = ("rapier2d:shipped", "rapier2d:matched")
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,7 @@ class Mechanism:
 def mechanisms_of(
     name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float
 ) -> list[Mechanism]:
-    """The mechanisms of an engine in `MECHANISMS`, in this scene at this dt; `settings` are those
+    """The mechanisms of an engine in `KNOWN`, in this scene at this dt; `settings` are those
     it reported once loaded."""
     # What cannot be read back is as it was asked for.
     resolved = {
@@ -70,10 +77,10 @@ def mechanisms_of(
         for setting, (asked, used) in settings.items()
     }
     flight = Mechanism(FLIGHT, {"alpha": row_of(name).alpha})
-    single = (
-        [Mechanism(DIGITS, {"precision": np.float32})] if row_of(name).rounding == FLOAT32 else []
-    )
-    return [flight, *MECHANISMS[name](resolved, scene, dt), *single]
+    single = []
+    if row_of(name).rounding == FLOAT32:
+        single = [Mechanism(DIGITS, {"precision": np.float32, "summed": name not in ROUNDED_MOVES})]
+    return [flight, *KNOWN[name](resolved, scene, dt), *single]
 
 
 def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
@@ -251,6 +258,92 @@ def _box2d_v3_shipped(reported: Mapping[str, Any], scene: Scene, _dt: float) -> 
     ]
 
 
+def _planck(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str) -> list[Mechanism]:
+    """Those of Box2D 2.3 in float64, whose compiled-in numbers are settings here."""
+    made = partial(_javascript, "planck", profile)
+    still = {"continuous": False, "bullet": False}
+    still |= {f"elastic_{name}": value for name, value in still.items()}
+    velocity, position = reported["velocity, position iterations"].split(",")
+    impulse = {
+        "order": BOX2D,
+        "iterations": int(velocity),
+        "touching": True,
+        "cap": reported["maxTranslation"],
+    }
+    correction = {
+        "correction_share": 0.2 if int(position) else 0.0,  # Settings.baumgarte
+        "correction_iterations": int(position),
+        "slop": reported["linearSlop"],
+        "correction_most": reported["maxLinearCorrection"],
+    }
+    uncorrected = made(position_iterations=0, elastic_position_iterations=0)
+    common = [
+        Mechanism(RESTITUTION, {"threshold": reported["velocityThreshold"]}),
+        Mechanism(IMPULSE, impulse),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
+    ]
+    if profile == "matched":
+        rubbed = _box2d_friction(reported) if scene.friction else []
+        swept = [Mechanism(SWEPT, without=made(**still))]
+        return [*common, *rubbed, *(swept if reported["continuous collision"] else [])]
+    return [
+        *common,
+        *_box2d_friction(reported, None if scene.friction else made(friction=0.0)),
+        Mechanism(SKIN, {"skin": 2 * reported["linearSlop"]}, (IMPULSE, POSITION_CORRECTION)),
+        Mechanism(SWEPT, without=made(**still, sleeping=False)),
+    ]
+
+
+def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str) -> list[Mechanism]:
+    """Soft substeps and one sweep for restitution, as in Box2D 3.1.
+
+    Not known to the reference: a pair that comes nearer is a contact one step later, or not, by
+    where the broad phase last looked; `tests/adapters/test_javascript.py` shows it.
+    """
+    made = partial(_javascript, "rapier2d", profile)
+    # Contacts as stiff as Box2D 3.1's: contact_erp is 0.1358 at 1/240 s.
+    impulse = {
+        "order": BOX2D_V3,
+        "touching": True,
+        "margin": reported["prediction distance in m"],
+        "hertz": 30.0,
+        "damping": 10.0,
+    }
+    # max_corrective_velocity: 10 units of length in a second
+    push = {"push_speed": 10.0 * reported["length unit in m"]}
+    asleep = Mechanism(SWEPT, without=made(sleeping=False))
+    rubbed = _box2d_v3_friction(reported, None if scene.friction else made(friction=0.0))
+    return [
+        Mechanism(IMPULSE, impulse),
+        Mechanism(POSITION_CORRECTION, push, (IMPULSE,)),
+        *(rubbed if scene.friction or profile == "shipped" else []),
+        *([asleep] if profile == "shipped" else []),
+    ]
+
+
+def _matter(
+    _reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str
+) -> list[Mechanism]:
+    """Those that matter can be played without; the reference has none of them.
+
+    Not known: the rest of the polygons, its contacts below the resting threshold, and the place of
+    its position correction.
+    """
+    made = partial(_javascript, "matter", profile)
+    smooth = Mechanism(FRICTION, without=made(friction=0))
+    return [
+        *([Mechanism(AIR, without=made(friction_air=0))] if profile == "shipped" else []),
+        *([smooth] if profile == "shipped" or scene.friction else []),
+        Mechanism(POSITION_CORRECTION, without=made(position_iterations=0)),
+        Mechanism(SIDES, without=made(sides=MANY_SIDES)),
+    ]
+
+
+def _javascript(name: str, profile: str, **changed: Any) -> Callable[[], Engine]:
+    """Makes the engine of a row of `FETCHED` with these changes."""
+    return partial(row_of(f"{name}:{profile}").make, **changed)
+
+
 MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism]]] = {
     "reference:exercise": _exercise,
     "reference:lesson": _lesson,
@@ -262,3 +355,12 @@ MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism
     "box2d_v3:matched": _box2d_v3_matched,
 }
 """The engines whose mechanisms are known."""
+KNOWN = MECHANISMS | {
+    "planck:shipped": partial(_planck, profile="shipped"),
+    "planck:matched": partial(_planck, profile="matched"),
+    "matter:shipped": partial(_matter, profile="shipped"),
+    "matter:matched": partial(_matter, profile="matched"),
+    "rapier2d:shipped": partial(_rapier, profile="shipped"),
+    "rapier2d:matched": partial(_rapier, profile="matched"),
+}
+"""And those that are fetched."""

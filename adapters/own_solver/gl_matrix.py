@@ -1,5 +1,5 @@
 """Finds the gl-matrix that an Exercise.js calls: the one the exercise hands out beside the file,
-else that of npm."""
+else that of npm above it, else the one that the extra `js` fetches."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from adapters.npm_packages import HOW, file_of
+
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
 HANDED_OUT = "gl-matrix*.js"
-WHERE_TO = "put the gl-matrix.js that the exercise hands out beside the file"
+WHERE_TO = (
+    f"put the gl-matrix.js that the exercise hands out beside the file, or let it be fetched: {HOW}"
+)
 # 2.x, then 3.x
 BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")
 # Up to version 2 vec2, mat4 ... are globals; from version 3 on they are inside glMatrix, and are
@@ -35,7 +39,7 @@ def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
 
 def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
     """Beside the solver, gl-matrix.js before others; then the packages of its folder and of those
-    above it."""
+    above it; then the one that is fetched."""
     folder = solver.resolve().parent
     beside = sorted(folder.glob(HANDED_OUT), key=lambda file: (len(file.name), file.name))
     yield from ((file.name, file) for file in beside if file != solver.resolve() and file.is_file())
@@ -43,6 +47,8 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
         package = above / "node_modules" / "gl-matrix"
         built = (package / name for name in (*BUILT, main_of(package)))
         yield from ((file.relative_to(above).as_posix(), file) for file in built if file.is_file())
+    if (fetched := file_of("gl-matrix")) is not None:
+        yield fetched.name, fetched
 
 
 def main_of(package: Path) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED
-from adapters.javascript.packages import missing
+from adapters.npm_packages import missing
 from reports.compare.metrics import METRICS, Metric
 from reports.run.arguments import unknown
 from reports.terminal.console import Console

@@ -15,7 +15,7 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Scenario, Scene
 
 Make = Callable[[], Engine]
-EMPTY_STEPS, READS = 1000, 20  # of one run
+EMPTY_STEPS, CALLS, READS = 1000, 100, 20  # of one run
 EMPTY, CALL, READ = "empty step", "call", "read"
 
 
@@ -40,8 +40,8 @@ class Stepping:
 
 @dataclass(frozen=True)
 class EmptySteps:
-    """`EMPTY_STEPS` steps of a world with one static disk, as no engine here can have less: in one
-    call of `step`, or `singly`."""
+    """Steps of a world with one static disk, as no engine here can have less: `EMPTY_STEPS` in one
+    call of `step`, or, `singly`, `CALLS` of one step each."""
 
     make: Make
     dt: float
@@ -52,7 +52,7 @@ class EmptySteps:
         with closing(self.make()) as engine:
             engine.listening = False
             engine.load(empty(), self.dt)
-            calls, count = (EMPTY_STEPS, 1) if self.singly else (1, EMPTY_STEPS)
+            calls, count = (CALLS, 1) if self.singly else (1, EMPTY_STEPS)
             started = perf_counter()
             for _ in range(calls):
                 engine.step(count)
@@ -87,7 +87,7 @@ def beside(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | Readi
     dt = scenario.dt(scenario.substeps[-1])
     return [
         (EMPTY, EmptySteps(make, dt, singly=False), EMPTY_STEPS),
-        (CALL, EmptySteps(make, dt, singly=True), EMPTY_STEPS),
+        (CALL, EmptySteps(make, dt, singly=True), CALLS),
         (READ, Reading(make, scenario), READS),
     ]
 

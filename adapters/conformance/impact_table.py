@@ -1,0 +1,206 @@
+"""What each engine does with e, as the probes read it: a row an engine, kept in impact_table.csv.
+
+`uv run --extra js python -m adapters.conformance.impact_table` asks all engines anew, and writes
+the file and the table of adapters/README.md; it takes half a minute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import replace
+from datetime import date
+from functools import partial
+from pathlib import Path
+from textwrap import wrap
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from adapters.conformance import physics
+from adapters.conformance.probe import DT, head_on, loaded, scene_of
+from adapters.engine import Unsupported
+from adapters.engine_row import FLOAT32, EngineRow
+from adapters.engines import ENGINES, FETCHED
+from adapters.friction import Frictionless
+
+KEPT = Path(__file__).with_name("impact_table.csv")
+README = Path(__file__).parent.parent / "README.md"
+BEGIN, END = "<!-- impact table -->\n", "<!-- end of impact table -->"
+SLOWEST, FASTEST = 1e-3, 100.0  # m/s, between which a threshold is looked for
+NEAR = 0.05  # of e: what is nearer to that at `FASTEST` is the same
+BOUNCES = 5
+
+
+def threshold(row: EngineRow) -> float:
+    """m/s: the closing speed from which on a pair bounces as it does at `FASTEST`, to 1 %; 0 if it
+    already does at `SLOWEST`."""
+
+    def restitution(closing: float) -> float:
+        return float(physics.restitution(row, closing).got)
+
+    usual, low, high = restitution(FASTEST), SLOWEST, FASTEST
+    if abs(restitution(low) - usual) < NEAR:
+        return 0.0
+    while high > 1.01 * low:
+        middle = (low * high) ** 0.5
+        low, high = (low, middle) if abs(restitution(middle) - usual) < NEAR else (middle, high)
+    return high
+
+
+def elastic_energy(row: EngineRow) -> float:
+    """%, of the height that a disk dropped by 2 m with e = 1 gains in `BOUNCES` bounces, in steps
+    of 1/256 s; 0 is exact."""
+    gravity, drop = 10.0, 2.0
+    fall = (2 * drop / gravity) ** 0.5
+    scene = scene_of(
+        restitution=1.0,
+        position=[[0.0, 0.25 + drop]],
+        velocity=[[0.0, 0.0]],
+        radius=[0.25],
+        mass=[1.0],
+        gravity=[0.0, -gravity],
+        walls=[[[-8.0, 0.0], [8.0, 0.0]]],
+    )
+    with loaded(row, scene) as engine:
+        engine.step(round((2 * BOUNCES - 0.5) * fall / DT))
+        heights = []
+        for _ in range(round(fall / DT)):
+            engine.step()
+            heights.append(float(engine.read().position[0, 1]))
+    return 100 * ((max(heights) - 0.25) / drop - 1)
+
+
+def lever(row: EngineRow) -> float:
+    """The lever arm by which friction turns a disk in a bounce, in radii."""
+    scene = replace(head_on(2.0, spin=40.0), friction=physics.FRICTION)
+    with loaded(row, scene) as engine:
+        before = engine.read()
+        engine.step(24)
+        after = engine.read()
+    taken = scene.mass[1] * float((after.velocity - before.velocity)[1, 1])
+    turned = scene.inertia[1] * float((after.angular_velocity - before.angular_velocity)[1])
+    return abs(turned / taken) / float(scene.radius[1]) if taken else float("nan")
+
+
+def scaled(row: EngineRow, scale: float) -> float:
+    """e of two equal disks of 0.5 m that close at 2 m/s, where 0.5 is stated, with all lengths
+    `scale` times as long."""
+    scene = head_on(2.0)
+    small = replace(
+        scene,
+        position=scale * scene.position,
+        velocity=scale * scene.velocity,
+        radius=scale * scene.radius,
+        inertia=scale**2 * scene.inertia,
+    )
+    with loaded(row, small) as engine:
+        before = engine.read().velocity
+        engine.step(24)
+        after = engine.read().velocity
+    return float((after[2] - after[1])[0] / (before[1] - before[2])[0])
+
+
+def reading(probe: str) -> Callable[[EngineRow], float]:
+    """The number that a probe of the physics reads."""
+
+    def read(row: EngineRow) -> float:
+        got = physics.PHYSICS[probe].read(row).got
+        return float("nan") if isinstance(got, str) else got
+
+    return read
+
+
+class Column(NamedTuple):
+    """A column of the table: its heading in README, and how it is read; what cannot be asked of an
+    engine is NaN."""
+
+    heading: str
+    read: Callable[[EngineRow], float]
+
+
+COLUMNS: dict[str, Column] = {
+    "threshold": Column("bounces from m/s", threshold),
+    "e_slow": Column("e at 0.1 m/s", reading("restitution_0.1")),
+    "e_2": Column("e at 2 m/s", reading("restitution_2")),
+    "e_wall": Column("e on a wall", reading("restitution_wall")),
+    "e_small": Column("e of 5 mm disks", partial(scaled, scale=0.01)),
+    "energy": Column(f"height gained in {BOUNCES} bounces, e = 1", elastic_energy),
+    "friction_unasked": Column("friction, none stated", reading("friction")),
+    "friction_0": Column("friction at e = 0", reading("friction_0")),
+    "friction_1": Column("friction at e = 1", reading("friction_1")),
+    "lever": Column("lever arm of friction", lever),
+    "spin": Column("300 rad/s after 4 steps", reading("fast_spin")),
+}
+
+
+def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
+    """What is read of one engine, with the date and its versions."""
+    with closing(row.make()) as engine:
+        engine.load(head_on(2.0), DT)
+        versions = ", ".join(f"{library} {number}" for library, number in engine.versions().items())
+    known: dict[str, float | str] = {
+        "engine": name,
+        "numbers": "float32" if row.rounding == FLOAT32 else "float64",
+        "date": date.today().isoformat(),
+        "versions": versions,
+    }
+    return known | {key: asked(column.read, row) for key, column in COLUMNS.items()}
+
+
+def asked(read: Callable[[EngineRow], float], row: EngineRow) -> float:
+    """What is read; NaN if the engine refuses the scene."""
+    try:
+        return read(row)
+    except (Unsupported, Frictionless):
+        return float("nan")
+
+
+def table_of(rows: Mapping[str, EngineRow]) -> pd.DataFrame:
+    """A row an engine: engine, numbers, date, versions, then `COLUMNS`."""
+    return pd.DataFrame([row_of_table(name, row) for name, row in rows.items()])
+
+
+def kept() -> pd.DataFrame:
+    """The table as it was last written."""
+    return pd.read_csv(KEPT, keep_default_na=False, na_values=["", "nan"])
+
+
+def in_markdown(table: pd.DataFrame) -> str:
+    """The table as README shows it, then when it was read and with which versions."""
+    headings = ["engine", *(column.heading for column in COLUMNS.values()), "numbers"]
+    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
+    for row in table.to_dict("records"):
+        cells = [f"`{row['engine']}`", *(cell(key, row[key]) for key in COLUMNS), row["numbers"]]
+        lines.append(f"| {' | '.join(cells)} |")
+    versions = dict.fromkeys(", ".join(table.versions).split(", "))
+    read = f"Read on {table.date.max()} with {', '.join(versions)}."
+    return "\n".join([*lines, "", *wrap(read, 120)]) + "\n"
+
+
+def cell(column: str, value: float) -> str:
+    """A number to three digits; "-" for none."""
+    if np.isnan(value):
+        return "-"
+    if column == "energy":
+        return f"{round(value, 1) + 0.0:+.1f} %"  # and no -0.0
+    return f"{round(value, 6):.3g}"
+
+
+def with_table(text: str, table: pd.DataFrame) -> str:
+    """The text of README with this table in its place."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return before + BEGIN + in_markdown(table) + END + after
+
+
+def main() -> None:
+    """Ask all engines, and write the file and the table."""
+    table = table_of(ENGINES | FETCHED)
+    table.to_csv(KEPT, index=False, float_format="%.10g")
+    README.write_text(with_table(README.read_text("utf-8"), kept()), "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""The table of what each engine does with e is what the probes read, and README shows it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from adapters.conformance import impact_table
+from adapters.conformance.impact_table import COLUMNS, README, in_markdown, kept, row_of_table
+from adapters.engine_row import EngineRow
+from adapters.engines import ENGINES, FETCHED, changed
+from adapters.npm_packages import missing
+
+ROWS = ENGINES | FETCHED
+TABLE = kept().set_index("engine")
+QUICK = ("reference:ordered", "pymunk:shipped")
+EACH = [  # two seconds each
+    pytest.param(
+        name,
+        marks=[
+            *([] if name in QUICK else [pytest.mark.slow]),
+            *(
+                [pytest.mark.skipif(bool(missing(row.package)), reason=missing(row.package))]
+                if row.package
+                else []
+            ),
+        ],
+    )
+    for name, row in ROWS.items()
+]
+
+
+def drifted(name: str, row: EngineRow) -> list[str]:
+    """The columns in which an engine no longer reads what is kept of `name`."""
+    fresh, was = row_of_table(name, row), TABLE.loc[name]
+    numbers = [
+        column
+        for column in COLUMNS
+        # 1e-3 leaves room for another compiler's last digits, 1e-6 for those of a number near 0
+        if not np.isclose(fresh[column], was[column], rtol=1e-3, atol=1e-6, equal_nan=True)
+    ]
+    return numbers + [key for key in ("numbers", "versions") if fresh[key] != was[key]]
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_an_engine_reads_what_is_kept_of_it(name):
+    """With the same versions; else `python -m adapters.conformance.impact_table` writes it anew."""
+    assert drifted(name, ROWS[name]) == []
+
+
+def test_an_engine_with_another_restitution_is_noticed():
+    """The negative control: elasticity e for sqrt(e) on a shape."""
+    row = EngineRow(partial(changed, "pymunk:shipped", elasticity=0.6), "", 0.0, 2.0**-53)
+    assert {"e_slow", "e_2", "e_wall", "e_small"} <= set(drifted("pymunk:shipped", row))
+
+
+def test_the_table_has_every_engine_and_readme_shows_it():
+    """In their order, and nothing that is not in the file."""
+    assert list(TABLE.index) == list(ROWS)
+    assert in_markdown(kept()) in README.read_text("utf-8")
+
+
+def test_the_table_takes_its_place_and_leaves_the_rest_of_a_text():
+    """However often it is written."""
+    text = f"before\n{impact_table.BEGIN}old\n{impact_table.END}\nafter\n"
+    once = impact_table.with_table(text, kept())
+    assert once == f"before\n{impact_table.BEGIN}{in_markdown(kept())}{impact_table.END}\nafter\n"
+    assert impact_table.with_table(once, kept()) == once
+
+
+# The readings of an engine that is exact, and of one whose cause is known.
+
+
+def test_exact_readings_are_read_as_exact():
+    """reference:ordered takes every collision at its own time, with friction."""
+    row = TABLE.loc["reference:ordered"]
+    exact = {
+        "threshold": 0,
+        "e_slow": 0.5,
+        "e_2": 0.5,
+        "e_small": 0.5,
+        "friction_1": 0.2,
+        "lever": 1,
+    }
+    assert row[list(exact)].to_dict() == pytest.approx(exact, rel=1e-9)
+    assert (
+        abs(row.energy) < 0.1
+    )  # a sample is up to dt / 2 from the top: (g dt / 4)^2 / (2 g), 1e-4 %
+
+
+def test_the_threshold_of_box2d_is_found_where_it_is_compiled_in():
+    """1 m/s, to the 1 % to which it is looked for."""
+    assert 1.0 <= TABLE.loc["box2d:shipped"].threshold <= 1.01
+    assert TABLE.loc["box2d:shipped"].e_small == 0
