@@ -199,7 +199,7 @@ def main() -> None:
     """Ask all engines, and write the file and the table."""
     table = table_of(ENGINES | FETCHED)
     table.to_csv(KEPT, index=False, float_format="%.10g")
-    README.write_text(with_table(README.read_text("utf-8"), kept()), "utf-8")
+    README.write_text(with_table(README.read_text(encoding="utf-8"), kept()), encoding="utf-8")
 
 
 if __name__ == "__main__":

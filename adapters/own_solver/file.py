@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 from adapters.own_solver.beside import modules_beside
-from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
 
 LARGEST = 2**20  # bytes; the exercise's file has about five thousand
 # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
@@ -138,6 +137,9 @@ def read_beside(path: Path, text: str) -> dict[str, str]:
 def read_library(path: Path, text: str) -> dict[str, str]:
     """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
     `NotASolver`."""
+    # it loads numpy, which --help does without
+    from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
+
     found = gl_matrix_of(path, text)
     return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], WHERE_TO))}
 

@@ -52,7 +52,7 @@ def compare_bits(out: Path | None) -> NoReturn:
             put_text(out, written(rows, made_by))
         except OSError as fault:
             refuse([f"{out}: {fault.strerror or fault}"])
-    kept = KEPT.read_text("utf-8")
+    kept = KEPT.read_text(encoding="utf-8")
     found, both = differences(read(kept), read(written(rows, made_by)))
     console = Console()
     show(console, found, Counter((both.engine + ":" + both.profile).tolist()))

@@ -31,7 +31,7 @@ LOOK = 0.05  # s between two looks at whether a process that has not connected s
 class PortableWorker(Worker):
     """As `Worker`, by other channels."""
 
-    def open(self) -> None:
+    def start(self) -> None:
         """Start the process, which will connect."""
         self.folder = tempfile.mkdtemp()
         self.trail_file = Path(self.folder) / "trail"

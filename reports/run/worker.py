@@ -47,9 +47,9 @@ class Worker:
         error."""
         self.memory, self.show, self.stopped = memory, show, False
         self.printed = b""
-        self.open()
+        self.start()
 
-    def open(self) -> None:
+    def start(self) -> None:
         """Start the process, with its channels."""
         self.connection, theirs = Pipe()
         self.output, printing = os.pipe()

@@ -131,7 +131,7 @@ def test_a_folder_that_cannot_be_written_to_is_no_cache(folder: Path, made: list
 
 def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """$CROSSCHECK_CACHE before $XDG_CACHE_HOME before ~/.cache."""
-    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("CROSSCHECK_CACHE", raising=False)
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     assert truth_cache.folder() == tmp_path / ".cache" / "crosscheck2d"

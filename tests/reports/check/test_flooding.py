@@ -12,6 +12,7 @@ import pytest
 from adapters.own_solver import process as solver_process
 from adapters.own_solver.file import LONGEST, NotASolver, SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
+from adapters.system import Pieces
 from reports.check.machine import as_junit
 from reports.check.verdict import FileCheck
 from tests.reports.terminal.command_line import crosscheck
@@ -30,6 +31,8 @@ def flooded(size: int) -> SolverProcess:
         start_new_session=True,
         bufsize=0,
     )
+    assert talk.process.stdout is not None
+    talk.pieces = Pieces(talk.process.stdout)
     return talk
 
 
