@@ -142,7 +142,7 @@ def test_a_start_that_is_none_is_refused_and_says_what_would_cure_it(scene, toru
 
 
 def test_touching_disks_that_part_are_allowed():
-    """And never collision."""
+    """They never collide."""
     engine, x, _ = state_after(two(gap=0.0, closing=-1.0), 1.0)
     assert len(engine.collisions) == 0
     assert x.tolist() == [[-1.0, 0.0], [1.0, 0.0]]
