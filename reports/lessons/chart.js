@@ -2,7 +2,8 @@
 // Line charts as SVG: two axes, a grid, and the curves of the engines in their colours.
 
 const SIZE = { width: 520, height: 290, left: 62, right: 12, top: 10, bottom: 42 };
-const LETTER = 7.4;  // of an axis, at most
+const LETTER = 10;  // of an axis, at most: on a narrow page, where they are largest
+const LINE = 16;  // height of a line of text, at most
 const EMPTY = 1e-16;  // what is 0 stands at the foot of a logarithmic axis
 const svg = (name, attributes, text) => {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -74,7 +75,7 @@ function drawChart(chart) {
   const guides = chart.guides.map(([axis, value, text]) => [axis, axis === "x" ? x.place(value) : y.place(value), text]);
   for (const [axis, place] of guides) drawGuide(picture, axis, place);
   chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, [k, chart.curves.length], clip));
-  guides.forEach(([axis, place, text], k) => nameGuide(picture, axis, place, text, k));
+  nameGuides(picture, guides, chart.curves.map((curve) => curve.x.map((each, j) => [x.place(each), y.place(curve.y[j])])));
   figure.append(caption, picture);
   return figure;
 }
@@ -93,8 +94,8 @@ function drawAxes(picture, chart, x, y) {
   picture.append(svg("text", { class: "axis", x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, chart.x));
   // long numbers push the title out to the left, and the picture is as much wider
   const longest = Math.max(...numbers.map(([, text]) => text.length));
-  const title = Math.min(13, left - 7 - LETTER * longest - 7);
-  picture.setAttribute("viewBox", `${title - 13} 0 ${width + 13 - title} ${height}`);
+  const title = Math.min(LINE, left - 7 - LETTER * longest - 7);
+  picture.setAttribute("viewBox", `${title - LINE} 0 ${width + LINE - title} ${height}`);
   picture.append(svg("text", { class: "axis", x: -(top + height - bottom) / 2, y: title, transform: "rotate(-90)", "text-anchor": "middle" }, chart.y));
 }
 
@@ -105,12 +106,38 @@ function drawGuide(picture, axis, place) {
   picture.append(svg("line", { class: "guide", ...ends }));
 }
 
-// Its text, at the end where it is least in the way, over all lines; that of number k stands above those before it.
-function nameGuide(picture, axis, place, text, k) {
+// Their texts, over all lines: that of a line upwards is beside it, in the lowest row that no curve crosses there.
+function nameGuides(picture, guides, curves) {
   const { width, height, right, bottom } = SIZE;
-  const late = axis === "y" || place > width / 2;
-  const at = axis === "x" ? { x: place + (late ? -5 : 5), y: height - bottom - 6 - 16 * k } : { x: width - right - 4, y: place - 5 };
-  picture.append(svg("text", { class: "axis over", ...at, "text-anchor": late ? "end" : "start" }, text));
+  const taken = new Set();
+  for (const [axis, place, text] of guides) {
+    const late = axis === "y" || place > width / 2;
+    const at = { x: width - right - 4, y: place - 5 };
+    if (axis === "x") {
+      const far = 5 + LETTER * text.length;
+      at.x = place + (late ? -5 : 5);
+      at.y = freeRow(late ? [place - far, place] : [place, place + far], curves, taken) ?? height - bottom - 6 - LINE * taken.size;
+      taken.add(at.y);
+    }
+    picture.append(svg("text", { class: "axis over", ...at, "text-anchor": late ? "end" : "start" }, text));
+  }
+}
+
+// The foot of the lowest row of text from x `from` to `to` that is not taken and that no curve crosses.
+function freeRow([from, to], curves, taken) {
+  const { height, top, bottom } = SIZE;
+  const crossed = curves.flatMap((points) => points.slice(1).map((end, j) => heights(points[j], end, from, to))).filter((each) => each);
+  const rows = Array.from({ length: Math.floor((height - top - bottom) / LINE) }, (_, k) => height - bottom - 6 - LINE * k);
+  return rows.find((row) => !taken.has(row) && crossed.every(([low, high]) => high < row - LINE || low > row + 6));
+}
+
+// Least and largest y of a line from a to b between x `from` and `to`; null where it does not come.
+function heights(a, b, from, to) {
+  const [[x1, y1], [x2, y2]] = a[0] <= b[0] ? [a, b] : [b, a];
+  if (!(x2 >= from && x1 <= to) || !Number.isFinite(y1 + y2)) return null;
+  const at = (x) => x2 > x1 ? y1 + (y2 - y1) * (Math.max(x1, Math.min(x2, x)) - x1) / (x2 - x1) : y1;
+  const ends = x2 > x1 ? [at(from), at(to)] : [y1, y2];
+  return [Math.min(...ends), Math.max(...ends)];
 }
 
 // The lower a curve lies, the wider are its line and its marks, so that those that coincide stay visible under each other.

@@ -72,9 +72,12 @@ def test_an_axis_of_counts_has_ticks_at_whole_numbers(page: Page, values: list[f
     assert all(tick == int(tick) for tick in ticks) is whole
 
 
+@pytest.mark.parametrize("width", [1280, 400])
 @pytest.mark.parametrize("largest", [1.0, 0.00123, 0.0000251, 12345.0])
-def test_the_title_of_an_axis_touches_none_of_its_numbers(page: Page, largest: float):
-    """However long these are; and it stays in the picture."""
+def test_the_title_of_an_axis_touches_none_of_its_numbers(page: Page, largest: float, width: int):
+    """However long these are, also in the larger letters of a narrow page; and it stays in the
+    picture."""
+    page.set_viewport_size({"width": width, "height": 1800})
     page.evaluate(
         "high => document.querySelector('.curves').append(drawChart({title: 'long numbers',"
         " x: 'time in s', y: 'm', log: '', guides: [],"
@@ -93,3 +96,55 @@ def test_the_title_of_an_axis_touches_none_of_its_numbers(page: Page, largest: f
 
     assert picture <= title["left"]
     assert title["right"] < number
+
+
+@pytest.mark.parametrize(
+    ("height", "lowest"),
+    [pytest.param(0.0, False, id="curve at the foot"), pytest.param(1.0, True, id="at the top")],
+)
+def test_the_text_of_a_guide_lies_on_no_curve(page: Page, height: float, lowest: bool):
+    """It stands in the lowest row, or above where a curve runs through that."""
+    page.set_viewport_size({"width": 1280, "height": 1800})
+    page.evaluate(
+        "height => document.querySelector('.curves').append(drawChart({title: 'guide', x: 's',"
+        " y: 'm', log: '', guides: [['x', 0.4, 'here']], curves: [{name: 'truth', x: [0, 1],"
+        " y: [height, height]}, {name: 'truth', x: [0, 0], y: [0, 1]}]}))",
+        height,
+    )
+    text, curve, foot = page.evaluate(
+        """() => {
+          const picture = [...document.querySelectorAll('figure svg')].at(-1);
+          const box = (one) => one.getBoundingClientRect();
+          return [box(picture.querySelector('.over')), box(picture.querySelector('.curve')),
+            box(picture.querySelector('.guide')).bottom];
+        }"""
+    )
+
+    assert text["bottom"] < curve["top"] or text["top"] > curve["bottom"]
+    assert (foot - text["bottom"] < text["height"] / 2) is lowest
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+def test_a_name_in_the_table_of_facts_is_clear_of_its_value(page: Page, width: int):
+    """Also the longest name, beside a value that takes several lines, and in a slider's label."""
+    page.set_viewport_size({"width": width, "height": 1800})
+    gaps = page.evaluate(
+        """() => {
+          const drawn = (one) => {
+            const range = document.createRange();
+            range.selectNodeContents(one);
+            return range.getBoundingClientRect();
+          };
+          const value = "works at 2, and fails at 2.089 or more in every scene of the search";
+          const line = row("tr", ["th", "event_driven:float64"], ["td", value]);
+          document.querySelector(".facts-table tbody").append(line);
+          const gap = drawn(line.lastChild).left - drawn(line.firstChild).right;
+          line.remove();
+          const sliders = [...document.querySelectorAll(".sliders label")];
+          return [gap, ...sliders.map((label) =>
+            drawn(label.querySelector("output")).left - drawn(label.firstChild).right)];
+        }"""
+    )
+
+    assert len(gaps) > 1
+    assert min(gaps) > 8, gaps
