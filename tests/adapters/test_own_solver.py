@@ -24,7 +24,9 @@ from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 
 
-@pytest.mark.parametrize("name", ["plain.js", "plain.py", "arrays.py"])
+@pytest.mark.parametrize(
+    "name", ["plain.js", "plain.py", pytest.param("arrays.py", marks=pytest.mark.slow)]
+)
 def test_a_file_plays_as_an_engine(name: str):
     """A right file makes of the ship's flight what the reference makes of it, to rounding, in every
     language."""

@@ -81,7 +81,9 @@ def test_the_note_names_the_steps_at_which_it_happens():
     assert off_grid_note(thrown(0.2, 0.6)) == ""
 
 
-@pytest.mark.parametrize(("stop", "noted"), [(0.55, True), (0.6, False)])
+@pytest.mark.parametrize(
+    ("stop", "noted"), [(0.55, True), pytest.param(0.6, False, marks=pytest.mark.slow)]
+)
 def test_the_page_and_the_terminal_say_so(tmp_path: Path, stop: float, noted: bool):
     """With the scene; a scene on the grid has no such remark."""
     (tmp_path / "thrown.toml").write_text(scene_text(thrown(0.2, stop)))

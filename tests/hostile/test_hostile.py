@@ -81,12 +81,12 @@ def found(request: pytest.FixtureRequest) -> dict[Key, Outcome]:
     return {key: outcome for key, outcome, _ in play_all(keys)}
 
 
-# Every 50th is for the gate: some of each family.
+# Every 80th is for the gate: some of each family.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "key",
     [
-        pytest.param(key, marks=[pytest.mark.long] if k % 50 else [], id=": ".join(key))
+        pytest.param(key, marks=[pytest.mark.long] if k % 80 else [], id=": ".join(key))
         for k, key in enumerate(ALL)
     ],
 )

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 SCENE = """
 import sys, numpy as np
 from reference_impl import exercise, lesson, neighbours, ordered
@@ -33,6 +35,7 @@ for solver, side, steps in SOLVERS:
 """
 
 
+@pytest.mark.slow
 def test_plain_python_gives_the_same_bits_as_the_compiled_solver():
     """A crowd with collisions, two walls, gravity, wrap, spin, forces and a static disk, through
     every variant."""

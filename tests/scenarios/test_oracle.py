@@ -96,7 +96,7 @@ def test_it_finds_what_the_closed_form_says(name: str):
     )
 
 
-@pytest.mark.parametrize("name", RANDOM)
+@pytest.mark.parametrize("name", [pytest.param("asteroids", marks=pytest.mark.slow), *RANDOM[1:]])
 def test_the_random_scenes_are_answered_to_their_end(name: str, records: dict[str, TruthRecord]):
     """No reason to stop, no overlap at any sample, as many collisions as ever."""
     one, record = scenario(name), records[name]

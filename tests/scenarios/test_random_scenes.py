@@ -95,6 +95,7 @@ def test_a_few_random_scenes_end_played_or_refused_by_name():
     sweep(random_scenarios(FAST))
 
 
+@pytest.mark.slow
 def test_a_few_random_scenes_are_as_the_exact_answer_has_them():
     """Up to its horizon, in whatever corner they come to rest."""
     agree(random_scenarios(2 * len(LAYOUTS)))

@@ -48,9 +48,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-# A process of its own loads for seconds what this one has; that it ends the same is for the slow
-# test.
-@pytest.fixture(scope="module", params=[crosscheck, pytest.param(process, marks=pytest.mark.slow)])
+# A process of its own loads for seconds what this one has; that it ends the same is for the long
+# run.
+@pytest.fixture(scope="module", params=[crosscheck, pytest.param(process, marks=pytest.mark.long)])
 def checked(
     request: pytest.FixtureRequest, folder: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Any, Any, Path]:
@@ -95,7 +95,7 @@ def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_lin
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", [80, 40])
+@pytest.mark.parametrize("columns", [pytest.param(80, marks=pytest.mark.long), 40])
 def test_a_check_of_one_file_says_what_it_does_meanwhile(folder: Path, columns: int):
     """It takes seconds: the file, then the search for a scene; gone at the end, and in a pipe."""
     words = ("check", "ben/Exercise.js", "--page", "p.html")

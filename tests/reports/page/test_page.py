@@ -96,7 +96,12 @@ def test_the_replay_moves_disks(page: Page) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [HEAD_ON, *(pytest.param(name, marks=pytest.mark.slow) for name in (ORBIT, ASTEROIDS))]
+    "name",
+    [
+        HEAD_ON,
+        pytest.param(ORBIT, marks=pytest.mark.slow),
+        pytest.param(ASTEROIDS, marks=pytest.mark.long),
+    ],
 )
 def test_the_replay_shows_the_trajectory(
     page: Page, comparisons: list[Comparison], name: str

@@ -216,7 +216,7 @@ def test_a_solver_that_is_stopped_is_not_said_to_be_in_a_line_of_this_program(tm
     assert not ended.outside
 
 
-@pytest.mark.parametrize("name", ["UPPER.PY", pytest.param("Mixed.Py", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["UPPER.PY", pytest.param("Mixed.Py", marks=pytest.mark.long)])
 def test_a_solver_may_be_called_in_capitals(tmp_path: Path, name: str):
     """As `check` takes it: no engine of that name is looked for."""
     (tmp_path / name).write_text("nonsense(")

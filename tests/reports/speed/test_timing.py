@@ -134,6 +134,7 @@ def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_tak
     assert np.isnan(sizes.exponent(n[:3], n[:3])).all()
 
 
+@pytest.mark.slow
 def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
     """A gas that loses energy falls asleep, so whoever took more steps of it would look cheaper."""
     ages: list[int] = []

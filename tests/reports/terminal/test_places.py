@@ -54,12 +54,12 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
             REFUSED + "Broken pipe",
             marks=pytest.mark.slow,
         ),
-        pytest.param("$C list engines >/dev/null", 0, "", marks=pytest.mark.slow),
+        pytest.param("$C list engines >/dev/null", 0, "", marks=pytest.mark.long),
         pytest.param(
-            "$C list nothing >&-", 2, "list 'nothing' is not known", marks=pytest.mark.slow
+            "$C list nothing >&-", 2, "list 'nothing' is not known", marks=pytest.mark.long
         ),
         pytest.param("$C list nothing 2>&-", 2, "", marks=pytest.mark.slow),
-        pytest.param("$C list nothing 2>/dev/full", 2, "", marks=pytest.mark.slow),
+        pytest.param("$C list nothing 2>/dev/full", 2, "", marks=pytest.mark.long),
         ("$C list engines <&- >&- 2>&-", 1, ""),
         ("PYTHONOPTIMIZE=2 $C list engines", 2, "PYTHONOPTIMIZE=2"),
     ],

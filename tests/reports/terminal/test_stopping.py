@@ -143,7 +143,15 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", BOTH)
 @pytest.mark.parametrize(
-    "words", [["run"], ["list"], ["diff", "done", "done"], ["report", "done"], ["check", SOLVERS]]
+    "words",
+    [
+        ["run"],
+        ["check", SOLVERS],
+        *(
+            pytest.param(words, marks=pytest.mark.long)
+            for words in (["list"], ["diff", "done", "done"], ["report", "done"])
+        ),
+    ],
 )
 @pytest.mark.parametrize(
     "after", [1.0, *(pytest.param(after, marks=pytest.mark.long) for after in (0.3, 2.0))]

@@ -69,7 +69,12 @@ def assert_fits(columns: int, *words: str | Path, cwd: Path) -> None:
 
 @pytest.mark.parametrize(
     ("columns", "words"),
-    [(80, ("--help",)), (80, ("run", "--help")), (80, ("list",)), (40, ("list",))],
+    [
+        (80, ("--help",)),
+        pytest.param(80, ("run", "--help"), marks=pytest.mark.slow),
+        pytest.param(80, ("list",), marks=pytest.mark.slow),
+        (40, ("list",)),
+    ],
 )
 def test_what_is_printed_at_once_fits_its_terminal(words: tuple, columns: int, tmp_path: Path):
     """On a pseudo-terminal."""
