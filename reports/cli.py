@@ -275,7 +275,9 @@ def check(
     page: Annotated[
         Path | None,
         typer.Option(
-            metavar="PATH", parser=place, help="Where to write the page.  [default: check.html]"
+            metavar="PATH",
+            parser=place,
+            help="Where to write the page of the file, or of the class.  [default: check.html]",
         ),
     ] = None,
     formats: Annotated[

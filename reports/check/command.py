@@ -7,7 +7,7 @@ import os
 import re
 import sys
 from collections import Counter
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -74,8 +74,6 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     single = any(FORMATS[one.format].single for one in outputs)
     files = submission_of(path) if single else files_of(path)
     several = path.is_dir() and not single
-    if page is not None and several:
-        refuse([f"--page {page}: shows one file; {path} is a folder"])
     if page is None and not path.is_dir() and all(one.option == "--junit" for one in outputs):
         page = Path("check.html")
     places_for(page, outputs)
@@ -94,7 +92,9 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     for one in outputs:
         if one.path is not None:
             write(one, FORMATS[one.format].text(marked))
-    if page is not None:
+    if page is not None and several:
+        make_class_page(page, marked)
+    elif page is not None:
         scenes = scenes_of(checks[0])
         if scenes and printed == ["table"]:
             print_scene(scenes, page)
@@ -300,11 +300,23 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
 
 
 def make_page(path: Path, one: FileCheck, scenes: Sequence[Smallest]) -> None:
-    """Write the page."""
+    """Write the page of a file."""
     from reports.check.page import write_page
 
+    put_page(path, partial(write_page, path, one, scenes))
+
+
+def make_class_page(path: Path, marked: Sequence[Marked]) -> None:
+    """Write the page of a class."""
+    from reports.check.class_page import write_class_page
+
+    put_page(path, partial(write_class_page, path, marked))
+
+
+def put_page(path: Path, put: Callable[[], None]) -> None:
+    """Write a page and say where it is; exits 2 if that is not possible."""
     try:
-        write_page(path, one, scenes)
+        put()
     except OSError as fault:
         say(f"--page {path}: {fault.strerror or fault}; name another file")
         sys.exit(BAD_INPUT)

@@ -150,7 +150,6 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
             ["anna/Exercise.js", "--page", "class.txt"],
             "class.txt: exists and is no page of a check; name another file",
         ),
-        ([".", "--page", "p.html"], "--page p.html: shows one file"),
         (
             ["anna/Exercise.js", "--page", "no/x.html"],
             "--page no/x.html: No such file or directory; name another file",
