@@ -325,6 +325,10 @@ def check(
             help="Whether marks of a student name likely causes, or only wrong answers.",
         ),
     ] = "full",
+    scaffold: Annotated[
+        str,
+        typer.Option(metavar="gradescope", help="Write an autograder to DIR, and check nothing."),
+    ] = "",
 ) -> None:
     """Check a hand-written solver of the exercise.
 
@@ -337,6 +341,11 @@ def check(
     from reports.check.command import grading_of, outputs_of
 
     grading = grading_of(points, id_pattern, hints)
+    if scaffold:
+        from reports.check.scaffold import write_scaffold
+
+        write_scaffold(scaffold, path, points, hints)
+        return
     check_and_say(path, page, outputs_of(as_json, junit, formats or [], outs or []), grading)
 
 
