@@ -293,20 +293,78 @@ def check(
     page: Annotated[
         Path | None,
         typer.Option(
-            metavar="PATH", parser=place, help="Where to write the page.  [default: check.html]"
+            metavar="PATH",
+            parser=place,
+            help="Where to write the page of the file, or of the class.  [default: check.html]",
         ),
     ] = None,
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="NAME",
+            help=(
+                "Write the marks as table, json, junit, gradescope, prairielearn, classroom or csv."
+                " Repeatable, each with its --out."
+            ),
+        ),
+    ] = None,
+    outs: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--out",
+            metavar="PATH",
+            parser=place,
+            help="Where the --format goes.  [default: printed]",
+        ),
+    ] = None,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TASKS.toml",
+            parser=place,
+            help="Points of each task or question.  [default: 20 for the two tasks]",
+        ),
+    ] = None,
+    id_pattern: Annotated[
+        str,
+        typer.Option(
+            metavar="REGEX",
+            help=(
+                "What of the path is the student's id: the match, or its first group."
+                "  [default: name of the folder or file]"
+            ),
+        ),
+    ] = "",
+    hints: Annotated[
+        str,
+        typer.Option(
+            metavar="full|low",
+            help="Whether marks of a student name likely causes, or only wrong answers.",
+        ),
+    ] = "full",
+    scaffold: Annotated[
+        str,
+        typer.Option(metavar="gradescope", help="Write an autograder to DIR, and check nothing."),
+    ] = "",
 ) -> None:
     """Check a hand-written solver of the exercise.
 
-    Says what is right, what is wrong, and what likely causes each fault.
+    Says what is right, what is wrong, and what likely causes each fault, and gives points.
 
     A solver.py runs with all your permissions. It may import installed packages, and modules beside
     it that are not named like one of those.
     """
     from reports.check.command import check as check_and_say
+    from reports.check.command import grading_of, outputs_of
 
-    check_and_say(path, as_json, junit, page)
+    grading = grading_of(points, id_pattern, hints)
+    if scaffold:
+        from reports.check.scaffold import write_scaffold
+
+        write_scaffold(scaffold, path, points, hints)
+        return
+    check_and_say(path, page, outputs_of(as_json, junit, formats or [], outs or []), grading)
 
 
 @app.command()

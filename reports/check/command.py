@@ -1,28 +1,34 @@
-"""`crosscheck check`: one file or a folder of them, as a table, a page, JSON or JUnit."""
+"""`crosscheck check`: one file or a folder of them, as a table, a page, or a format of formats/."""
 
 from __future__ import annotations
 
 import errno
-import json
 import os
+import re
 import sys
-from collections.abc import Hashable, Sequence
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling, printable
 from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess
+from reports.check.formats.formats import FORMATS
+from reports.check.formats.table import show
 from reports.check.functions import keeps_state
-from reports.check.machine import as_json, as_junit
+from reports.check.marks import Marked, id_of, place_of
+from reports.check.points import DEFAULT, BadPoints, Points, read_points
 from reports.check.rows import CheckRow
-from reports.check.terminal import print_class, print_file, print_scene
-from reports.check.verdict import FileCheck, check_file, nothing_in
-from reports.run.made import may_overwrite, sealed
+from reports.check.terminal import print_scene
+from reports.check.verdict import FileCheck, check_file, named, nothing_in
+from reports.run.made import may_overwrite
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
+from reports.terminal.console import Console
+from reports.terminal.counts import counted
 from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
@@ -30,40 +36,139 @@ from reports.terminal.progress import Progress
 if TYPE_CHECKING:
     from reports.check.smallest import Smallest
 
-# What an earlier file of ours begins with, and nothing else does: it may be written over.
-PAGE, JUNIT = (
-    b'<meta name="generator" content="crosscheck check">',
-    b'<testsuites name="crosscheck check"',
-)
+# What an earlier page of ours begins with, and nothing else does: it may be written over.
+PAGE = b'<meta name="generator" content="crosscheck check">'
 CHECKING = 600.0  # s that a file may take: what each of its calls may take adds up to less
 # how the names of files and folders begin that no student wrote
 NOBODYS = (".", "__", "node_modules")
 
 
-def check(path: Path, json_wanted: bool, junit: Path | None, page: Path | None) -> None:
+# the name that the exercise gives the file, and ours
+EXPECTED = ("exercise.js", "solver.py")
+# What students hand in instead of a file, and nobody keeps beside a class.
+HANDED_IN = (
+    *(".zip", ".rar", ".7z", ".tar", ".gz", ".tgz", ".bz2", ".xz"),
+    *(".pdf", ".doc", ".docx", ".odt", ".rtf", ".ipynb", ".ts"),
+)
+
+
+class Output(NamedTuple):
+    """What is written: the option that asks for it, its format, and where; None: printed."""
+
+    option: str
+    format: str
+    path: Path | None
+
+
+class Grading(NamedTuple):
+    """How a check becomes marks: points, how ids are read, whether causes are left out."""
+
+    points: Points
+    id_pattern: re.Pattern[str] | None
+    low: bool
+
+
+def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Grading) -> None:
     """Check what is at `path` and say it; exits 0, 1 (a fault was found) or 2 (there is nothing to
     check)."""
-    files = files_of(path)
-    if page is not None and path.is_dir():
-        refuse([f"--page {page}: shows one file; {path} is a folder"])
-    if page is None and not path.is_dir() and not json_wanted:
+    single = any(FORMATS[one.format].single for one in outputs)
+    files = submission_of(path) if single else files_of(path)
+    several = path.is_dir() and not single
+    if page is None and not path.is_dir() and all(one.option == "--junit" for one in outputs):
         page = Path("check.html")
-    places_for(page, junit)
-    checks = checked(files)
-    if not path.is_dir() and checks[0].refused:
+    places_for(page, outputs)
+    checks = [one_of_several(path)] if single and files[0].is_dir() else checked(files)
+    if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
-    if json_wanted:
-        print(json.dumps(as_json(checks), indent=2, allow_nan=False))
+    marked = marks_of(path, checks, grading)
+    printed = [one.format for one in outputs if one.path is None] or ["table"]
+    if printed == ["table"]:
+        show(marked)
+        if several and (left := others_in(path, files)):
+            said = f"No .js and no .py file, so not read: {named(left)}."
+            Console().print(said, highlight=False)
     else:
-        print_class(path, checks, others_in(path)) if path.is_dir() else print_file(checks[0])
-    if junit is not None:
-        write(junit, as_junit(checks))
-    if page is not None:
+        sys.stdout.write(FORMATS[printed[0]].text(marked))
+    for one in outputs:
+        if one.path is not None:
+            write(one, FORMATS[one.format].text(marked))
+    if page is not None and several:
+        make_class_page(page, marked)
+    elif page is not None:
         scenes = scenes_of(checks[0])
-        if scenes and not json_wanted:
+        if scenes and printed == ["table"]:
             print_scene(scenes, page)
         make_page(page, checks[0], scenes)
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
+
+
+def outputs_of(
+    as_json: bool, junit: Path | None, formats: Sequence[str], outs: Sequence[Path]
+) -> list[Output]:
+    """What is to be written; each --format goes to the --out of the same place, a single one
+    without --out is printed. Exits 2 if that makes no sense."""
+    for name in formats:
+        if name not in FORMATS:
+            refuse([f"--format {name}: is none of {', '.join(FORMATS)}"])
+    if len(outs) != len(formats) and (outs or len(formats) > 1):
+        given = f"{counted(len(formats), 'time')}, --out {counted(len(outs), 'time')}"
+        refuse([f"--format is given {given}; give each --format an --out"])
+    places: list[Path | None] = [*outs] or [None] * len(formats)
+    found = [Output("--json", "json", None)] * as_json
+    found += [Output("--junit", "junit", junit)] * (junit is not None)
+    found += [Output("--out", name, place) for name, place in zip(formats, places)]
+    if sum(one.path is None for one in found) > 1:
+        refuse(["--json and --format: one of them can be printed; give --format an --out"])
+    return found
+
+
+def grading_of(points: Path | None, id_pattern: str, hints: str) -> Grading:
+    """How marks are given; exits 2 if that makes no sense."""
+    if hints not in HINTS:
+        refuse([f"--hints {hints}: is none of {', '.join(HINTS)}"])
+    try:
+        pattern = re.compile(id_pattern) if id_pattern else None
+        return Grading(read_points(points or DEFAULT), pattern, hints == "low")
+    except BadPoints as fault:
+        refuse([f"--points {fault}"])
+    except re.error as fault:
+        refuse([f"--id-pattern {id_pattern}: is no regular expression: {fault}"])
+
+
+HINTS = ("full", "low")
+
+
+def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[Marked]:
+    """The marks of each file; says on standard error where an id is not sure to be one."""
+    pattern, within = grading.id_pattern, [one.path for one in checks]
+    ids = [id_of(file, path, pattern) for file in within]
+    if pattern is not None:
+        odd = [str(file) for file in within if not pattern.search(place_of(file, path))]
+        if odd:
+            say(f"--id-pattern does not match {named(odd)}: its folder or file name is the id")
+    if twice := [name for name, times in Counter(ids).items() if times > 1]:
+        say(f"the same id for several files: {named(twice)}")
+    return [Marked(name, one, path, grading.points, grading.low) for name, one in zip(ids, checks)]
+
+
+def submission_of(path: Path) -> list[Path]:
+    """The solver of one student: `path`, or the one in that folder; among several the one that is
+    named as the exercise says. The folder itself if that leaves none, or several."""
+    if not path.is_dir():
+        return files_of(path)
+    found = solvers_below(path)
+    named_so = [file for file in found if file.name.lower() in EXPECTED]
+    chosen = named_so if len(named_so) == 1 else found
+    return chosen if len(chosen) == 1 else [path]
+
+
+def one_of_several(folder: Path) -> FileCheck:
+    """What is said of a submission without a solver, or with several."""
+    files = [place_of(file, folder) for file in solvers_below(folder)]
+    if not files:
+        return check_file(folder)
+    why = f"holds {len(files)} solvers: {named(files)}; hand in one, named Exercise.js or solver.py"
+    return FileCheck(folder, [], f"{folder}: {why}")
 
 
 def files_of(path: Path) -> list[Path]:
@@ -80,57 +185,83 @@ def files_of(path: Path) -> list[Path]:
         refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
     if not path.is_dir():
         return [path]
-    theirs = [
-        one
-        for one in path.rglob("*")
-        if not any(p.startswith(NOBODYS) for p in one.relative_to(path).parts)
-    ]
-    found = sorted(
-        file
-        for file in theirs
-        if file.suffix.lower() in KINDS
-        and (file.is_file() or dangling(file))
-        and not is_handed_out(file)
-    )
+    found = solvers_below(path)
     if not found:
         refuse([f"{path}: {nothing_in(path)}"])
     owners = {file.relative_to(path).parts[0] for file in found}
-    empty = [
-        one for one in theirs if one.parent == path and one.is_dir() and one.name not in owners
-    ]
     loose = sum(file.parent == path for file in found)
-    return found if 2 * loose >= len(found) else sorted(found + empty)
+    foldered = 2 * loose < len(found)
+    missing = [
+        one
+        for one in visible(path.iterdir())
+        if one.name not in owners
+        and (one.suffix.lower() in HANDED_IN if one.is_file() else is_missing(one, foldered))
+    ]
+    return sorted(found + missing)
 
 
-def others_in(folder: Path) -> list[str]:
-    """The names of what lies in the folder itself and can be no solver, such as an archive."""
+def solvers_below(folder: Path) -> list[Path]:
+    """The files that may be solvers, links to nothing too, in order of their names."""
+    return sorted(
+        file
+        for file in folder.rglob("*")
+        if not any(part.startswith(NOBODYS) for part in file.relative_to(folder).parts)
+        and file.suffix.lower() in KINDS
+        and (file.is_file() or dangling(file))
+        and not is_handed_out(file)
+    )
+
+
+def visible(paths: Iterable[Path]) -> list[Path]:
+    """Those that a person may have put there."""
+    return [path for path in paths if not path.name.startswith(NOBODYS)]
+
+
+def is_missing(path: Path, foldered: bool) -> bool:
+    """Whether a folder without a solver stands for a student: where most students have a folder,
+    or if it is empty or holds what is handed in by mistake."""
+    if not path.is_dir():
+        return False
+    inside = visible(path.rglob("*"))
+    return foldered or not inside or any(one.suffix.lower() in HANDED_IN for one in inside)
+
+
+def others_in(folder: Path, files: Sequence[Path]) -> list[str]:
+    """The names of what lies in the folder itself, can be no solver and has no row."""
     return sorted(
         one.name
-        for one in folder.iterdir()
-        if one.is_file() and one.suffix.lower() not in KINDS and not one.name.startswith(NOBODYS)
+        for one in visible(folder.iterdir())
+        if one.is_file() and one.suffix.lower() not in KINDS and one not in files
     )
 
 
-def places_for(page: Path | None, junit: Path | None) -> None:
+def places_for(page: Path | None, outputs: Sequence[Output]) -> None:
     """Exit 2, before anything is checked, if what is to be written has no place or would take
     somebody else's."""
-    if page is not None and junit is not None and os.path.realpath(page) == os.path.realpath(junit):
-        refuse([f"--junit {junit}: is where the page goes; name another file"])
-    marks = (
-        ("--page", page, PAGE, "page of a check"),
-        ("--junit", junit, JUNIT, "JUnit file of a check"),
-    )
-    for option, path, mark, what in marks:
+    taken = {} if page is None else {os.path.realpath(page): "is where the page goes"}
+    if page is not None:
+        place_for("--page", page, PAGE, "page of a check")
+    for option, name, path in outputs:
         if path is None:
             continue
-        try:
-            if path.is_dir():
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-            may_overwrite(path, mark, what, option)
-        except FolderTaken as fault:
-            refuse([str(fault)])
-        except OSError as fault:
-            refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
+        if why := taken.get(os.path.realpath(path)):
+            refuse([f"{option} {path}: {why}; name another file"])
+        taken[os.path.realpath(path)] = "is named twice"
+        kind = FORMATS[name]
+        what = "JUnit file of a check" if name == "junit" else f"{name} file of a check"
+        place_for(option, path, kind.mark, what, kind.sealed)
+
+
+def place_for(option: str, path: Path, mark: bytes, what: str, seals: bool = True) -> None:
+    """Exit 2 unless a file may be written there."""
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        may_overwrite(path, mark, what, option, seals)
+    except FolderTaken as fault:
+        refuse([str(fault)])
+    except OSError as fault:
+        refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
 
 
 def is_handed_out(file: Path) -> bool:
@@ -169,11 +300,23 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
 
 
 def make_page(path: Path, one: FileCheck, scenes: Sequence[Smallest]) -> None:
-    """Write the page."""
+    """Write the page of a file."""
     from reports.check.page import write_page
 
+    put_page(path, partial(write_page, path, one, scenes))
+
+
+def make_class_page(path: Path, marked: Sequence[Marked]) -> None:
+    """Write the page of a class."""
+    from reports.check.class_page import write_class_page
+
+    put_page(path, partial(write_class_page, path, marked))
+
+
+def put_page(path: Path, put: Callable[[], None]) -> None:
+    """Write a page and say where it is; exits 2 if that is not possible."""
     try:
-        write_page(path, one, scenes)
+        put()
     except OSError as fault:
         say(f"--page {path}: {fault.strerror or fault}; name another file")
         sys.exit(BAD_INPUT)
@@ -193,9 +336,11 @@ def scenes_here(
         return []
 
 
-def write(path: Path, text: str) -> None:
+def write(output: Output, text: str) -> None:
     """Write a file that was asked for; exits 2 if that is not possible."""
+    assert output.path is not None
     try:
-        put_text(path, sealed(text))
+        put_text(output.path, text)
     except OSError as fault:
-        refuse([f"--junit {path}: {fault.strerror or fault}; name a file that can be written"])
+        why = fault.strerror or fault
+        refuse([f"{output.option} {output.path}: {why}; name a file that can be written"])

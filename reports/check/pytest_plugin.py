@@ -75,7 +75,7 @@ class RowItem(pytest.Item):
         """The row in words, without a stack that is not the solver's."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))
-        from reports.check.machine import evidence
+        from reports.check.evidence import evidence
 
         likely = f"likely: {self.row.cause}"
         return "\n  ".join([self.row.asked, likely, *evidence(self.row)])

@@ -11,9 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from adapters.own_solver.file import printable
+from reports.check.outcomes import OUTCOMES
 from reports.check.rows import TASKS, CheckRow
 from reports.check.scene_words import faults_of, scene_lines, together
-from reports.check.verdict import FileCheck, headline, named, numbers_of
+from reports.check.verdict import FileCheck, headline, numbers_of
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
@@ -29,7 +30,6 @@ STYLE = {
     "free choice": "yellow",
     "not asked": "dim",
 }
-SHORT = {"right": "ok", "free choice": "ok", "fault": "FAULT", "follows": "<-", "not asked": "-"}
 LEGEND = (
     "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked:"
     " the file has no such part, or cannot be judged that far."
@@ -132,19 +132,19 @@ def elided(name: str, room: int) -> str:
     return f"{name[: max(room - end - 1, 1)]}…{name[-end:]}"
 
 
-def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]) -> None:
+def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     """A row a file, a verdict for every task; below, what the signs mean, of each the sentence to
-    begin with, and which are copies. `others`: the files that lie beside them and are no
-    solvers."""
+    begin with, and which are copies."""
     console = Console()
     widest = {
-        task: max(len(task), *(len(SHORT[one.tasks[task]]) for one in checks)) for task in TASKS
+        task: max(len(task), *(len(OUTCOMES[one.tasks[task]].short) for one in checks))
+        for task in TASKS
     }
     # beside all tasks, or on a narrow terminal beside some of them
     room = max(console.width // 2, console.width - sum(width + 1 for width in widest.values()))
     rows: list[list[str | Text]] = []
     for one in checks:
-        words = [Text(SHORT[word], STYLE[word]) for word in one.tasks.values()]
+        words = [Text(OUTCOMES[word].short, STYLE[word]) for word in one.tasks.values()]
         rows.append([elided(name_in(folder, one), room), *words])
     print_table(console, ["solver", *TASKS], rows, left=list(TASKS))
     console.print(f"\n{LEGEND}", highlight=False)
@@ -163,8 +163,6 @@ def print_class(folder: Path, checks: Sequence[FileCheck], others: Sequence[str]
         said = f"The same code, but for spaces and lines of comments: {', '.join(names)}."
         console.print(legible(said), highlight=False)
     console.print(total(checks), highlight=False)
-    if others:
-        console.print(f"No .js and no .py file, so not read: {named(others)}.", highlight=False)
     if any(one.faults for one in checks):
         console.print("crosscheck check FILE shows the lines and the numbers of one.")
 

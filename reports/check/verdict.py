@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 
 from adapters.own_engine.surface import is_engine
 from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
@@ -24,7 +25,7 @@ class FileCheck:
     """One file, its rows and the restitution its scenes have; or why it is no solver at all, and
     then no rows.
 
-    solver: the text that was checked; None if there is none.
+    solver: the text that was checked; None if there is none. seconds: that the check took.
     """
 
     path: Path
@@ -32,6 +33,7 @@ class FileCheck:
     refused: str = ""
     restitution: float | None = None
     solver: SolverText | None = None
+    seconds: float = 0.0
 
     @property
     def faults(self) -> list[CheckRow]:
@@ -52,6 +54,11 @@ class FileCheck:
     def passed(self) -> bool:
         """Whether no fault was found."""
         return not self.refused and not self.faults
+
+    @property
+    def loaded(self) -> bool:
+        """Whether anything beyond the file itself could be looked at."""
+        return any(row.task != "file" for row in self.rows)
 
     def of(self, task: str) -> list[CheckRow]:
         """The rows of a task."""
@@ -144,6 +151,12 @@ def task_title(task: str) -> str:
 
 def check_file(path: Path) -> FileCheck:
     """The check of one file, whatever it is; of a folder, that there is none."""
+    began = perf_counter()
+    return replace(check_of(path), seconds=perf_counter() - began)
+
+
+def check_of(path: Path) -> FileCheck:
+    """The check of one file, not timed."""
     if path.is_dir():
         return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:

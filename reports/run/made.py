@@ -235,9 +235,9 @@ def is_sealed(data: bytes) -> bool:
     return bool(seal) and data == encoded(sealed(text.decode(errors="replace")))
 
 
-def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
+def may_overwrite(path: Path, mark: bytes, what: str, option: str, seals: bool = True) -> None:
     """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or our own, which
-    nobody has changed.
+    nobody has changed, as far as its kind `seals` that.
 
     `OSError` if it cannot be looked into, or its folder is not there.
     """
@@ -248,7 +248,7 @@ def may_overwrite(path: Path, mark: bytes, what: str, option: str) -> None:
             if mark not in file.read(HEAD):
                 raise FolderTaken(f"{option} {path}: exists and is no {what}; name another file")
             file.seek(0)
-            if not is_sealed(file.read()):
+            if seals and not is_sealed(file.read()):
                 raise FolderTaken(
                     f"{option} {path}: is a {what} that was changed since; name another file, or"
                     " move it"

@@ -91,11 +91,19 @@ def test_copies_in_a_class_are_named_and_others_are_not(folder: Path):
 
 
 def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
-    """Where solvers lie side by side, a folder of pictures is no student."""
+    """Where solvers lie side by side, a folder of pictures is no student; an empty one, a zip and a
+    PDF stand for one."""
     shutil.copy(RIGHT, tmp_path / "anna.js")
-    (tmp_path / "pictures").mkdir()
+    for name in ("pictures", "empty", "zipped"):
+        (tmp_path / name).mkdir()
+    for name in ("pictures/ufo.png", "zipped/all.zip", "cem.pdf", "dora.ZIP", "marks.csv"):
+        (tmp_path / name).write_bytes(b"PK")
 
-    assert command.files_of(tmp_path) == [tmp_path / "anna.js"]
+    found = command.files_of(tmp_path)
+
+    assert [one.name for one in found] == ["anna.js", "cem.pdf", "dora.ZIP", "empty", "zipped"]
+    assert command.others_in(tmp_path, found) == ["marks.csv"]
+    assert check_file(tmp_path / "dora.ZIP").refused.endswith("a solver is a .js or a .py file")
 
 
 def test_one_loose_file_hides_no_folder_without_a_solver(tmp_path: Path):
@@ -115,13 +123,13 @@ def test_one_loose_file_hides_no_folder_without_a_solver(tmp_path: Path):
 
 
 def test_what_is_no_solver_is_named(tmp_path: Path):
-    """An archive beside the files, and what a student's folder holds instead; at most three."""
+    """A text beside the files, and what a student's folder holds instead; at most three."""
     shutil.copy(RIGHT, tmp_path / "anna.js")
-    for name in ("a.zip", "b.zip", "c.zip", "d.zip", ".hidden"):
+    for name in ("a.txt", "b.txt", "c.txt", "d.txt", ".hidden"):
         (tmp_path / name).write_text("")
 
-    assert command.others_in(tmp_path) == ["a.zip", "b.zip", "c.zip", "d.zip"]
-    assert named(command.others_in(tmp_path)) == "a.zip, b.zip, c.zip and 1 more"
+    assert command.others_in(tmp_path, []) == ["a.txt", "b.txt", "c.txt", "d.txt"]
+    assert named(command.others_in(tmp_path, [])) == "a.txt, b.txt, c.txt and 1 more"
     (tmp_path / "eva").mkdir()
     (tmp_path / "eva" / "report.pdf").write_text("")
     assert check_file(tmp_path / "eva").refused.endswith(

@@ -13,12 +13,13 @@ import pytest
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.consequences import with_consequences
+from reports.check.formats.questions_json import SCHEMA, as_json
 from reports.check.lines import Access, Source, accesses_of, part_of
-from reports.check.machine import SCHEMA, as_json
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
 from reports.check.rows import UNKNOWN, CheckRow
 from reports.check.verdict import FileCheck
 from tests.reports.check.confusion import judged
+from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT, HERE, MUTANTS
 
 CORRECT_FILES = HERE / "correct"
@@ -146,7 +147,7 @@ def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, F
     one = checks["two_overlap_and_b_sign.js"]
     text = one.solver.text.splitlines() if one.solver else []
     overlap, sign = one.findings
-    reported = as_json([one])
+    reported = as_json(marks_of(one))
     rows = {row["name"]: row for row in reported["files"][0]["rows"]}
 
     jsonschema.validate(reported, json.loads(SCHEMA.read_text()))
@@ -285,7 +286,7 @@ def test_what_follows_from_a_fault_in_another_task_is_no_fault_of_its_own(
     verdict is one of the schema; two faults remain two."""
     typo, root = consequences["typo_in_c.js"], consequences["root_missing.js"]
 
-    jsonschema.validate(as_json([typo, root]), json.loads(SCHEMA.read_text()))
+    jsonschema.validate(as_json(marks_of(typo, root)), json.loads(SCHEMA.read_text()))
     assert [task for task, word in typo.tasks.items() if word == "fault"] == ["2c"]
     assert typo.tasks["loop"] == "follows"
     assert [root.tasks[task] for task in ("2a", "2b", "2c", "scenes")] == ["fault"] + 3 * [

@@ -13,8 +13,9 @@ from adapters.own_solver import process as solver_process
 from adapters.own_solver.file import LONGEST, NotASolver, SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.system import Pieces
-from reports.check.machine import as_junit
+from reports.check.formats.junit import as_junit
 from reports.check.verdict import FileCheck
+from tests.reports.check.marked import marks_of
 from tests.reports.terminal.command_line import crosscheck
 
 FLOOD = "import os, sys\nwhile True:\n    os.write(1, b'x' * {size})\n"
@@ -99,7 +100,7 @@ def test_a_folder_that_is_called_as_a_solver_is_none(tmp_path):
 def test_junit_is_well_formed_for_a_file_with_control_characters_in_its_name(tmp_path):
     """As an attribute it is what XML can hold."""
     path = tmp_path / "my\x01\x1bsolver.py"
-    suites = ElementTree.fromstring(as_junit([FileCheck(path, [], "is no solver")]))
+    suites = ElementTree.fromstring(as_junit(marks_of(FileCheck(path, [], "is no solver"))))
 
     assert suites[0].get("name", "").endswith("my\ufffd\ufffdsolver.py")
     assert suites[0][0].get("classname") == "my\ufffd\ufffdsolver.py"

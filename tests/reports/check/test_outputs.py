@@ -3,6 +3,7 @@ file as an engine."""
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shutil
@@ -19,7 +20,7 @@ from playwright.sync_api import Browser
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check import command
-from reports.check.machine import SCHEMA
+from reports.check.formats.questions_json import SCHEMA
 from reports.check.rows import CheckRow
 from reports.check.smallest import Smallest, smallest_scene, smallest_scenes
 from reports.check.verdict import check_file
@@ -149,7 +150,6 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
             ["anna/Exercise.js", "--page", "class.txt"],
             "class.txt: exists and is no page of a check; name another file",
         ),
-        ([".", "--page", "p.html"], "--page p.html: shows one file"),
         (
             ["anna/Exercise.js", "--page", "no/x.html"],
             "--page no/x.html: No such file or directory; name another file",
@@ -170,6 +170,35 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
             ["anna/Exercise.js", "--junit", "./check.html"],
             "--junit check.html: is where the page goes",
         ),
+        (
+            [".", "--format", "xlsx"],
+            "--format xlsx: is none of table, json, junit, gradescope, prairielearn, classroom,",
+        ),
+        (
+            [".", "--format", "csv", "--format", "junit", "--out", "a"],
+            "--format is given 2 times, --out 1 time; give each --format an --out",
+        ),
+        ([".", "--out", "a.csv"], "--format is given 0 times, --out 1 time"),
+        ([".", "--json", "--format", "csv"], "one of them can be printed"),
+        (
+            [".", "--format", "csv", "--out", "a", "--format", "json", "--out", "./a"],
+            "--out a: is named twice; name another file",
+        ),
+        (
+            [".", "--format", "csv", "--out", "class.txt"],
+            "--out class.txt: exists and is no csv file of a check; name another file",
+        ),
+        (
+            ["anna", "--format", "gradescope", "--out", "anna/Exercise.js"],
+            "Exercise.js: exists and is no gradescope file of a check",
+        ),
+        ([".", "--format", "csv", "--out", "no/a.csv"], "--out no/a.csv: No such file"),
+        ([".", "--format", "csv", "--out", "empty"], "--out empty: Is a directory"),
+        ([".", "--points", "no.toml"], "--points no.toml: No such file or directory"),
+        ([".", "--points", "class.txt"], "--points class.txt: is not TOML"),
+        ([".", "--points", "empty"], "--points empty: Is a directory"),
+        ([".", "--id-pattern", "("], "--id-pattern (: is no regular expression: missing )"),
+        ([".", "--hints", "some"], "--hints some: is none of full, low"),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_2(folder: Path, words: list[str], message: str):
@@ -202,6 +231,43 @@ def test_a_junit_file_of_an_earlier_check_is_written_over_and_a_page_is_not(fold
 
     assert (first.returncode, again.returncode, other.returncode) == (1, 1, 2)
     assert ElementTree.parse(folder / "r.xml").getroot().get("name") == "crosscheck check"
+
+
+def test_marks_of_a_class_are_written_in_several_formats_at_once(folder: Path, tmp_path: Path):
+    """A row a student, the table printed, too; a second time over its own files."""
+    words = ["check", folder, "--format", "csv", "--out", "m.csv", "--format", "json"]
+    words += ["--out", "m.json", "--format", "table", "--out", "m.txt", "--id-pattern", "^a"]
+    for _ in range(2):
+        done = crosscheck(*words, cwd=tmp_path)
+    rows = list(csv.DictReader((tmp_path / "m.csv").open()))
+    handed_in = [row for row in rows if row["file"].endswith((".js", ".py"))]
+
+    assert done.returncode == 1
+    assert [row["id"] for row in handed_in] == ["a", "ben", "cem", "dora"]
+    assert [row["total"] for row in handed_in] == ["20", "17", "0", "0"]
+    assert "is not text" in handed_in[3]["first cause"]
+    assert [one["id"] for one in json.loads((tmp_path / "m.json").read_text())["files"]] == [
+        row["id"] for row in rows
+    ]
+    assert (tmp_path / "m.txt").read_text() == f"crosscheck check\n\n{done.stdout}"
+    assert "--id-pattern does not match" in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.csv", "m.json", "m.txt"]
+
+
+def test_a_submission_is_a_file_or_its_folder_and_is_always_answered(folder: Path):
+    """The file that is named as the exercise says; none, or several, is said to the student."""
+    (folder / "ben" / "old.js").write_text("x = 1\n")
+    (folder / "none").mkdir()
+    words = ("--format", "gradescope")
+    done = [crosscheck("check", name, *words, cwd=folder) for name in ("ben", "none", ".")]
+    (folder / "ben" / "old.js").unlink()
+    (folder / "none").rmdir()
+    ben, none, several = (json.loads(one.stdout) for one in done)
+
+    assert [one.returncode for one in done] == [1, 1, 1]
+    assert (ben["score"], ben["extra_data"]["id"]) == (17.0, "ben")
+    assert (none["score"], none["output"]) == (0.0, "holds no .js and no .py file")
+    assert several["output"].startswith("holds 5 solvers: anna/Exercise.js, ben/Exercise.js,")
 
 
 @pytest.mark.slow

@@ -1,0 +1,87 @@
+"""Writes the page of a class: points, common causes, and of each student what to begin with."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+from reports.check.marks import Marked, number
+from reports.check.page import GENERATOR
+from reports.check.rows import TASKS
+from reports.check.terminal import same_code
+from reports.check.verdict import headline
+from reports.page.documents import render
+from reports.run.made import sealed
+from reports.terminal.foreign_text import put_text
+
+BINS = 10  # of the distribution, each a tenth of the points
+
+
+NOTHING = "No file that can be checked."
+PLACE = re.compile(r" \(line \d+, column \d+\)")
+
+
+class Bar(NamedTuple):
+    """A bar of a chart: what it counts, how many students, its share of the longest, percent."""
+
+    label: str
+    students: int
+    length: float
+
+
+def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
+    """Write the page of a class to `path`, over whatever is there; raises `OSError`."""
+    root, checks = marked[0].root, [one.check for one in marked]
+    html = render(
+        "check/class.html.j2",
+        generator=GENERATOR,
+        scripts=["check/class.js"],
+        styles=["check/check.css", "check/class.css"],
+        name=root.resolve().name,
+        marked=marked,
+        tasks={task: TASKS[task] for task in TASKS if any(task in one.worth for one in marked)},
+        right=sum(one.check.passed for one in marked),
+        refused=sum(bool(one.check.refused) for one in marked),
+        points=bars(distribution(marked)),
+        causes=bars(causes(marked)),
+        copies=same_code(root, checks),
+        number=number,
+        version=version("crosscheck2d"),
+    )
+    put_text(path, sealed(html))
+
+
+def distribution(marked: Sequence[Marked]) -> dict[str, int]:
+    """How many students have how many points, in tenths of what there is; the last holds all of
+    them."""
+    most = marked[0].most
+    tenths = Counter(min(int(one.points / most * BINS), BINS - 1) for one in marked)
+    names = [f"{number(most * k / BINS)} to {number(most * (k + 1) / BINS)}" for k in range(BINS)]
+    return {name: tenths[k] for k, name in enumerate(names)}
+
+
+def causes(marked: Sequence[Marked]) -> dict[str, int]:
+    """How many students have each cause, the most common first, else in the order of the tasks."""
+    found = Counter[str]()
+    for one in marked:
+        found.update(set(causes_of(one)))
+    return dict(sorted(found.items(), key=lambda cause: (-cause[1], cause[0])))
+
+
+def causes_of(one: Marked) -> list[str]:
+    """The causes of one student, without numbers and places in the file."""
+    if one.check.refused:
+        return [NOTHING]
+    if not one.check.loaded:
+        return ["The file: it cannot be loaded, or fails as a whole."]
+    return [PLACE.sub("", headline(row)) for row in one.check.causes]
+
+
+def bars(counts: dict[str, int]) -> list[Bar]:
+    """Bars of these counts, in their order."""
+    longest = max(counts.values(), default=1) or 1
+    return [Bar(label, count, round(100 * count / longest, 1)) for label, count in counts.items()]

@@ -1,0 +1,202 @@
+"""What a check is worth: points task by task, and the id of the student."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+from reports.check.outcomes import OUTCOMES, Status
+from reports.check.points import Points
+from reports.check.rows import TASKS, UNKNOWN, CheckRow
+from reports.check.verdict import WITHOUT_NUMBERS, FileCheck, headline, numbers_of, task_title
+
+# Names of files that say nothing of who wrote them: then the folder does.
+ANYBODYS = ("exercise", "solver")
+
+
+class TaskMark(NamedTuple):
+    """The points of one task.
+
+    Attributes:
+        task: its key in `TASKS`.
+        status: the worst verdict of its questions.
+        points, most: what it gets, of how many.
+        not_judged: points of questions that could not be asked; they are not in `points`.
+    """
+
+    task: str
+    status: Status
+    points: float
+    most: float
+    not_judged: float
+
+    @property
+    def title(self) -> str:
+        """Its name."""
+        return task_title(self.task)
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A check with the student's id and the points.
+
+    root: the file or folder that was given; worth: what each question gives; low: whether feedback
+    leaves out causes, lines and formulas.
+    """
+
+    id: str
+    check: FileCheck
+    root: Path
+    worth: Points
+    low: bool = False
+
+    @cached_property
+    def tasks(self) -> list[TaskMark]:
+        """The marks of the tasks that give points, and of those that have a fault."""
+        found = self.check.tasks
+        return [
+            mark_of(self.check, task, self.worth.get(task, {}))
+            for task in TASKS
+            if self.worth.get(task) or found[task] == "fault"
+        ]
+
+    @property
+    def points(self) -> float:
+        """The sum of the tasks."""
+        return rounded(sum(mark.points for mark in self.tasks))
+
+    @property
+    def most(self) -> float:
+        """The points that a right solver gets."""
+        return rounded(sum(mark.most for mark in self.tasks))
+
+    @property
+    def not_judged(self) -> float:
+        """The points of all questions that could not be asked."""
+        return rounded(sum(mark.not_judged for mark in self.tasks))
+
+    @property
+    def status(self) -> Status:
+        """Of the whole file."""
+        if self.check.refused:
+            return "refused"
+        return "right" if self.check.passed else "fault"
+
+    @property
+    def brief(self) -> str:
+        """The sentence to begin with, without the file's path; "" of a file without a fault."""
+        if self.check.passed:
+            return ""
+        return self.check.brief.removeprefix(f"{self.check.path}: ")
+
+    @property
+    def summary(self) -> str:
+        """What a student reads above the tasks."""
+        if self.check.refused:
+            return self.brief
+        said = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
+        return f"{said} {number(self.points)} of {number(self.most)} points."
+
+    def feedback(self, task: str) -> list[str]:
+        """What a student reads of a task, a line each: faults with their numbers, what follows,
+        what was free, what could not be asked."""
+        if self.check.refused:
+            return [self.brief]
+        rows = self.check.of(task)
+        lines = [line for row in self.check.causes if row.task == task for line in self.of(row)]
+        lines += [f"{row.name}: {row.cause}; it costs nothing" for row in rows if follows(row)]
+        lines += [
+            f"{row.name}: free choice: {row.cause}" for row in rows if row.verdict == "free choice"
+        ]
+        lines += [
+            f"{row.name}: not asked: {row.cause}" for row in rows if row.verdict == "not asked"
+        ]
+        if not rows:
+            lines += ["not asked: the file could not be used", *self.of(self.check.faults[0])]
+        return lines
+
+    def of(self, row: CheckRow) -> list[str]:
+        """A fault for the student: question and numbers; unless `low` its likely cause, the lines
+        of the file and the exercise's formula, too."""
+        if self.low:
+            said = headline(row) if row.name in WITHOUT_NUMBERS else f"{row.name}: wrong answer."
+            return [" ".join([said, *numbers_of(row)])]
+        lines = [" ".join([headline(row), *numbers_of(row)])]
+        lines += [f"line {line}: {text}" for line, text in row.lines]
+        return lines + [f"exercise: {row.formula}"] * bool(row.formula)
+
+
+def follows(row: CheckRow) -> bool:
+    """Whether a row is wrong because of a fault elsewhere."""
+    return row.verdict == "follows"
+
+
+def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark:
+    """The mark of a task, whose questions give `worth` points each.
+
+    A question that could not be asked gives none. A cause costs once, the dearest of the questions
+    that it spoils; one that spoils only questions without points costs as much as the cheapest that
+    has some; a task that is not implemented, or fails, all. What follows from a fault costs
+    nothing.
+    """
+    most, rows = sum(worth.values()), check.of(task)
+    cheapest = min(filter(None, worth.values()), default=0.0)
+    costs: dict[str, float] = {}
+    for row in rows:
+        if OUTCOMES[row.verdict].points == "lost":
+            cost = most if row.name == "implemented" else worth.get(row.name) or cheapest
+            mistake = row.name if row.cause == UNKNOWN else row.cause
+            costs[mistake] = max(cost, costs.get(mistake, 0.0))
+    lost = min(most, sum(costs.values()))
+    unasked = sum(points for name, points in worth.items() if not asked(name, rows))
+    not_judged = min(unasked, most - lost)
+    status: Status = "refused" if check.refused else check.tasks[task]
+    return TaskMark(
+        task, status, rounded(most - lost - not_judged), rounded(most), rounded(not_judged)
+    )
+
+
+def asked(name: str, rows: Sequence[CheckRow]) -> bool:
+    """Whether a question was asked, of the rows of its task: one that has no row was not where
+    others of the task were not, either."""
+    verdicts = {row.name: row.verdict for row in rows}
+    if name in verdicts:
+        return OUTCOMES[verdicts[name]].points != "not judged"
+    return bool(rows) and "not asked" not in verdicts.values()
+
+
+def id_of(file: Path, root: Path, pattern: re.Pattern[str] | None = None) -> str:
+    """The id of the student whose `file`, or folder, was found at or below `root`.
+
+    It is what `pattern` matches in the path, or its first group; without a match the name of the
+    student's folder, or of the file; of an Exercise.js or solver.py in no folder of a student that
+    of the folder it is in.
+    """
+    if pattern is not None and (match := pattern.search(place_of(file, root))):
+        return match[1] if pattern.groups and match[1] is not None else match[0]
+    within = Path(place_of(file, root))
+    if len(within.parts) > 1:
+        return within.parts[0]
+    if file.stem.lower() in ANYBODYS and not file.is_dir():
+        return file.resolve().parent.name or file.stem
+    return within.name if file.is_dir() else within.stem
+
+
+def place_of(file: Path, root: Path) -> str:
+    """The path of a file below the folder that was given; of one that was given itself all of it,
+    from its own folder on."""
+    return "/".join(file.relative_to(root).parts) if file != root else file.resolve().name
+
+
+def rounded(points: float) -> float:
+    """Points without the last bits of their sum."""
+    return round(points, 6)
+
+
+def number(points: float) -> str:
+    """Points for people."""
+    return f"{points:.2f}".rstrip("0").rstrip(".")

@@ -1,0 +1,41 @@
+"""What a verdict means elsewhere: in points, in the table of a class, in JUnit, in the systems that
+keep marks. It is decided here only."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+from reports.check.rows import Verdict
+
+Status = Verdict | Literal["refused"]
+
+
+class Outcome(NamedTuple):
+    """What a status is elsewhere.
+
+    Attributes:
+        short: in the table of a class.
+        points: what becomes of the points of a question: "not judged" ones are not given.
+        junit: the element that a JUnit test case holds; "" for none.
+        gradescope: the status of a test of Gradescope.
+        classroom: the status of a test of GitHub Classroom.
+    """
+
+    short: str
+    points: Literal["given", "lost", "not judged"]
+    junit: str
+    gradescope: str
+    classroom: str
+
+
+OUTCOMES: dict[Status, Outcome] = {
+    "right": Outcome("ok", "given", "", "passed", "pass"),
+    "free choice": Outcome("ok", "given", "", "passed", "pass"),
+    # wrong because of a fault elsewhere, which has cost its points there
+    "follows": Outcome("<-", "given", "skipped", "passed", "pass"),
+    "fault": Outcome("FAULT", "lost", "failure", "failed", "fail"),
+    # nothing is known of it: a person may look
+    "not asked": Outcome("-", "not judged", "skipped", "failed", "error"),
+    # no solver at all
+    "refused": Outcome("-", "not judged", "error", "failed", "error"),
+}

@@ -1,0 +1,85 @@
+"""How many points each question of each task gives: tasks.toml, or the file that --points names."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from reports.check.rows import TASKS
+
+DEFAULT = Path(__file__).parent / "tasks.toml"
+# The questions that may have points, by task. "loop" and "scenes" have none by default: the
+# exercise hands out the step, and a scene is wrong only where a task is.
+QUESTIONS = {
+    "1": (
+        *("velocity", "position", "spin", "angle", "turns"),
+        *("coasting", "force kept", "sphere kept", "input only"),
+    ),
+    "2a": ("reach", "touch", "same centre", "input only"),
+    "2b": ("one point", "normal", "velocities", "split", "separating pair"),
+    "2c": (
+        *("impulse", "tangential part", "energy", "restitution"),
+        *("restitution at other speeds", "separating", "A and B exchanged"),
+    ),
+    "2d": ("velocity of A", "velocity of B", "momentum", "rest kept"),
+    "loop": ("all spheres", "pairs", "integration first", "edges in a step", "edges", "ufo"),
+    "scenes": ("forced", "head_on", "oblique", "row", "crowd", "first wrong collision"),
+}
+Points = Mapping[str, Mapping[str, float]]
+"""Task -> question -> points. A task that is not in it gives none."""
+
+
+class BadPoints(ValueError):
+    """A file of points that cannot be used; the message names it and says what to change."""
+
+
+def read_points(path: Path = DEFAULT) -> Points:
+    """The points of a file, tasks in the order of the exercise; raises `BadPoints`."""
+    try:
+        given = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise BadPoints(
+            f"{path}: {fault.strerror or fault}; name a file that can be read"
+        ) from None
+    except ValueError as fault:  # no TOML, or no UTF-8
+        raise BadPoints(f"{path}: is not TOML: {' '.join(str(fault).split())}") from None
+    if unknown := [task for task in given if task not in QUESTIONS]:
+        raise BadPoints(f"{path}: there is no task {unknown[0]!r}; tasks: {', '.join(QUESTIONS)}")
+    points = {task: of_task(path, task, given[task]) for task in TASKS if task in given}
+    if not sum(sum(questions.values()) for questions in points.values()):
+        raise BadPoints(f"{path}: gives no points at all")
+    return points
+
+
+def of_task(path: Path, task: str, given: Any) -> dict[str, float]:
+    """The points of the questions of a task: as they are given, or a number shared as by default.
+
+    Raises `BadPoints`.
+    """
+    if not isinstance(given, dict):
+        share = shares(task)
+        whole = amount(path, task, given)
+        return {name: whole * part / sum(share.values()) for name, part in share.items()}
+    for name in given:
+        if name not in QUESTIONS[task]:
+            known = ", ".join(QUESTIONS[task])
+            raise BadPoints(f"{path}: task {task} has no question {name!r}; questions: {known}")
+    return {name: amount(path, f"{task}, {name}", value) for name, value in given.items()}
+
+
+def shares(task: str) -> dict[str, float]:
+    """The points that the questions of a task have by default; the same for all where it has
+    none."""
+    given = tomllib.loads(DEFAULT.read_text(encoding="utf-8"))
+    return given.get(task) or dict.fromkeys(QUESTIONS[task], 1.0)
+
+
+def amount(path: Path, what: str, value: Any) -> float:
+    """A number of points; raises `BadPoints`."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not math.isfinite(value) or value < 0:
+        raise BadPoints(f"{path}: task {what}: {value!r} is no number of points, 0 or more")
+    return float(value)

@@ -1,0 +1,82 @@
+"""The page of a class, of checks that are made up here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from playwright.sync_api import Browser
+
+from adapters.own_solver.file import SolverText
+from reports.check.class_page import NOTHING, bars, causes, distribution, write_class_page
+from reports.check.marks import Marked
+from tests.reports.check.test_marks import HOSTILE, marked, row, students
+from tests.reports.page.browsing import opened, overhang
+
+SIGN = row("2d", "velocity of B", "fault", "B gets the sign of A")
+
+
+def test_each_cause_counts_a_student_once_and_each_student_has_one_bar():
+    """Also if the cause shows in several questions, and whatever cannot be loaded."""
+    twice = marked(SIGN, replace(SIGN, name="momentum"))
+
+    assert causes([twice, marked(SIGN), marked()]) == {
+        "Task 2d velocities: B gets the sign of A.": 2
+    }
+    assert sum(distribution(students()).values()) == len(students())
+    assert distribution([marked()])["18 to 20"] == 1
+    assert causes(students())[NOTHING] == 1
+    throws = row("1", "implemented", "fault", "x is not defined (line 6, column 7)")
+    assert list(causes([marked(throws)])) == ["Task 1 integrate: x is not defined."]
+    assert [bar.length for bar in bars({"a": 4, "b": 1, "c": 0})] == [100.0, 25.0, 0.0]
+
+
+def of_text(name: str, text: str) -> Marked:
+    """A right file of that text."""
+    one = marked(name=name)
+    solver = SolverText(one.check.path, "javascript", text, "0" * 16)
+    return replace(one, check=replace(one.check, solver=solver))
+
+
+def test_a_class_is_sorted_filtered_and_opens_offline(browser: Browser, tmp_path: Path):
+    """At two widths nothing overflows; no error, no request; what a student wrote is inert."""
+    script = marked(row("1", "velocity", "fault", "<script>alert(1)</script>"), name="<b>eve</b>")
+    group = [*students(), marked(SIGN, name="zoe"), script]
+    copies = [of_text("kim", "x = 1"), of_text("lou", "x  = 1"), of_text("max", "x = 2")]
+    write_class_page(tmp_path / "class.html", [*group, *copies])
+    page, heard = opened(
+        browser, (tmp_path / "class.html").as_uri(), viewport={"width": 1280, "height": 900}
+    )
+    ids = page.locator(".students tbody th:visible")
+    everybody = ids.count()
+    page.get_by_role("button", name="total").click()
+    totals = [float(x) for x in page.locator(".students tbody td:nth-child(2)").all_inner_texts()]
+    page.locator("#filter").fill("sign of a")
+    filtered = ids.all_inner_texts()
+    page.locator(".students details:visible summary").click()
+    opened_text = page.locator(".students details[open]").inner_text()
+    same = page.locator(".copies li").all_inner_texts()
+    wide = overhang(page)
+    page.set_viewport_size({"width": 400, "height": 800})
+    narrow = overhang(page)
+    page.context.close()
+
+    assert heard == []
+    assert everybody == len(group) + len(copies)
+    assert totals == sorted(totals)
+    assert filtered == ["zoe"]
+    assert "Came: 1 m. Expected: 2 m." in opened_text
+    assert same == ["kim/Exercise.js, lou/Exercise.js"]
+    assert (wide <= 0, narrow <= 0) == (True, True)
+    assert "<script>alert" not in (tmp_path / "class.html").read_text()
+
+
+def test_a_page_of_two_hundred_is_small_and_quick(tmp_path: Path):
+    """8 MB and a second: of the 40 s that a class may take the checks need nearly all."""
+    loud = [marked(SIGN, row("1", "spin", "fault", HOSTILE), name=f"s{k}") for k in range(200)]
+    began = perf_counter()
+    write_class_page(tmp_path / "class.html", loud)
+
+    assert perf_counter() - began < 5.0  # some 0.2 s; a busy machine takes longer
+    assert (tmp_path / "class.html").stat().st_size < 8e6
