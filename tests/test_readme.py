@@ -72,6 +72,7 @@ WRITTEN = {
     "solver.py",
     "made.json",
     "random.py",
+    "marks.csv",
 }
 BIN = Path(sys.executable).parent
 

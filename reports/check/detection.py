@@ -130,13 +130,13 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
         cause = "the distance is not the one between the centres: positions are added or mixed up"
     if not wrong:
         return judged(
-            "reach", "2a", ASKED, "the pairs that overlap", "the pairs that overlap", True
+            "overlap", "2a", ASKED, "the pairs that overlap", "the pairs that overlap", True
         )
     (dx, dy, ra, rb), was = wrong[0]
     case = f"sizes {shown(ra)} and {shown(rb)} m at a distance of {shown(np.hypot(dx, dy))} m"
     got, expected = ("collide", "do not collide") if was else ("do not collide", "collide")
     return judged(
-        "reach",
+        "overlap",
         "2a",
         ASKED,
         f"{case}: {got} ({len(wrong)} of {len(seen)} pairs wrong)",
@@ -172,7 +172,7 @@ def touch(answer: Answer) -> CheckRow:
     sign = "<=" if reacts else "<"
     said = f"the comparison is the one with {sign}"
     got = "yes" if reacts else "no"
-    return CheckRow("touch", "2a", asked, got, "yes or no", "free choice", said)
+    return CheckRow("just touching", "2a", asked, got, "yes or no", "free choice", said)
 
 
 def same_centre(answer: Answer) -> CheckRow:

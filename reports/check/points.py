@@ -18,8 +18,8 @@ QUESTIONS = {
         *("velocity", "position", "spin", "angle", "turns"),
         *("coasting", "force kept", "sphere kept", "input only"),
     ),
-    "2a": ("reach", "touch", "same centre", "input only"),
-    "2b": ("one point", "normal", "velocities", "split", "separating pair"),
+    "2a": ("overlap", "just touching", "same centre", "input only"),
+    "2b": ("one point", "normal", "velocities", "shares", "separating pair"),
     "2c": (
         *("impulse", "tangential part", "energy", "restitution"),
         *("restitution at other speeds", "separating", "A and B exchanged"),

@@ -122,7 +122,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
         (
             split(balls, shift)
             if all(met)
-            else not_asked("split", "2b", "they do not meet in one point")
+            else not_asked("shares", "2b", "they do not meet in one point")
         ),
     ]
     return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
@@ -279,7 +279,13 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
     asked = f"How is the overlap shared, for masses of {shown(a.m)} and {shown(b.m)} kg?"
     got = f"A {shown(shift.a)} m, B {shown(shift.b)} m"
     return CheckRow(
-        "split", "2b", asked, got, "any shares", "free choice", f"{how}; the centre of mass {aside}"
+        "shares",
+        "2b",
+        asked,
+        got,
+        "any shares",
+        "free choice",
+        f"{how}; the centre of mass {aside}",
     )
 
 

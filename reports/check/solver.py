@@ -180,7 +180,7 @@ def task_2(
 
 def not_asked_of_task_2(but: str, why: str) -> list[CheckRow]:
     """A row for each part of task 2 that could not be asked, without the part that says why."""
-    first = {"2a": "reach", "2b": "one point", "2c": "impulse", "2d": "velocity of A"}
+    first = {"2a": "overlap", "2b": "one point", "2c": "impulse", "2d": "velocity of A"}
     return [not_asked(name, task, why) for task, name in first.items() if task != but]
 
 

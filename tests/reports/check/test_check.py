@@ -123,7 +123,7 @@ def test_a_free_choice_is_no_fault_and_does_not_read_as_one():
         for row in check_solver(next(path for path in CORRECT if path.name == "one_sided.js"))
     }
 
-    choices = [rows[name] for name in ("touch", "split", "separating", "same centre")]
+    choices = [rows[name] for name in ("just touching", "shares", "separating", "same centre")]
     assert {row.verdict for row in choices} == {"free choice"}
     assert [row.expected for row in choices] == [
         "yes or no",

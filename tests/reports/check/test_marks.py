@@ -52,7 +52,7 @@ def points_of(*changed: CheckRow) -> dict[str, float]:
 
 def test_a_right_file_has_all_points_of_the_two_tasks():
     """20, and a free choice, or what follows from a fault, costs none of them."""
-    free = row("2a", "reach", "free choice", "any")
+    free = row("2a", "overlap", "free choice", "any")
     follows = row("2d", "velocity of A", "follows", "it follows from the fault in 2c")
 
     assert (marked().points, marked().most) == (20.0, 20.0)
@@ -181,7 +181,7 @@ def students() -> list[Marked]:
         row("2c", "impulse", "fault", "the factor (1 + e) is missing"),
         row("2d", "velocity of B", "not asked", "it fails"),
         row("scenes", "crowd", "follows", "it follows from the faults above"),
-        row("2a", "touch", "free choice", "the comparison is the one with <"),
+        row("2a", "just touching", "free choice", "the comparison is the one with <"),
     ]
     hostile = marked(
         row("1", "velocity", "fault", HOSTILE),
