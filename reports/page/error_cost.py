@@ -132,33 +132,42 @@ def caption(scenes: int, clock: Clock) -> str:
     )
     if clock.fault:
         return said
+    least, most = int(clock.table.rounds.min()), int(clock.table.rounds.max())
+    rounds = f"{least} to {most}" if least < most else f"{most}"
     return (
-        f"{said} The light mark left of a point is the cost without what the way from Python to the"
-        " engine takes: as many steps of a world in which nothing moves. Times are medians of"
-        f" {int(clock.table.rounds.min())} interleaved rounds; an engine timed twice differs from"
-        f" itself by {style.number(100 * clock.noise.floor, 2)} %."
+        f"{said} The light mark left of a point is the cost without the calls from Python: without"
+        " what as many steps take in a world in which nothing moves. Times are medians of"
+        f" {rounds} interleaved rounds, fewer of what takes long; an engine timed twice differs"
+        f" from itself by {style.number(100 * clock.noise.floor, 2)}\u00a0%."
     )
 
 
 def points(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
     """A row a scenario, engine and step size of what was timed, or without times of all that was
-    played: error in radii, cost and idle (what of it is the binding's) in µs per simulated second;
-    or in place of the cost the steps per simulated second.
+    played: error in radii, and the columns of `with_times`; or in place of the cost the steps per
+    simulated second.
     """
-    names = scores.name.str.split(":", n=1)
-    found = scores.assign(
-        engine=names.str[0], profile=names.str[1], failed=(~np.isfinite(scores.error)).astype(int)
-    ).drop(columns="cost")
+    found = with_times(scores, clock).assign(failed=(~np.isfinite(scores.error)).to_numpy(int))
     if clock.fault:
         played = found.error.map(np.isfinite)
-        return found.assign(cost=(1 / found.dt_s).where(played), idle=0.0, read=np.nan)
+        return found.assign(cost=(1 / found.dt_s).where(played), idle=0.0)
+    timed = found[found.scenario.isin(clock.table.scenario)]
+    return timed.assign(idle=timed.idle.where(timed.cost.notna(), 0.0))
+
+
+def with_times(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
+    """The rows of `scores` with engine, profile, cost and idle (what of it is the binding's), in µs
+    per simulated second, and read, µs of a read-out: nan where that was not timed, or where no time
+    is shown."""
+    names = scores.name.str.split(":", n=1)
     keys = ["scenario", *WHO, "dt_s"]
-    times = clock.table.rename(
+    times = clock.table.head(0 if clock.fault else len(clock.table)).rename(
         columns={"cost_us_per_s": "cost", "binding_us_per_s": "idle", "read_us": "read"}
     )
-    timed = found[found.scenario.isin(times.scenario)]
-    both = timed.merge(times[[*keys, "cost", "idle", "read"]], on=keys, how="left")
-    return both.assign(idle=both.idle.where(both.cost.notna(), 0.0))
+    numbers = ["dt_s", "cost", "idle", "read"]
+    times = times[[*keys, *numbers[1:]]].astype(dict.fromkeys(numbers, float))
+    found = scores.assign(engine=names.str[0], profile=names.str[1])
+    return found.merge(times, on=keys, how="left")
 
 
 def picture(table: pd.DataFrame, axis: str) -> go.Figure:
@@ -418,18 +427,19 @@ def cheapest(found: pd.DataFrame) -> str:
             even += 1
     if not wins and not even:
         return f"No engine keeps within {NEAR:g} radii in any of {counted(len(scenes), 'scene')}."
+    of = f"Of {counted(len(scenes), 'scene')}"
+    if not wins:
+        return f"{of}, in none one engine is clearly the cheapest within {NEAR:g} radii."
     parts = [
-        f"{name} in {len(costs)} ({style.number(middle_half(np.array(costs)), 2)} µs per simulated"
-        " second)"
+        f"{name} in {len(costs)} ({style.number(middle_half(np.array(costs)), 2)} µs)"
         for name, costs in sorted(wins.items(), key=lambda item: -len(item[1]))
     ]
-    parts += [f"no engine surely in {even}"] if even else []
+    parts += [f"none clearly in {even}"] if even else []
     nowhere = len(scenes) - even - sum(map(len, wins.values()))
-    parts += [f"no engine is that near in {nowhere}"] if nowhere else []
+    parts += [f"none is that near in {nowhere}"] if nowhere else []
     return (
-        f"Cheapest with an error of at most {NEAR:g} radii, of {counted(len(scenes), 'scene')}:"
-        f" {'; '.join(parts)}. It is the cheapest there with the cost of the calls from Python and"
-        " without it."
+        f"{of}, the cheapest engine with an error of at most {NEAR:g} radii is {', '.join(parts)}."
+        " Without the cost of calls from Python these are the same."
     )
 
 

@@ -34,6 +34,7 @@ class FirstScreen:
         error_cost: error against cost, its sentences and its times; None without exact answers.
         error_cost_charts: the pictures of `error_cost`.
         no_times: why no time is shown, or "".
+        timed: the scenes that were timed, if times are shown.
         answers: the engines ranked, a row a situation.
         whole: the row of all situations together.
         far_off: radii beyond which a disk is not where it should be.
@@ -50,6 +51,7 @@ class FirstScreen:
     error_cost: error_cost.ErrorCost | None
     error_cost_charts: Pictures
     no_times: str
+    timed: Sequence[str]
     answers: Sequence[situations.Answer]
     whole: situations.Answer | None
     far_off: float
@@ -71,7 +73,8 @@ def first_screen(
     """
     without_friction, _ = situations.by_friction(comparisons)
     scores = pooled.scores(comparisons)
-    answers = situations.answers(scores[scores.middle], situated(comparisons), untrusted)
+    middle = error_cost.with_times(scores[scores.middle], clock)
+    answers = situations.answers(middle, situated(comparisons), untrusted)
     drawings = pooled.drawings(scores, answers, untrusted)
     first = error_cost.error_cost(pooled.scores(without_friction), clock, untrusted)
     return FirstScreen(
@@ -83,6 +86,7 @@ def first_screen(
         error_cost=first,
         error_cost_charts=pictures(error_cost.KEY, first.drawings if first else {}),
         no_times=clock.fault,
+        timed=[] if clock.fault else list(dict.fromkeys(clock.table.scenario)),
         answers=answers,
         whole=situations.whole(answers),
         far_off=situations.FAR_OFF,

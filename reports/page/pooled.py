@@ -17,23 +17,23 @@ from scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
 ERROR, ANGLE = "position_max_radii", "angle_max"
-SCORES = [*situations.COLUMNS, "step_size", "middle"]
+SCORES = ["scenario", "name", "error", "angle", "dt_s", "step_size", "middle"]
 
 
 def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
     """A row a run of a scene with an exact answer: columns `SCORES`.
 
     error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
-    cost is µs of engine time per simulated second, nan without one; step_size counts from the
-    coarsest, dt_s is its length, middle says whether it is the one in the middle of the ladder. A
-    scene that a solver's own file refuses was not asked of it, and has no row of it.
+    step_size counts from the coarsest, dt_s is its length, middle says whether it is the one in the
+    middle of the ladder. A scene that a solver's own file refuses was not asked of it, and has no
+    row of it.
     """
     rows = []
     for comparison in comparisons:
         # a truth that is lost before its second sample has only the start, which is given to all
         if comparison.truth is None or len(comparison.truth) < 2:
             continue
-        table, scenario = comparison.table, comparison.scenario
+        table, scenario = comparison.table, comparison.scenario.name
         judged = table[(table.versus == style.TRUTH) & table.metric.isin([ERROR, ANGLE])]
         judged = judged[~judged.note.astype(str).str.startswith(NOT_JUDGED)]
         keys = zip(judged.engine + ":" + judged.profile, judged.dt_s, judged.metric)
@@ -45,10 +45,9 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
             error, angle = (
                 float(found.get((run.name, run.dt, each), np.inf)) for each in (ERROR, ANGLE)
             )
-            cost = run.seconds / scenario.duration * 1e6 if np.isfinite(error) else np.nan
             middle = run.dt == comparison.middle_dt
             step_size = steps.index(run.dt)
-            rows.append((scenario.name, run.name, error, angle, cost, run.dt, step_size, middle))
+            rows.append((scenario, run.name, error, angle, run.dt, step_size, middle))
     return pd.DataFrame(rows, columns=SCORES).astype({"middle": bool})
 
 

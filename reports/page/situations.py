@@ -102,7 +102,8 @@ class Ranked(NamedTuple):
         worst_in: the scene of the worst.
         right: in how many scenes it is off by less than `RIGHT`.
         fails: scene -> error, of those where it is off by more than `FAR_OFF`, the worst first.
-        cost: µs of engine time per simulated second, median; nan where not known.
+        cost: µs of engine time per simulated second, median of the scenes that were timed; nan
+            where none was.
     """
 
     name: str
@@ -115,14 +116,14 @@ class Ranked(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A row of the table: the best engine of a situation, and the best of another engine.
+    """A row of the table: the best engine of a situation, and the other engines.
 
     Attributes:
         title, meaning, unit: of the situation.
         scenes: which belong to it.
         steps: s, the smallest and the largest step size of these scores.
-        best, other: of what takes part as an engine, the nearest to the exact answers; and the best
-            profile of any other engine, if there is one.
+        best, others: of what takes part as an engine, the nearest to the exact answers; and the
+            best profile of each other engine, the nearest first.
         yours: the reader's own solvers, the best first.
         own: the best of `OWN` beside it, if it is not `best` itself.
         exact: those of `EXACT`.
@@ -134,7 +135,7 @@ class Answer(NamedTuple):
     scenes: Sequence[str]
     steps: tuple[float, float]
     best: Ranked
-    other: Ranked | None
+    others: Sequence[Ranked]
     yours: Sequence[Ranked]
     own: Ranked | None
     exact: Sequence[Ranked]
@@ -209,7 +210,11 @@ def answer(
         return sorted(found, key=lambda one: (one.median, one.worst))
 
     best, *rest = in_order(ranked) or in_order(dict.fromkeys(here.name))
-    engine = best.name.split(":")[0]
+    others: dict[str, Ranked] = {}
+    for one in rest:
+        engine = one.name.split(":")[0]
+        if engine != best.name.split(":")[0]:
+            others.setdefault(engine, one)
     own = in_order(groups.get(OWN, []))
     return Answer(
         title,
@@ -218,7 +223,7 @@ def answer(
         list(dict.fromkeys(here.scenario)),
         (float(here.dt_s.min()), float(here.dt_s.max())),
         best,
-        next((one for one in rest if one.name.split(":")[0] != engine), None),
+        list(others.values()),
         in_order(name for name in groups.get(YOURS, []) if name not in ranked),
         own[0] if own and own[0].name not in ranked else None,
         in_order(name for name in groups.get(EXACT, []) if name not in ranked),

@@ -75,15 +75,20 @@ def noise_of(ratios: Sequence[float] | pd.Series) -> Noise:
 
 
 def interleaved(
-    what: Sequence[Timed], rounds: int, budget: float, seed: int, limit: float = inf
+    what: Sequence[Timed],
+    rounds: int,
+    budget: float,
+    seed: int,
+    limit: float = inf,
+    fewest: int = FEWEST_ROUNDS,
 ) -> list[Sample]:
     """Samples of all of `what`, warm-up round first; each round visits all of it, in a new
     random order.
 
-    What has spent `budget` s of its own sits out the rounds left, but never the first
-    `FEWEST_ROUNDS`. Slow change of the machine (heat, clock, neighbours) thus meets all alike. The
-    garbage collector is off meanwhile, as in `timeit`. After `limit` s it ends, and a round that is
-    not whole by then is left out: of the rounds kept nothing is missing.
+    What has spent `budget` s of its own sits out the rounds left, but never the first `fewest`
+    after the warm-up. Slow change of the machine (heat, clock, neighbours) thus meets all alike.
+    The garbage collector is off meanwhile, as in `timeit`. After `limit` s it ends, and a round
+    that is not whole by then is left out: of the rounds kept nothing is missing.
     """
     rng = np.random.default_rng(seed)
     spent = {one.key: 0.0 for one in what}
@@ -99,9 +104,9 @@ def interleaved(
                 one = what[index]
                 if perf_counter() > end:
                     return samples[:whole]
-                if k < FEWEST_ROUNDS or spent[one.key] < budget:
+                if k < fewest or spent[one.key] < budget:
                     sample = sampled(one, k, place)
-                    spent[one.key] += sample.cost * one.amount * sample.runs
+                    spent[one.key] += (sample.cost + sample.wrapping) * one.amount * sample.runs
                     samples.append(sample)
     finally:
         if collecting:

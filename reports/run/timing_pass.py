@@ -23,7 +23,7 @@ from reports.run.stepping import (
     beside,
     binding_of,
 )
-from reports.run.timing import WARM_UP, Noise, Timed, interleaved, noise_of
+from reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
 from reports.run.worker_process import allow
 from scenarios.model import Scenario
 
@@ -35,11 +35,13 @@ SCENES = (
     "column_of_ten",  # a stack
     "asteroids",  # the exercise's own scene
     "gas_of_100",  # a crowd
+    "frictional_box",  # a crowd with friction
 )
-"""Scenes with different work for an engine."""
-# s a run may take: of a longer one only the first part is timed, so that every round visits all.
-# About a hundred of them take a quarter of the pass.
-LONGEST = 0.03
+"""Scenes with different work for an engine, one at least in each situation of the report."""
+# Disks times steps, over all step sizes of a scene: of a scene with more only the first part is
+# timed, the same for every engine, as a second of a stack costs otherwise at the start than later.
+WORK = 120_000
+SHARE = 0.15  # s of its own after which a cell sits out the rounds left: no single one takes all
 BUSY = 0.10  # a noise floor beyond it: no time is shown
 STARTING = 120.0  # s to import and compile the engines, before the first round
 
@@ -73,14 +75,14 @@ class CellToTime(NamedTuple):
     row: EngineRow
     scenario: Scenario
     substeps: int
-    seconds: float  # that it took when it was played
 
     @property
     def part(self) -> Scenario:
-        """The scenario, or as much of its beginning as takes `LONGEST`."""
+        """The scenario, or as much of its beginning as has `WORK`."""
         scenario = self.scenario
-        # Halved, so that another run of the same times the same part.
-        halvings = max(0, ceil(log2(max(self.seconds, 1e-9) / LONGEST)))
+        work = scenario.scene.n * scenario.intervals * sum(scenario.substeps)
+        # Halved, so that another ladder of steps times the same part, if it can.
+        halvings = max(0, ceil(log2(max(work, 1) / WORK)))
         samples = max(1, scenario.intervals // 2**halvings)
         return replace(scenario, duration=samples * scenario.sample_interval)
 
@@ -98,7 +100,6 @@ def cells_to_time(
             engines[name],
             replace(scenarios[record["scene"]], truth=None),
             record["substeps"],
-            record["seconds"],
         )
         for record in archive.records
         if (name := f"{record['engine']}:{record['profile']}") in engines
@@ -134,12 +135,13 @@ class Pass:
         ]
         what += besides(self.cells)
         left = self.seconds - (perf_counter() - started)  # the engines have been imported, too
-        samples = interleaved(what, ROUNDS, self.seconds, self.seed, left)
-        rounds: dict[Any, list[Any]] = {}
+        samples = interleaved(what, ROUNDS, SHARE, self.seed, left, fewest=0)
+        if all(sample.round == WARM_UP for sample in samples):
+            return []
+        rounds: dict[Any, list[Sample]] = {}
         for sample in samples:
-            if sample.round != WARM_UP:
-                rounds.setdefault(sample.key, []).append(sample)
-        return [line_of(key, found) for key, found in rounds.items()]
+            rounds.setdefault(sample.key, []).append(sample)
+        return [line_of(key, counted_rounds(found)) for key, found in rounds.items()]
 
 
 def in_turns(cells: Sequence[CellToTime]) -> list[tuple[CellToTime, int]]:
@@ -175,7 +177,12 @@ def can(timed: Timed) -> bool:
     return False
 
 
-def line_of(key: tuple[Any, ...], samples: Sequence[Any]) -> dict[str, Any]:
+def counted_rounds(samples: Sequence[Sample]) -> Sequence[Sample]:
+    """Those without the warm-up, unless it took so long that there is no other."""
+    return [sample for sample in samples if sample.round != WARM_UP] or samples
+
+
+def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
     """The line of the journal for the samples of one key."""
     costs = [sample.cost for sample in samples]
     if key[0] == "timing":

@@ -15,7 +15,7 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
-from reports.page.error_cost import Clock
+from reports.page.error_cost import NO_CLOCK, Clock, with_times
 from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
@@ -25,6 +25,7 @@ from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN
 from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of
 from reports.run.timing import noise_of
 from reports.run.timing_pass import COLUMNS as TIMED
+from reports.run.timing_pass import SCENES
 from scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, write_small
@@ -117,7 +118,8 @@ def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
 
     whole = [*smooth, *rough]
     rows, few = (
-        situations.answers(scores(each), situated(each), set()) for each in (whole, smooth)
+        situations.answers(with_times(scores(each), NO_CLOCK), situated(each), set())
+        for each in (whole, smooth)
     )
     assert rows[-1].title == FRICTION
     assert rows[:-1] == few
@@ -158,8 +160,7 @@ def test_engines_are_ranked_among_themselves_and_the_next_is_another_engine():
 
     assert (row.title, row.best.name, row.best.median) == (SINGLE, "pymunk:matched", 0.01)
     assert (row.best.worst, row.best.worst_in, row.best.fails) == (50.0, "c", {"c": 50.0})
-    assert row.other is not None
-    assert (row.other.name, row.other.fails) == ("box2d:matched", {"c": np.inf})
+    assert [(one.name, one.fails) for one in row.others] == [("box2d:matched", {"c": np.inf})]
     assert row.own is not None
     assert row.own.name == "reference:exercise"
     assert [one.name for one in row.exact] == ["reference:ordered"]
@@ -213,7 +214,7 @@ def test_no_mark_is_left_out_however_many_situations_there_are(
 ):
     """Every number is drawn, also of more situations than the marks that `figure_of` puts on a line
     unless told otherwise. The control: with that many, plotly leaves out marks."""
-    found = scores(comparisons)
+    found = with_times(scores(comparisons), NO_CLOCK)
     rows = situations.answers(found[found.middle], situated(comparisons), set())
     figure = by_situation(found, [rows[-1]] * 8).figure
     assert figure is not None
@@ -274,7 +275,7 @@ def test_equal_medians_are_ordered_by_the_worst_scene_and_who_breaks_the_protoco
     [other] = situations.answers(equal, PLACES, {"box2d:matched"})
 
     assert row.best.name == "box2d:matched"
-    assert (other.best.name, other.other) == ("pymunk:matched", None)
+    assert (other.best.name, other.others) == ("pymunk:matched", [])
 
 
 def test_where_no_engine_was_played_our_own_solvers_are_ranked():
@@ -296,6 +297,7 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     table = page.locator(".which")
     nearest = page.locator(".nearest")
     top, named = nearest.bounding_box(), nearest.locator("span").first.inner_text()
+    says = nearest.inner_text()
     rows = [row.locator("td").first.inner_text().split() for row in table.locator("tbody tr").all()]
     scene = table.locator("tbody th").first.inner_text()
     page.context.close()
@@ -307,7 +309,10 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     assert top["y"] < 450
     assert scene.startswith(SINGLE)
     assert rows[0][0] == best
-    assert named.split() == [*SINGLE.split(), best]
+    assert named.split() == [*f"{SINGLE}:".split(), best]
+    assert says.startswith("Nearest to the exact answer, at a step of ")
+    assert "\u00a0ms: " in says
+    assert "crosscheck advise my_scene.toml --error 1%" in says
     assert heard == []
 
 
@@ -378,6 +383,39 @@ def test_without_times_to_trust_the_table_has_no_costs(
         said.append((f"No costs: {clock.fault}" in text, 'data-head="Cost"' in text))
 
     assert said == [(True, False), (True, False), (False, True)]
+
+
+def test_a_cost_is_that_of_the_timing_pass_and_not_of_the_run(comparisons: list[Comparison]):
+    """A run hears of every collision, which takes an engine in C much longer than its steps. Where
+    a scene was not timed, or the clock is at fault, there is no cost."""
+    runs = [run for each in comparisons[:2] for run in each.runs]
+    rows = [
+        (r.scenario, r.engine, r.profile, r.dt, 1.0, 3, 9.0, 9.0, 9.0, 1.0, 2.0, 0.0, np.nan)
+        for r in comparisons[0].runs
+    ]
+    quiet, busy = (
+        Clock(pd.DataFrame(rows, columns=TIMED), noise_of(spread), 12.0)
+        for spread in ([1.0, 1.0, 1.0], [0.7, 1.0, 1.3])
+    )
+    found = with_times(scores(comparisons[:2]), quiet)
+
+    assert {run.scenario for run in runs} == set(found.scenario)
+    assert set(found.cost[found.scenario == comparisons[0].scenario.name]) == {9.0}
+    assert found.cost[found.scenario != comparisons[0].scenario.name].isna().all()
+    assert with_times(scores(comparisons[:2]), busy).cost.isna().all()
+
+
+def test_every_situation_has_a_timed_scene():
+    """So none is without a cost, in the main job."""
+    timed = {
+        situation
+        for name in SCENES
+        for situation in situations.situations_of(
+            scenario(name), scenario(name).truth(scenario(name).times)
+        )
+    }
+
+    assert timed == set(situations.SITUATIONS) - {situations.ALL}
 
 
 def test_your_solver_comes_before_the_engines(comparisons: list[Comparison], tmp_path: Path):

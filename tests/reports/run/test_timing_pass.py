@@ -16,9 +16,10 @@ from reports.run.stepping import binding_of
 from reports.run.timing import WARM_UP, Spent, Timed, interleaved, noise_of
 from reports.run.timing_pass import (
     BUSY,
-    LONGEST,
     SCENES,
+    SHARE,
     TABLE,
+    WORK,
     CellToTime,
     is_busy,
     noise_floor,
@@ -79,7 +80,7 @@ def test_without_a_second_nothing_is_timed(tmp_path: Path):
     assert "took no times (--timings 0)" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_six_scenes_that_need_different_things_are_timed_else_the_first_played():
+def test_scenes_that_need_different_things_are_timed_else_the_first_played():
     """Each is in the catalogue; of others as many."""
     others = [name for name in SCENARIOS if name not in SCENES]
 
@@ -112,16 +113,41 @@ def test_the_pass_ends_in_time_and_leaves_out_a_round_that_is_not_whole(
     assert len(interleaved(what, 9, 99.0, 0)) == 40
 
 
-def test_of_a_long_run_only_the_first_part_is_timed():
-    """Halved until it takes `LONGEST`; a short one is whole."""
-    scene = scenario("near_miss")
-    whole, part = (
-        CellToTime("key", "a:b", ENGINES["pymunk:matched"], scene, 1, seconds).part
-        for seconds in (LONGEST, 3 * LONGEST)
-    )
+def test_of_a_long_scene_only_the_first_part_is_timed_and_the_same_of_every_engine():
+    """Halved until disks times steps are at most `WORK`; a short one is whole. A second of a stack
+    costs otherwise at the start than later, so parts that depend on the engine compare nothing."""
+    parts = {
+        name: {
+            CellToTime("key", engine, ENGINES[engine], scenario(name), substeps).part.duration
+            for engine in ("pymunk:matched", "reference:ordered")
+            for substeps in scenario(name).substeps
+        }
+        for name in ("column_of_ten", "gas_of_100")
+    }
+    stack, gas = scenario("column_of_ten"), scenario("gas_of_100")
+    [part] = parts["gas_of_100"]
 
-    assert whole.duration == scene.duration
-    assert part.duration == pytest.approx(scene.duration / 4, abs=scene.sample_interval)
+    assert parts["column_of_ten"] == {stack.duration}
+    assert gas.scene.n * gas.intervals * sum(gas.substeps) == 3.75 * WORK
+    assert part == pytest.approx(gas.duration / 4)
+
+
+def test_what_takes_long_is_timed_once_and_leaves_the_rounds_to_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The only sample of one that used up its share is its warm-up, and counts; of the others the
+    warm-up does not. The control: what is within its share has every round."""
+    what = [
+        Timed(("beside", key, "", ""), partial(Spent, seconds), 1.0)
+        for key, seconds in {"long": 2 * SHARE, "short": SHARE / 100}.items()
+    ]
+    monkeypatch.setattr(timing_pass, "besides", lambda _: what)
+    lines = timing_pass.Pass([], 5.0, 0)()
+
+    assert {line["beside"]: len(line["cost"]) for line in lines} == {
+        "long": 1,
+        "short": timing_pass.ROUNDS,
+    }
 
 
 def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
@@ -155,7 +181,7 @@ def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
 def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest.MonkeyPatch):
     """An engine that takes no world in which nothing moves is timed all the same."""
     refusing = timing_pass.CellToTime(
-        "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
+        "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1
     )
     monkeypatch.setattr("reports.run.stepping.empty", partial(int, "no world"))
     lines = timing_pass.Pass([refusing], 5.0, 0)()
