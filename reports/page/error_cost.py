@@ -166,7 +166,7 @@ def with_times(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
     )
     numbers = ["dt_s", "cost", "idle", "read"]
     times = times[[*keys, *numbers[1:]]].astype(dict.fromkeys(numbers, float))
-    found = scores.assign(engine=names.str[0], profile=names.str[1])
+    found = scores.assign(engine=names.str[0], profile=names.str[1]).astype({"dt_s": float})
     return found.merge(times, on=keys, how="left")
 
 
