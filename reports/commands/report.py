@@ -4,13 +4,14 @@ the exit status."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import NoReturn
 
 from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
 from reports.commands.own_solvers import lines
+from reports.compare.comparison import Comparison
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
@@ -65,14 +66,11 @@ def print_summary(report: Report, page: str) -> None:
     """Medians over the scenarios at their middle step, the finding, and where the page is."""
     console = Console()
     for comparisons in filter(None, by_friction(report.comparisons)):
-        names = overview.names_of(comparisons)
-        columns, found = overview.with_numbers(
-            overview.summary(comparisons, names, report.untrusted)
-        )
-        headings = ["engine", *map(heading, columns)]
-        rows = [[name, *(cell.text for cell in cells)] for name, cells in found.items()]
+        headings, rows, without = medians(comparisons, report.untrusted)
         rough = any(each.scenario.scene.friction for each in comparisons)
         print_table(console, headings, rows, title_of(len(comparisons), rough))
+        if without:
+            console.print(f"Without a model of friction: {', '.join(without)}.", highlight=False)
         console.print()
     print_list(
         console,
@@ -81,6 +79,19 @@ def print_summary(report: Report, page: str) -> None:
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
+
+
+def medians(
+    comparisons: Sequence[Comparison], untrusted: Set[str]
+) -> tuple[list[str], list[list[str]], list[str]]:
+    """The headings and rows of the summary, and who has no row, as it does not model friction."""
+    found = overview.summary(comparisons, overview.names_of(comparisons), untrusted)
+    columns, shown = overview.with_numbers(found)
+    without = [name for name, cells in shown.items() if cells[-1].text == overview.NO_FRICTION]
+    rows = [
+        [name, *(c.text for c in cells)] for name, cells in shown.items() if name not in without
+    ]
+    return ["engine", *map(heading, columns)], rows, without
 
 
 def heading(column: overview.Column) -> str:

@@ -64,7 +64,7 @@ class ErrorCost(NamedTuple):
 
     Attributes:
         drawings: scenario, or `POOLED` -> its picture.
-        sentences: three, on speed and error.
+        sentences: three, on speed and error, or two on error.
         fault: why there are no times, or "".
         caption: what a point is.
         costs: a row an engine, see `costs_of`; empty without times.
@@ -359,14 +359,12 @@ def no_nearer(fine: pd.DataFrame) -> bool:
 
 def sentences(found: pd.DataFrame, table: pd.DataFrame, fault: str) -> list[str]:
     """Three, on error and cost: who is not beaten in both, who is cheapest for an error of
-    `NEAR` radii, what half the step brings. `table`: the points of the first picture; `found` those
-    scene by scene."""
+    `NEAR` radii, what half the step brings; two on errors alone where there are no times.
+
+    table: the points of the first picture; `found` has those scene by scene.
+    """
     if fault:
-        return [
-            f"{fault} What follows is about errors alone.",
-            nearest(table),
-            halving(table, False),
-        ]
+        return [nearest(table), halving(table, False)]
     return [unbeaten(table), cheapest(found), halving(table, True)]
 
 

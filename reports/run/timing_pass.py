@@ -40,8 +40,11 @@ SCENES = (
 """Scenes with different work for an engine, one at least in each situation of the report."""
 # Disks times steps, over all step sizes of a scene: of a scene with more only the first part is
 # timed, the same for every engine, as a second of a stack costs otherwise at the start than later.
-WORK = 120_000
-SHARE = 0.15  # s of its own after which a cell sits out the rounds left: no single one takes all
+WORK = 60_000
+SLOW = (
+    0.5  # s of a part: what takes longer is not timed again, its cost is that of when it was played
+)
+SHARE = 0.1  # s of its own after which a cell sits out the rounds left: no single one takes all
 BUSY = 0.10  # a noise floor beyond it: no time is shown
 STARTING = 120.0  # s to import and compile the engines, before the first round
 
@@ -75,6 +78,12 @@ class CellToTime(NamedTuple):
     row: EngineRow
     scenario: Scenario
     substeps: int
+    seconds: float  # that it took when it was played
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether its part takes longer than `SLOW`, as it was played."""
+        return self.seconds * self.part.duration / self.scenario.duration > SLOW
 
     @property
     def part(self) -> Scenario:
@@ -100,6 +109,7 @@ def cells_to_time(
             engines[name],
             replace(scenarios[record["scene"]], truth=None),
             record["substeps"],
+            record["seconds"],
         )
         for record in archive.records
         if (name := f"{record['engine']}:{record['profile']}") in engines
@@ -124,24 +134,24 @@ class Pass:
     seed: int
 
     def __call__(self) -> list[dict[str, Any]]:
-        """A line of the journal for each thing that was timed; none if not even one round after
-        the warm-up fits."""
+        """A line of the journal for each thing that was timed; none if not even the warm-up
+        fits."""
         allow(self.seconds + STARTING)
         started = perf_counter()
+        slow = [cell for cell in self.cells if cell.is_slow]
         what = [
             timed
-            for cell, copies in in_turns(self.cells)
+            for cell, copies in in_turns([cell for cell in self.cells if not cell.is_slow])
             for timed in (timed_cell(cell, copy) for copy in range(copies))
         ]
         what += besides(self.cells)
         left = self.seconds - (perf_counter() - started)  # the engines have been imported, too
         samples = interleaved(what, ROUNDS, SHARE, self.seed, left, fewest=0)
-        if all(sample.round == WARM_UP for sample in samples):
-            return []
         rounds: dict[Any, list[Sample]] = {}
         for sample in samples:
             rounds.setdefault(sample.key, []).append(sample)
-        return [line_of(key, counted_rounds(found)) for key, found in rounds.items()]
+        lines = [line_of(key, counted_rounds(found)) for key, found in rounds.items()]
+        return [*lines, *map(as_played, slow)] if lines else []
 
 
 def in_turns(cells: Sequence[CellToTime]) -> list[tuple[CellToTime, int]]:
@@ -178,7 +188,7 @@ def can(timed: Timed) -> bool:
 
 
 def counted_rounds(samples: Sequence[Sample]) -> Sequence[Sample]:
-    """Those without the warm-up, unless it took so long that there is no other."""
+    """Those without the warm-up, unless that took so long that there is no other."""
     return [sample for sample in samples if sample.round != WARM_UP] or samples
 
 
@@ -191,6 +201,14 @@ def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
         return {"timing": cell, "copy": copy, "timed_s": until, "cost": costs, "wrapping": wrapping}
     _, what, name, scene = key
     return {"beside": what, "of": name, "scenario": scene, "cost": costs}
+
+
+def as_played(cell: CellToTime) -> dict[str, Any]:
+    """The line of the journal for a cell that is not timed again: what it took to play, listening
+    for collisions, so rather too much than too little."""
+    until = cell.scenario.duration
+    cost = [cell.seconds / until]
+    return {"timing": cell.key, "copy": 0, "timed_s": until, "cost": cost, "wrapping": [0.0]}
 
 
 def is_busy(archive: Archive) -> bool:

@@ -13,6 +13,7 @@ from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
 from adapters.play import play
+from reports.commands.report import medians
 from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
 from reports.page.error_cost import NO_CLOCK, Clock, with_times
@@ -88,6 +89,19 @@ def test_who_models_no_friction_is_not_shown_as_failed(with_friction):
     assert (row[0].text, row[0].failed) == (overview.NO_FRICTION, False)
     assert {each.outcome for each in overview.failures(rough[0])} == {overview.NO_FRICTION}
     assert overview.outcome_cell(("refused", "collisions accumulate")).failed
+
+
+def test_the_terminal_names_who_models_no_friction_below_the_numbers_with_units(with_friction):
+    """It has no row there, so that its words widen no column; of scenes without friction it has."""
+    smooth, rough = with_friction
+    headings, rows, without = medians(rough, set())
+
+    assert without == ["reference:exercise"]
+    assert without[0] not in [row[0] for row in rows]
+    assert headings[1] == "Position\nradii"
+    assert all("\n" in heading for heading in headings[1:])
+    assert medians(smooth, set())[2] == []
+    assert "reference:exercise" in [row[0] for row in medians(smooth, set())[1]]
 
 
 def test_an_engine_stands_in_one_group_whatever_was_played():
@@ -311,7 +325,7 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     assert rows[0][0] == best
     assert named.split() == [*f"{SINGLE}:".split(), best]
     assert says.startswith("Nearest to the exact answer, at a step of ")
-    assert "\u00a0ms: " in says
+    assert "\u00a0ms:" in says
     assert "crosscheck advise my_scene.toml --error 1%" in says
     assert heard == []
 

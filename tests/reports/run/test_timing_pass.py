@@ -18,6 +18,7 @@ from reports.run.timing_pass import (
     BUSY,
     SCENES,
     SHARE,
+    SLOW,
     TABLE,
     WORK,
     CellToTime,
@@ -118,7 +119,7 @@ def test_of_a_long_scene_only_the_first_part_is_timed_and_the_same_of_every_engi
     costs otherwise at the start than later, so parts that depend on the engine compare nothing."""
     parts = {
         name: {
-            CellToTime("key", engine, ENGINES[engine], scenario(name), substeps).part.duration
+            CellToTime("key", engine, ENGINES[engine], scenario(name), substeps, 0).part.duration
             for engine in ("pymunk:matched", "reference:ordered")
             for substeps in scenario(name).substeps
         }
@@ -128,8 +129,8 @@ def test_of_a_long_scene_only_the_first_part_is_timed_and_the_same_of_every_engi
     [part] = parts["gas_of_100"]
 
     assert parts["column_of_ten"] == {stack.duration}
-    assert gas.scene.n * gas.intervals * sum(gas.substeps) == 3.75 * WORK
-    assert part == pytest.approx(gas.duration / 4)
+    assert gas.scene.n * gas.intervals * sum(gas.substeps) == 7.5 * WORK
+    assert part == pytest.approx(gas.duration / 8, abs=gas.sample_interval)
 
 
 def test_what_takes_long_is_timed_once_and_leaves_the_rounds_to_the_others(
@@ -148,6 +149,23 @@ def test_what_takes_long_is_timed_once_and_leaves_the_rounds_to_the_others(
         "long": 1,
         "short": timing_pass.ROUNDS,
     }
+
+
+def test_what_is_slow_has_the_cost_of_when_it_was_played():
+    """It is not run again: the pass is over before it could be. The control: what is quick is."""
+    scene = scenario("near_miss")
+    quick, slow = (
+        CellToTime(key, "pymunk:matched", ENGINES["pymunk:matched"], scene, 1, seconds)
+        for key, seconds in (("quick", 0.0), ("slow", 3 * SLOW))
+    )
+    costs = {
+        line["timing"]: line["cost"]
+        for line in timing_pass.Pass([quick, slow], 5.0, 0)()
+        if "timing" in line
+    }
+
+    assert costs["slow"] == [3 * SLOW / scene.duration]
+    assert max(costs["quick"]) < costs["slow"][0] / 10
 
 
 def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
@@ -181,7 +199,7 @@ def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
 def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest.MonkeyPatch):
     """An engine that takes no world in which nothing moves is timed all the same."""
     refusing = timing_pass.CellToTime(
-        "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1
+        "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
     monkeypatch.setattr("reports.run.stepping.empty", partial(int, "no world"))
     lines = timing_pass.Pass([refusing], 5.0, 0)()

@@ -168,6 +168,7 @@ def test_the_page_of_speed_opens_with_which_engine_for_what(
     top = tab.locator(".which").bounding_box()
     rows = tab.locator(".which tbody th").all_inner_texts()
     costs = tab.locator(".which td[data-head=Cost]").all_inner_texts()
+    advised = tab.locator("#which code").first.inner_text()
     tab.context.close()
 
     assert top is not None
@@ -179,6 +180,7 @@ def test_the_page_of_speed_opens_with_which_engine_for_what(
         "All scenes",
     ]
     assert all(cost[0].isdigit() for cost in costs)
+    assert advised == "crosscheck advise my_scene.toml --error 1%"
     assert heard == []
 
 
