@@ -28,7 +28,8 @@ OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # exits that no engine makes by
 # bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
 PRINTED = 65536
 WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
-ASKING = "own_solver/process.py"  # waits for what a solver's file answers
+# the calls that wait for what a solver's file answers
+ASKING = ("own_solver/process.py", "adapters/system.py")
 # of the thread that got the signal, which is the one that plays: others only watch
 INNERMOST = re.compile(
     r'Current thread [^\n]*most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)'
@@ -148,7 +149,7 @@ class Worker:
         file = "/".join(Path(found[1]).parts[-2:]) if found else ""
         place = f" in {found[3]}, line {found[2]} of {file}" if found else ""
         # a solver's file runs in a process of its own, whose place in the file is not known here
-        if file == ASKING:
+        if file in ASKING:
             place = ", while the solver's file had not come back from a call"
         said = [line for line in (before if fatal else printed).splitlines() if line.strip()]
         return place + (f'; it had printed "{said[-1].strip()[:200]}"' if said else "")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from adapters.engines import DISTINCT
+from adapters.engines import DISTINCT, ENGINES
 from reports.speed.results import Results
 from reports.terminal.foreign_text import put_text
 
@@ -78,7 +78,10 @@ def figures(results: Results) -> pd.DataFrame:
         cheaper(results.versus, AGAINST, "cheaper", "ratio"),
         cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
     ]
-    return pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
+    table = pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
+    # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
+    names = table.engine + ":" + table.profile
+    return table[~names.isin([name for name, row in ENGINES.items() if row.adds_friction])]
 
 
 def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:

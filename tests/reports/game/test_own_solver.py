@@ -146,7 +146,7 @@ def test_the_page_says_that_it_waits(
     ("text", "said"),
     [
         ("function integrate(sphere, dt) {", "SyntaxError"),
-        ("var nothing = 0;", "has no function integrate"),
+        ("var nothing = 0;", "has neither the functions of the exercise"),
         ("throw new Error('not today')", "not today"),
         (
             SOLVER.read_text() + "\nintegrate = function () { throw new TypeError('of what?'); };",
@@ -178,7 +178,7 @@ def test_every_file_that_cannot_fly_is_reported(tmp_path: Path, monkeypatch: pyt
     """A line each; the good one is not named, and none of them is left among the engines."""
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     shutil.copy(SOLVER, tmp_path / "good.js")
-    (tmp_path / "a.js").write_text("(")
+    (tmp_path / "a.js").write_text("\0")
     (tmp_path / "b.js").write_text("var nothing = 0;")
     before = list(ENGINES)
     words = [word for name in ("a.js", "good.js", "b.js") for word in ("--engine", name)]

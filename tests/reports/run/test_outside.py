@@ -14,7 +14,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -170,22 +170,18 @@ def test_no_more_workers_are_started_than_the_machine_can_hold(
 ):
     """Each takes memory and open files; the sentence names what there is least of. Fewer are left
     alone."""
-    monkeypatch.setattr(
-        runner.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 10**9 // 4096}.get
-    )
-    monkeypatch.setattr(runner.resource, "getrlimit", lambda _: (1024, 4096))
+    monkeypatch.setattr(runner.psutil, "virtual_memory", lambda: SimpleNamespace(total=10**9))
+    monkeypatch.setattr(runner, "most_files", lambda: 1024)
 
     assert affordable(1000) == 2
     assert (
         capsys.readouterr().err
-        == "1000 workers are more than can start here (memory of 999 MB, of which each takes 400):"
+        == "1000 workers are more than can start here (memory of 1000 MB, of which each takes 400):"
         " 2 do\n"
     )
     assert affordable(2) == 2
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(
-        runner.os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 10**12 // 4096}.get
-    )
+    monkeypatch.setattr(runner.psutil, "virtual_memory", lambda: SimpleNamespace(total=10**12))
     assert affordable(1000) == 184
     assert "limit of 1024 open files, of which each takes 5): 184 do" in capsys.readouterr().err
 
