@@ -394,7 +394,7 @@ def test_without_times_to_trust_the_table_has_no_costs(
         clock = Clock(times, noise_of(spread), asked)
         write_small(page, comparisons[:1], clock=clock)
         text = page.read_text(encoding="utf-8")
-        said.append((f"No costs: {clock.fault}" in text, 'data-head="Cost"' in text))
+        said.append((f"No costs: {clock.fault}" in text, 'class="cost"' in text))
 
     assert said == [(True, False), (True, False), (False, True)]
 

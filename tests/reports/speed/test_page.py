@@ -167,7 +167,7 @@ def test_the_page_of_speed_opens_with_which_engine_for_what(
     tab, heard = opened(browser, page.as_uri(), viewport={"width": 1280, "height": 900})
     top = tab.locator(".which").bounding_box()
     rows = tab.locator(".which tbody th").all_inner_texts()
-    costs = tab.locator(".which td[data-head=Cost]").all_inner_texts()
+    costs = tab.locator(".which .cost").all_inner_texts()
     advised = tab.locator("#which code").first.inner_text()
     tab.context.close()
 
