@@ -49,9 +49,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-# A process of its own loads for seconds what this one has; that it ends the same is for the long
-# run.
-@pytest.fixture(scope="module", params=[crosscheck, pytest.param(process, marks=pytest.mark.long)])
+# A process of its own loads for seconds what this one has; that it ends the same is for the gate.
+@pytest.fixture(scope="module", params=[crosscheck, pytest.param(process, marks=pytest.mark.slow)])
 def checked(
     request: pytest.FixtureRequest, folder: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Any, Any, Path]:
