@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 from playwright.sync_api import Browser
 
+from adapters.engines import ENGINES
 from reports.run import timing_pass, worker
 from tests.forks import FRESH, Forked
 from tests.reports.page.browsing import chromium
@@ -57,6 +58,17 @@ def forked_workers() -> Iterator[None]:
         patch.setattr(worker, "start", Forked)
         patch.setattr(timing_pass, "ROUNDS", 1)  # of many runs no test looks at the times
         yield
+
+
+@pytest.fixture(autouse=True)
+def same_engines() -> Iterator[None]:
+    """A test that adds an engine to the table, by `crosscheck play --engine FILE` say, leaves the
+    table to the next one as it was."""
+    before = dict(ENGINES)
+    yield
+    if before != ENGINES:
+        ENGINES.clear()
+        ENGINES.update(before)
 
 
 @pytest.fixture

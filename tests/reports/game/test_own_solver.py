@@ -56,12 +56,11 @@ def solver(folder: Path, more: str = "") -> Path:
 
 
 @contextmanager
-def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
+def page_of(browser: Browser, path: Path) -> Iterator[Page]:
     """The game, paused at its first frame, with this solver solid and the reference as its
     ghost."""
     rows, _ = own_rows([f"{path}:own"])
-    for name, row in rows.items():
-        monkeypatch.setitem(ENGINES, name, row)
+    ENGINES.update(rows)
     with served(application(Game([*rows, "reference:exercise"]))) as url:
         page, heard = opened(
             browser, url, viewport={"width": 400, "height": 800}, reduced_motion="reduce"
@@ -73,11 +72,9 @@ def page_of(browser: Browser, path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 
 
 @pytest.mark.slow
-def test_a_right_solver_flies_as_the_reference_does(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: Path):
     """Under its file's name, the ship under thrust in both."""
-    with page_of(browser, solver(tmp_path), monkeypatch) as page:
+    with page_of(browser, solver(tmp_path)) as page:
         page.keyboard.down("w")
         fly(page, 20)
         reported = page.evaluate(
@@ -103,12 +100,12 @@ def test_a_right_solver_flies_as_the_reference_does(
     ],
 )
 def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: str, reason: str
+    browser: Browser, tmp_path: Path, act: str, reason: str
 ):
     """Whether it throws or hangs: the page says so in the field and in its row, and the ghost
     becomes solid."""
     path = solver(tmp_path, AFTER.format(calls=3000, act=act))
-    with page_of(browser, path, monkeypatch) as page:
+    with page_of(browser, path) as page:
         began = monotonic()
         fly(page, 30)
         took = monotonic() - began
@@ -126,12 +123,10 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
 
 
 @pytest.mark.slow
-def test_the_page_says_that_it_waits(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path):
     """While an answer takes longer than a second; then why."""
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
-    with page_of(browser, path, monkeypatch) as page:
+    with page_of(browser, path) as page:
         page.evaluate("game.ask(4)")
         page.wait_for_function(
             "() => document.getElementById('banner').textContent.startsWith('Waiting')"
@@ -247,14 +242,12 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_any_name_of_a_folder_will_do(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path):
     """Spaces, umlauts, quotes, brackets: the solver flies, and can be left out and made solid
     again."""
     folder = tmp_path / 'Übung "zwei" <b>]'
     folder.mkdir()
-    with page_of(browser, solver(folder), monkeypatch) as page:
+    with page_of(browser, solver(folder)) as page:
         page.locator("[name=solid][value='reference:exercise']").check()
         page.wait_for_function("() => game.field.engines[0] === 'reference:exercise'")
         page.locator("tr[data-engine$=':own'] [name=flies]").uncheck()
@@ -295,27 +288,20 @@ def test_a_faulty_solver_is_the_solid_ship_and_named(browser: Browser, tmp_path:
     on the first screen at 1280 x 900 with two files."""
     [faulty] = [mutant for mutant in MUTANTS if mutant.name == "normal_long.js"]
     files = [faulty.write(tmp_path), solver(tmp_path)]
-    before = dict(ENGINES)
     game = game_of(None, ["pymunk:shipped", "box2d:shipped", *map(str, files)])
-    try:
-        game.said = {f"{file}:own": check_file(file).sentences for file in files}
-        with served(application(game)) as url:
-            page, heard = opened(
-                browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
-            )
-            page.wait_for_function("() => game.field")
-            fly(page, 60)
-            solid = page.evaluate("game.field.engines[game.now.solid]")
-            label = page.evaluate("game.sky.last[0][game.sky.last[1]].label")
-            said = page.locator(".said").all_inner_texts()
-            bottom = page.evaluate(
-                "document.querySelector('.engines').getBoundingClientRect().bottom"
-            )
-            left = page.evaluate("game.now.flyers.map((flyer) => flyer.left)")
-            page.context.close()
-    finally:
-        ENGINES.clear()
-        ENGINES.update(before)
+    game.said = {f"{file}:own": check_file(file).sentences for file in files}
+    with served(application(game)) as url:
+        page, heard = opened(
+            browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
+        )
+        page.wait_for_function("() => game.field")
+        fly(page, 60)
+        solid = page.evaluate("game.field.engines[game.now.solid]")
+        label = page.evaluate("game.sky.last[0][game.sky.last[1]].label")
+        said = page.locator(".said").all_inner_texts()
+        bottom = page.evaluate("document.querySelector('.engines').getBoundingClientRect().bottom")
+        left = page.evaluate("game.now.flyers.map((flyer) => flyer.left)")
+        page.context.close()
 
     assert heard == []
     assert (solid, label) == (f"{files[0]}:own", "normal_long.js")
@@ -342,16 +328,11 @@ def test_the_field_begins_with_the_restitution_of_the_file(tmp_path: Path):
     """So that a file written for 0.5 flies; the exact answer and a right solver fly beside it."""
     path = solver(tmp_path)
     path.write_text(path.read_text().replace("restitution = 0.9", "restitution = 0.5"))
-    before = dict(ENGINES)
-    try:
-        game = game_of(None, [str(path)])
-        flight = Session(game.engines, restitution=game.restitution).flight
-        flight.advance(4)
-        left = [flyer.left for flyer in flight.flyers]
-        flight.close()
-    finally:
-        ENGINES.clear()
-        ENGINES.update(before)
+    game = game_of(None, [str(path)])
+    flight = Session(game.engines, restitution=game.restitution).flight
+    flight.advance(4)
+    left = [flyer.left for flyer in flight.flyers]
+    flight.close()
 
     assert game.restitution == 0.5
     assert game.engines == [f"{path}:own", "reference:exercise", "event_driven:float64"]
@@ -389,12 +370,7 @@ def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Pa
     pace."""
     (tmp_path / "anna").mkdir()
     files = [str(solver(tmp_path)), str(solver(tmp_path / "anna"))]
-    before = dict(ENGINES)
-    try:
-        times, _, _ = measure(browser, 6.0, [*files, "reference:exercise", "pymunk:shipped"])
-    finally:
-        ENGINES.clear()
-        ENGINES.update(before)
+    times, _, _ = measure(browser, 6.0, [*files, "reference:exercise", "pymunk:shipped"])
     engines, picture = (min(times[k]) for k in ("engines, for a frame", "to draw a picture"))
 
     assert engines + picture < 1e3 * FRAME
