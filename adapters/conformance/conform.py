@@ -9,6 +9,7 @@ from adapters.conformance.physics import PHYSICS
 from adapters.conformance.probe import Probe, ProbeReading
 from adapters.engine import Unsupported
 from adapters.engine_row import EngineRow
+from adapters.own_solver.process import processes_reused
 
 PROBES: dict[str, Probe] = CONTRACT | PHYSICS
 
@@ -49,11 +50,12 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
     else misses the probe.
     """
     engine, profile = name.split(":")
-    try:
-        row.make().close()
-    except Exception as error:  # a missing library, or one that fails as it starts
-        return [no_answer(name, type(error).__name__, str(error))]
-    return [ask(engine, profile, probe, row) for probe in PROBES]
+    with processes_reused():
+        try:
+            row.make().close()
+        except Exception as error:  # a missing library, or one that fails as it starts
+            return [no_answer(name, type(error).__name__, str(error))]
+        return [ask(engine, profile, probe, row) for probe in PROBES]
 
 
 def no_answer(name: str, what: str, why: str) -> Finding:

@@ -32,9 +32,9 @@ class JavaScriptFile(JavaScriptSolver):
     surface = "engine"
     drivers, bind = (DRIVER, ENGINE_DRIVER), BIND
 
-    def renew(self) -> None:
+    def load(self) -> None:
         """Load the file, and look whether it has what an engine has."""
-        super().renew()
+        super().load()
         if lacking := [name for name in ENGINE if not self.functions[name]]:
             raise SolverFailed("error", f"has no function {' and no '.join(lacking)}; {HOW}")
         models = self.functions["models"]

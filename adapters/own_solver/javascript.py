@@ -52,12 +52,18 @@ class JavaScriptSolver:
     bind = BIND  # which finds its functions
 
     def __init__(self, solver: SolverText) -> None:
-        self.solver = solver
-        self.renew()
+        self.solver, self.v8 = solver, MiniRacer()
+        self.load()
 
     def renew(self) -> None:
-        """Load the file into a V8 of its own, with nothing in it of what was called before."""
-        solver, self.v8 = self.solver, MiniRacer()
+        """Load the file into a new V8, with nothing in it of what was called before."""
+        self.v8.close()
+        self.v8 = MiniRacer()
+        self.load()
+
+    def load(self) -> None:
+        """Load the file into an empty V8."""
+        solver = self.solver
         self.v8.set_hard_memory_limit(HEAP)
         for driver in self.drivers:
             self.v8.eval(driver)
@@ -84,9 +90,6 @@ class JavaScriptSolver:
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the
         file threw."""
-        if command == "renew":
-            self.v8.close()
-            return self.renew()
         code = f'__crosscheck("{command}", {json.dumps(json.dumps(argument))})'
         try:
             answer = json.loads(str(self.evaluated(code, limit, may_repeat=command == "ask")))

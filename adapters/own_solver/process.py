@@ -8,7 +8,8 @@ import pickle
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -28,6 +29,45 @@ LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take le
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
 """A command of the worker, its argument, and how long it may take, s."""
+
+
+# Of each text the process that waits for the next use; None outside of `processes_reused`.
+waiting: dict[SolverText, SolverProcess] | None = None
+
+
+@contextmanager
+def processes_reused() -> Iterator[None]:
+    """Within, a process is not ended after its use but loads the file anew for the next one.
+
+    A start takes a third of a second, of Python and its libraries; a load takes milliseconds.
+    """
+    global waiting
+    waiting = {}
+    try:
+        yield
+    finally:
+        for process in waiting.values():
+            process.close()
+        waiting = None
+
+
+def process_of(solver: SolverText) -> SolverProcess:
+    """A process that has just loaded this text; raises `SolverFailed` and `NotStarted`."""
+    if waiting and (process := waiting.pop(solver, None)):
+        try:
+            process.do("renew", limit=STARTING)
+            return process
+        except SolverFailed:
+            process.close()
+    return SolverProcess(solver, compiled=True)
+
+
+def done_with(solver: SolverText, process: SolverProcess) -> None:
+    """End a process, or let it wait for its next use."""
+    if waiting is None or solver in waiting or process.process is None:
+        process.close()
+    else:
+        waiting[solver] = process
 
 
 class SolverProcess:

@@ -62,7 +62,7 @@ class PythonSolver:
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 
-    def renew(self, _argument: Any = None) -> None:
+    def renew(self) -> None:
         """Load the file and the modules beside it as new ones, with nothing in them of what was
         called before."""
         solver, here = self.solver, self.solver.path.resolve()
@@ -99,8 +99,6 @@ class PythonSolver:
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """The answer to a command; raises `SolverFailed` after `limit` s, or if the file threw."""
-        if command == "renew":
-            return self.renew()
         with self.guarded(limit, "in one call"):
             return getattr(self.whole if command.startswith("whole") else self, command)(argument)
 

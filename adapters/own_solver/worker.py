@@ -95,13 +95,18 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
         known = next((endless[call] for call in calls if call in endless), None)
         try:
             answers.append(
-                {"failed": known} if known else {"done": solver.run(command, argument, limit)}
+                {"failed": known} if known else {"done": done_by(solver, command, argument, limit)}
             )
         except SolverFailed as failure:
             answers.append({"failed": vars(failure)})
             if failure.kind in ("timeout", "memory"):
                 endless |= dict.fromkeys([*calls, "step"], vars(failure))
     return answers
+
+
+def done_by(solver: Any, command: str, argument: Any, limit: float) -> Any:
+    """What a command gives; raises `SolverFailed`."""
+    return solver.renew() if command == "renew" else solver.run(command, argument, limit)
 
 
 def tell(answers: IO[str], what: Any) -> None:

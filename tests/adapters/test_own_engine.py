@@ -7,6 +7,7 @@ import re
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from adapters.engine_row import EngineRow
 from adapters.own_engine.engine import TEMPLATES, row_of_file
 from adapters.own_engine.models import FEATURES
 from adapters.own_solver.file import NotASolver
+from adapters.own_solver.process import SolverProcess
 from adapters.play import play, play_once
 from adapters.run import Run
 from reports.compare.comparison import compare
@@ -49,6 +51,54 @@ def missed(row: EngineRow, *probes: str) -> dict[str, str]:
     """The probes that an engine does not keep, of these or all -> the verdict."""
     asked = [ask("x", "own", each, row) for each in probes] or conform("x:own", row)
     return {one.probe: one.verdict for one in asked if one.verdict != "keeps"}
+
+
+COUNTS = {
+    "javascript": [
+        ("const models", "let worlds = 0;\nconst models"),
+        (
+            "  const disks = scene.position",
+            "  if (++worlds > 12) throw new Error(worlds);\n  const disks = scene.position",
+        ),
+    ],
+    "python": [
+        ("models = ", "worlds = []\nmodels = "),
+        (
+            "    disks = [",
+            "    worlds.append(scene)\n"
+            "    if len(worlds) > 12:\n"
+            "        raise ValueError(len(worlds))\n"
+            "    disks = [",
+        ),
+    ],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ENDS)
+def test_a_probe_begins_with_the_file_as_it_was_written(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Though one process plays them all: a file that throws in its 13th world never has one. Where
+    the process does not load it anew, it throws. None of the processes is left."""
+    row = row_of_file(template(tmp_path, kind, *COUNTS[kind]))
+    started: list[SolverProcess] = []
+    begin, do = SolverProcess.begin, SolverProcess.do
+
+    def noted(process: SolverProcess, settings: dict[str, str]) -> None:
+        started.append(process)
+        begin(process, settings)
+
+    monkeypatch.setattr(SolverProcess, "begin", noted)
+    assert missed(row) == {}
+    assert len(started) <= 2  # a probe may play two worlds beside each other
+    assert [one.process for one in started] == [None] * len(started)
+
+    def without(process: SolverProcess, command: str, *what: Any, **named: Any) -> Any:
+        return None if command == "renew" else do(process, command, *what, **named)
+
+    monkeypatch.setattr(SolverProcess, "do", without)
+    assert missed(row)
 
 
 @pytest.mark.slow
