@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
-from math import inf, isfinite, isnan, nan
+from math import inf, isfinite, isnan, log, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -175,7 +175,7 @@ def advise(
     found = [(ladder, those_that_keep(ladder, bound)) for ladder in by_engine(tried)]
     keeping = [kept[0] for _, kept in found if kept]
     changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
-    priced, noise, busy = timed(scene, seed, [*keeping, *changed], progress)
+    priced, apart, busy = timed(scene, seed, [*keeping, *changed], progress)
     plain = {one.name: one for one in priced if one.change == PLAIN}
     short = [min(ladder, key=smallest) for ladder, kept in found if not kept]
     return Advice(
@@ -186,7 +186,7 @@ def advise(
         sorted(plain.values(), key=lambda one: one.cost),
         reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
         [Change(plain[one.name], one) for one in priced if one.change != PLAIN],
-        noise,
+        float(np.percentile([*apart.values()], 75)) if apart else nan,
         busy,
     )
 
@@ -261,10 +261,11 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
 
 def timed(
     scene: str, seed: int, played: Sequence[Attempt], progress: Progress
-) -> tuple[list[Attempt], float, float]:
-    """The attempts with their costs, the noise, and how many cores other programs used."""
+) -> tuple[list[Attempt], dict[tuple[str, int], float], float]:
+    """The attempts with their costs, by how much each engine at each step size differs from itself,
+    |log(cost / cost of its copy)|, and how many cores other programs used."""
     if not played:
-        return [], nan, nan
+        return [], {}, nan
     makes = {
         ((one.name, one.change), one.substeps, copy): one.make
         for one in played
@@ -277,10 +278,13 @@ def timed(
         raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
     times = summed_up(pd.DataFrame(samples), ["key"])
     cost = dict(zip(times.key, times.cost))
-    pairs = [cost[key[0], key[1], 1] / cost[key] for key in cost if (key[0], key[1], 1) in cost]
-    noise = float(np.percentile(np.abs(np.log(pairs)), 75))
+    apart = {
+        (who[0], k): abs(log(cost[who, k, 1] / cost[who, k, 0]))
+        for who, k, copy in cost
+        if copy == 1
+    }
     priced = [replace(one, cost=cost[(one.name, one.change), one.substeps, 0]) for one in played]
-    return priced, noise, busy
+    return priced, apart, busy
 
 
 def reasons(
