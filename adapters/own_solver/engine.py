@@ -14,7 +14,7 @@ from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import FLOAT64, EngineRow
 from adapters.friction import must_be_frictionless
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
-from adapters.own_solver.process import SolverProcess, done_with, process_of
+from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import EXERCISE, restitution_of
 from scenarios.model import Array, Scene, State
 
@@ -58,7 +58,7 @@ class Student:
         loaded."""
         if self.started is None:
             try:
-                self.started = process_of(self.solver)
+                self.started = SolverProcess(self.solver, compiled=True)
             except SolverFailed as failure:
                 raise Unsupported(f"{self.path.name} {failure}") from None
             self.whole = self.started.surface != "exercise"
@@ -191,9 +191,9 @@ class Student:
         return self.process.versions
 
     def close(self) -> None:
-        """Give the process back."""
+        """End the process."""
         if self.started is not None:
-            done_with(self.solver, self.started)
+            self.started.close()
             self.started = None
 
 

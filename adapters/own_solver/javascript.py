@@ -57,9 +57,13 @@ class JavaScriptSolver:
 
     def renew(self) -> None:
         """Load the file into a new V8, with nothing in it of what was called before."""
-        self.v8.close()
+        self.close()
         self.v8 = MiniRacer()
         self.load()
+
+    def close(self) -> None:
+        """Give back what V8 takes."""
+        self.v8.close()
 
     def load(self) -> None:
         """Load the file into an empty V8."""

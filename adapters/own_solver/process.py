@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 from adapters import system
 from adapters.engine import NotStarted
@@ -31,43 +31,53 @@ Request = tuple[str, Any, float]
 """A command of the worker, its argument, and how long it may take, s."""
 
 
-# Of each text the process that waits for the next use; None outside of `processes_reused`.
-waiting: dict[SolverText, SolverProcess] | None = None
+class Idle(NamedTuple):
+    """A process whose solver is done with, what that was, and what the process writes."""
+
+    solver: str
+    process: subprocess.Popen[bytes]
+    pieces: system.Pieces
+
+
+# Of each language the process that waits for its next use; None where a process ends with its use.
+waiting: dict[str, Idle] | None = None
+REUSED = ("javascript", "python")
+
+
+def keep_processes() -> None:
+    """From now on a process is not ended after its use: the next one that is asked for is it.
+
+    A start takes a third of a second, of Python and its libraries. In V8 any other file can be
+    loaded, with nothing in it of the last one; in Python only the same file, as modules may have
+    been changed by it. A process that is left ends with the one that calls this.
+    """
+    global waiting
+    waiting = {} if waiting is None else waiting
 
 
 @contextmanager
 def processes_reused() -> Iterator[None]:
-    """Within, a process is not ended after its use but loads the file anew for the next one.
-
-    A start takes a third of a second, of Python and its libraries; a load takes milliseconds.
-    """
+    """As `keep_processes`, within."""
     global waiting
-    waiting = {}
+    before = waiting
+    keep_processes()
     try:
         yield
     finally:
-        for process in waiting.values():
-            process.close()
-        waiting = None
+        if before is None:
+            for idle in (waiting or {}).values():
+                end(idle.process)
+            waiting = None
 
 
-def process_of(solver: SolverText) -> SolverProcess:
-    """A process that has just loaded this text; raises `SolverFailed` and `NotStarted`."""
-    if waiting and (process := waiting.pop(solver, None)):
-        try:
-            process.do("renew", limit=STARTING)
-            return process
-        except SolverFailed:
-            process.close()
-    return SolverProcess(solver, compiled=True)
-
-
-def done_with(solver: SolverText, process: SolverProcess) -> None:
-    """End a process, or let it wait for its next use."""
-    if waiting is None or solver in waiting or process.process is None:
-        process.close()
-    else:
-        waiting[solver] = process
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process and all it has started."""
+    if process.poll() is None:
+        system.end_all(process.pid)
+    process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            stream.close()
 
 
 class SolverProcess:
@@ -87,8 +97,12 @@ class SolverProcess:
         NotStarted: the process cannot be started.
     """
 
+    process: subprocess.Popen[bytes] | None
+    pieces: system.Pieces
+
     def __init__(self, solver: SolverText | Loadable, compiled: bool = False) -> None:
         self.kind = solver.kind
+        self.sound = True  # nothing in it was stopped
         kept = folder()
         copies = None
         if compiled and kept and isinstance(solver, SolverText) and self.kind == "python":
@@ -98,19 +112,21 @@ class SolverProcess:
         settings["PYTHONPATH"] = path_of_this()
         if kept is not None:
             settings["NUMBA_CACHE_DIR"] = str(kept / "numba")
-        hello = self.start(pickle.dumps((solver, copies)).hex(), settings)
+        self.solver = pickle.dumps((solver, copies)).hex()
+        hello = self.start(settings)
         if not isinstance(hello, dict) or not {"failed", "functions"} & hello.keys():
-            self.close()
+            self.end()
             raise SolverFailed("crashed", INTRUDED)
         if "failed" in hello:
-            self.close()
+            self.end()
             raise SolverFailed(**hello["failed"])
         self.functions: dict[str, Any] = hello["functions"]
         self.surface: str = hello["surface"]
         self.versions: dict[str, str] = hello["versions"]
 
-    def start(self, solver: str, settings: dict[str, str]) -> Any:
-        """Start the process and send it the solver; returns its first answer.
+    def start(self, settings: dict[str, str]) -> Any:
+        """Start the process, or take the one that waits, and send it the solver; returns its first
+        answer.
 
         The process itself stops a file that does not load in time. If it does not answer at all, it
         is started once more before the file is blamed: a start of V8 has been seen to hang, though
@@ -118,18 +134,32 @@ class SolverProcess:
         """
         for last in (False, True):
             try:
-                self.begin(settings)
-                return self.exchange(solver, STARTING)
+                if not self.take():
+                    self.begin(settings)
+                return self.exchange(self.solver, STARTING)
             except BaseException as error:
-                self.close()
+                self.end()
                 if last or not (isinstance(error, SolverFailed) and error.kind == "timeout"):
                     raise
         raise AssertionError("the second start returns or raises")
 
+    def take(self) -> bool:
+        """Whether one waits that can load this solver; another one is ended."""
+        idle = waiting.pop(self.kind, None) if waiting else None
+        if idle is None:
+            return False
+        if idle.process.poll() is None and (
+            self.kind == "javascript" or idle.solver == self.solver
+        ):
+            _, self.process, self.pieces = idle
+            return True
+        end(idle.process)
+        return False
+
     def begin(self, settings: dict[str, str]) -> None:
         """Start the process, without the solver, and wait for its first line; raises
         `NotStarted`."""
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process = None
         try:
             self.process = subprocess.Popen(
                 python(WORK),
@@ -167,8 +197,10 @@ class SolverProcess:
         most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
         answers = self.exchange(requests, min(most + GRACE, total))
         if not isinstance(answers, list) or len(answers) != len(requests):
-            self.close()
+            self.end()
             raise SolverFailed("crashed", INTRUDED)
+        stopped = [a["failed"]["kind"] for a in answers if "failed" in a]
+        self.sound &= not {"timeout", "memory", "crashed"} & {*stopped}
         return [SolverFailed(**a["failed"]) if "failed" in a else a["done"] for a in answers]
 
     def do(self, command: str, argument: Any = None, limit: float = 5.0) -> Any:
@@ -195,7 +227,7 @@ class SolverProcess:
             left = deadline - monotonic()
             chunk = self.pieces.next(left)
             if chunk is None or left < 0:  # a process that writes without end always has a piece
-                self.close()
+                self.end()
                 raise SolverFailed(
                     "timeout", f"does not come back within {limit:g} s and had to be stopped"
                 )
@@ -203,7 +235,7 @@ class SolverProcess:
                 raise self.lost()
             received += chunk
             if len(received) > LONGEST_ANSWER:
-                self.close()
+                self.end()
                 raise SolverFailed("crashed", INTRUDED)
         try:
             return json.loads(received)
@@ -231,14 +263,18 @@ class SolverProcess:
         return SolverFailed("crashed", f"ended its own process ({name})")
 
     def close(self) -> None:
+        """End the process, or let it wait for its next use."""
+        free = waiting is not None and self.kind in REUSED and self.kind not in waiting
+        if free and self.process is not None and self.sound and self.process.poll() is None:
+            assert waiting is not None
+            waiting[self.kind] = Idle(self.solver, self.process, self.pieces)
+            self.process = None
+        self.end()
+
+    def end(self) -> None:
         """End the process and all it has started."""
         if self.process is not None:
-            if self.process.poll() is None:
-                system.end_all(self.process.pid)
-            self.process.wait()
-            for stream in (self.process.stdin, self.process.stdout):
-                if stream is not None:
-                    stream.close()
+            end(self.process)
             self.process = None
 
 

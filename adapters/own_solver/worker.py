@@ -25,25 +25,28 @@ MEMORY = 2 * 2**30
 
 
 def main() -> None:
-    """Load the text that the first line holds, say what it has, then answer request by request
-    until the input ends."""
+    """Load the text that a line holds, say what it has, then answer request by request until the
+    next text comes or the input ends."""
     stream, answers = private_pipes()
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
     Thread(target=listen, args=(stream, requests), daemon=True).start()
     system.limit_memory(MEMORY)
     system.write_no_core()
     tell(answers, HERE)
-    try:
-        solver = load(*pickle.loads(bytes.fromhex(loads(requests.get()))))
-    except SolverFailed as failure:
-        tell(answers, {"failed": vars(failure)})
-        return
-    tell(
-        answers,
-        {"functions": solver.functions, "surface": solver.surface, "versions": solver.versions()},
-    )
+    text, solver = "", None
     while True:
-        tell(answers, reply(solver, loads(requests.get())))
+        line = loads(requests.get())
+        if isinstance(line, list):
+            tell(answers, reply(solver, line))
+            continue
+        try:
+            solver = loaded(line, text, solver)
+        except SolverFailed as failure:
+            tell(answers, {"failed": vars(failure)})
+            return
+        text = line
+        has = {"functions": solver.functions, "surface": solver.surface}
+        tell(answers, has | {"versions": solver.versions()})
 
 
 def private_pipes() -> tuple[IO[str], IO[str]]:
@@ -64,6 +67,17 @@ def listen(stream: IO[str], requests: queue.SimpleQueue[str]) -> None:
     for line in stream:
         requests.put(line)
     system.end_all(os.getpid())
+
+
+def loaded(line: str, before: str, solver: Any) -> Any:
+    """The solver that a line holds, with nothing in it of the one `before`; raises
+    `SolverFailed`."""
+    if solver is not None and line == before:
+        solver.renew()
+        return solver
+    if solver is not None:
+        solver.close()
+    return load(*pickle.loads(bytes.fromhex(line)))
 
 
 def load(solver: Any, copies: Path | None) -> Any:

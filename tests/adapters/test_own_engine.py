@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from adapters.conformance.conform import ask, conform
@@ -82,22 +83,27 @@ def test_a_probe_begins_with_the_file_as_it_was_written(
     """Though one process plays them all: a file that throws in its 13th world never has one. Where
     the process does not load it anew, it throws. None of the processes is left."""
     row = row_of_file(template(tmp_path, kind, *COUNTS[kind]))
-    started: list[SolverProcess] = []
-    begin, do = SolverProcess.begin, SolverProcess.do
+    started: list[psutil.Process] = []
+    begin, start = SolverProcess.begin, SolverProcess.start
 
     def noted(process: SolverProcess, settings: dict[str, str]) -> None:
-        started.append(process)
         begin(process, settings)
+        assert process.process is not None
+        started.append(psutil.Process(process.process.pid))
 
     monkeypatch.setattr(SolverProcess, "begin", noted)
     assert missed(row) == {}
     assert len(started) <= 2  # a probe may play two worlds beside each other
-    assert [one.process for one in started] == [None] * len(started)
+    assert not any(one.is_running() for one in started)
 
-    def without(process: SolverProcess, command: str, *what: Any, **named: Any) -> Any:
-        return None if command == "renew" else do(process, command, *what, **named)
+    first = []
 
-    monkeypatch.setattr(SolverProcess, "do", without)
+    def not_anew(process: SolverProcess, settings: dict[str, str]) -> Any:
+        if not (first and process.take()):
+            first.append(start(process, settings))
+        return first[0]
+
+    monkeypatch.setattr(SolverProcess, "start", not_anew)
     assert missed(row)
 
 
