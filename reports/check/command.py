@@ -22,12 +22,11 @@ from reports.check.functions import keeps_state
 from reports.check.marks import Marked, id_of, place_of
 from reports.check.points import DEFAULT, BadPoints, Points, read_points
 from reports.check.rows import CheckRow
-from reports.check.terminal import print_scene
+from reports.check.terminal import print_scene, sentence_on
 from reports.check.verdict import FileCheck, check_file, named, nothing_in
 from reports.run.made import may_overwrite
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
-from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import put_text
@@ -80,15 +79,15 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     checks = [one_of_several(path)] if single and files[0].is_dir() else checked(files)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
-    marked = marks_of(path, checks, grading)
+    not_read = others_in(path, files) if several else []
+    marked = marks_of(path, checks, grading, not_read)
     printed = [one.format for one in outputs if one.path is None] or ["table"]
     if printed == ["table"]:
         show(marked)
-        if several and (left := others_in(path, files)):
-            said = f"No .js and no .py file, so not read: {named(left)}."
-            Console().print(said, highlight=False)
     else:
         sys.stdout.write(FORMATS[printed[0]].text(marked))
+        if not_read:
+            say(sentence_on(not_read))
     for one in outputs:
         if one.path is not None:
             write(one, FORMATS[one.format].text(marked))
@@ -138,7 +137,9 @@ def grading_of(points: Path | None, id_pattern: str, hints: str) -> Grading:
 HINTS = ("full", "low")
 
 
-def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[Marked]:
+def marks_of(
+    path: Path, checks: Sequence[FileCheck], grading: Grading, not_read: Sequence[str]
+) -> list[Marked]:
     """The marks of each file; says on standard error where an id is not sure to be one."""
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
@@ -148,7 +149,10 @@ def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[
             say(f"--id-pattern does not match {named(odd)}: its folder or file name is the id")
     if twice := [name for name, times in Counter(ids).items() if times > 1]:
         say(f"the same id for several files: {named(twice)}")
-    return [Marked(name, one, path, grading.points, grading.low) for name, one in zip(ids, checks)]
+    return [
+        Marked(name, one, path, grading.points, grading.low, not_read)
+        for name, one in zip(ids, checks)
+    ]
 
 
 def submission_of(path: Path) -> list[Path]:
@@ -227,11 +231,13 @@ def is_missing(path: Path, foldered: bool) -> bool:
 
 
 def others_in(folder: Path, files: Sequence[Path]) -> list[str]:
-    """The names of what lies in the folder itself, can be no solver and has no row."""
+    """The names of what lies in the folder itself and has no row: files that can be no solver, and
+    folders that hold none, which end in a slash."""
+    with_row = {file.relative_to(folder).parts[0] for file in files}
     return sorted(
-        one.name
+        f"{one.name}/" if one.is_dir() else one.name
         for one in visible(folder.iterdir())
-        if one.is_file() and one.suffix.lower() not in KINDS and one not in files
+        if one.name not in with_row and (one.is_dir() or one.suffix.lower() not in KINDS)
     )
 
 

@@ -192,7 +192,8 @@ def new_velocity(seen: Seen, k: int) -> CheckRow:
     return judged(
         f"velocity of {'AB'[k]}",
         "2d",
-        f"What velocity has {'AB'[k]} after the collision, by the impulse that the file computes?",
+        f"What is the velocity of {'AB'[k]} after the collision, by the impulse that the file"
+        " computes?",
         f"{shown(seen.after[k])} m/s",
         f"{shown(before + change)} m/s",
         seen.right_d or near(seen.change[k], change),
@@ -253,7 +254,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
         judged(
             f"velocity of {who}",
             "2d",
-            f"What velocity has {who} after the collision?",
+            f"What is the velocity of {who} after the collision?",
             f"{shown(after[int(b)].v)} m/s",
             f"{shown(right)} m/s",
             False,
@@ -263,8 +264,8 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
 
 
 def partly(answers: dict[str, Answer], e: float) -> str:
-    """Where no single mistake gives all collisions: whether some of them are right, or the order of
-    A and B matters."""
+    """Where no single mistake gives all collisions: that the order of A and B matters, that only
+    the tangent is wrong, or that some collisions are right; else ""."""
     if not alike_if_swapped(answers):
         return UNALIKE
     if only_across(answers, e):
@@ -312,7 +313,7 @@ def energy(collision: PairCollision, came: Array) -> float:
 
 def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> CheckRow:
     """On pairs that move apart: nothing, or the printed formula; both are free."""
-    asked = "What impulse gets a pair that overlaps and moves apart?"
+    asked = "Which impulse acts on a pair that overlaps and moves apart?"
     expected = "none, or that of the formula"
     seen = [
         (
@@ -351,8 +352,8 @@ def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(CO
 
 
 def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
-    """Who is called A must not matter to the velocities. Where both get opposite impulses (d) is
-    right, and it is the impulse that depends on it."""
+    """The velocities must not depend on which sphere is called A. If both get opposite impulses,
+    (d) is right, and the impulse is what depends on it."""
     first = next((name for name in COLLISIONS if not alike_if_swapped(answers, [name])), FIRST)
     task, mistake = ("2c", seen.impulse) if seen.opposite else ("2d", seen.update)
     return judged(

@@ -1,4 +1,5 @@
-"""The tiny states a solver is asked about, and its answers, which must not depend on each other."""
+"""The questions: a few spheres each, on which a solver's functions are called; and its answers,
+which must not depend on the question before."""
 
 from __future__ import annotations
 
@@ -82,7 +83,8 @@ class Answer:
     """What came of a question.
 
     Attributes:
-        balls: the spheres after each call.
+        balls: the spheres after each call; of a question that failed those of the calls before, or
+            as `left_by` of failing.py finds them.
         returned: whether a function gave back an object.
         strayed: whether the file's own ufo or asteroids changed, though they had no part in it.
         strange: fields that the spheres did not have before.
@@ -234,12 +236,12 @@ def fresh_world(process: SolverProcess) -> list[Request]:
 def ask_in_two_orders(
     process: SolverProcess, asked: dict[str, Question]
 ) -> tuple[dict[str, Answer], dict[str, Answer]]:
-    """The answers of a fresh world to each question, and those that came otherwise where more was
-    asked before.
+    """The answer to each question, asked first in a fresh world; and the answers that differ when
+    other questions come before.
 
-    A fresh world takes V8 10 ms. So all are asked in one world and then, in the other order, in a
-    second one: where both answer the same, what was asked before does not matter. Where they do
-    not, each question gets a world of its own.
+    A fresh world takes V8 10 ms. So all questions are asked in one world, and in the reverse order
+    in a second one. If both give the same answers, what was asked before does not matter. If not,
+    each question is asked again in a world of its own.
     """
     process.request(fresh_world(process))
     answers = ask(process, asked)
@@ -260,7 +262,7 @@ def ask_in_two_orders(
     return alone, others
 
 
-BY_CHANCE = ("same centre",)  # who has no direction may draw one
+BY_CHANCE = ("same centre",)  # where there is no normal, a solver may choose one at random
 
 
 def alike(one: Answer, other: Answer) -> bool:
@@ -274,7 +276,7 @@ def alike(one: Answer, other: Answer) -> bool:
 
 
 def stuck(answers: dict[str, Answer]) -> bool:
-    """Whether a call had to be stopped: whatever makes it again would have to be stopped, too."""
+    """Whether a call had to be stopped; if it is made again, it must be stopped again."""
     return any(
         answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
     )

@@ -101,7 +101,7 @@ class Restitution:
         return judged(
             "restitution at other speeds",
             "2c",
-            "Have the same two spheres that restitution at 2 mm/s and at 200 m/s, too?",
+            "Do the same two spheres have that restitution at 2 mm/s and at 200 m/s, too?",
             f"{shown(self.slow)} and {shown(self.fast)}",
             f"{shown(self.came)}, as at 2 m/s",
             near([self.slow, self.fast], self.came),
