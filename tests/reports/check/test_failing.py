@@ -93,6 +93,12 @@ def test_a_failure_in_2c_costs_2c_and_leaves_2a_and_2b_with_their_points(tmp_pat
             id="endless in 2d",
         ),
         pytest.param(
+            JS,
+            {"if (distance === 0) {": "if (distance === 0) { for (;;);"},
+            [FAULT, RIGHT, RIGHT, RIGHT],
+            id="endless for spheres at the same place",
+        ),
+        pytest.param(
             PY,
             {"    J = -(1": "    while vn:\n        pass\n    J = -(1"},
             [RIGHT, RIGHT, FAULT, NOT_ASKED],
