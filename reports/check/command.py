@@ -33,7 +33,7 @@ from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 
 if TYPE_CHECKING:
-    from reports.check.smallest import Smallest
+    from reports.check.smallest_scene import Smallest
 
 # What an earlier page of ours begins with, and nothing else does: it may be written over.
 PAGE = b'<meta name="generator" content="crosscheck check">'

@@ -18,7 +18,7 @@ from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_a
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.truth.closed_forms import world_thrusts
-from scenarios.truth.exact import computed
+from scenarios.truth.exact import OracleTruth
 from scenarios.truth.record import TruthRecord
 
 DT = 1e-3  # s, the exercise's
@@ -320,7 +320,7 @@ MET: dict[str, tuple[Any, ...]] = {
 @lru_cache(maxsize=8)
 def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or
-    many digits."""
+    many digits, which are computed once for each `e` and kept in the cache."""
     forced = Scenario(
         name="forced",
         asks="Where is a sphere after a second of a constant force and torque?",
@@ -341,7 +341,7 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
             sample_interval=INTERVAL,
         )
         try:
-            found.append((scenario, computed(scenario)))
+            found.append((scenario, OracleTruth(scenario).record()))
         except NoTruth:  # e = 0 leaves touching spheres, whose motion the oracle does not follow
             continue
     return tuple(found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from operator import itemgetter
 from tempfile import TemporaryDirectory
@@ -21,13 +21,11 @@ from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
 from reports.check.rows import SAME_AGAIN, TOLERANCE, CheckRow, near, shown
 from reports.check.scenes import SceneAnswer, first_wrong, play_scene, scene_of, truth_of
+from reports.check.smallest_scene import DT, Smallest
 from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed
 
-# s, coarse: a scene is played in milliseconds, and a collision found late is judged by the state it
-# is found in
-DT = 1e-2
 SECONDS = 1.5  # for drawing and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s
 EXAMPLES = 400
@@ -47,21 +45,6 @@ FIRST: list[Example] = [
     ([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0)),
     ([(-1, 0, 1, 0, 1, 1), (1, 1, -1, 0, 2, 3)], (0, 0, 0)),
 ]
-
-
-@dataclass(frozen=True)
-class Smallest:
-    """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where
-    there is one.
-
-    of: the numbers, from 1, of the faults that it shows.
-    """
-
-    scenario: Scenario
-    fault: str
-    yours: Trajectory
-    truth: Trajectory | None
-    of: tuple[int, ...] = (1,)
 
 
 # Task, or row of a task -> what a scene shows of it: where a flight leads, how it turns, an overlap

@@ -21,7 +21,7 @@ from reports.terminal.foreign_text import legible
 from reports.terminal.tables import print_table
 
 if TYPE_CHECKING:
-    from reports.check.smallest import Smallest
+    from reports.check.smallest_scene import Smallest
 
 STYLE = {
     "right": "green",
