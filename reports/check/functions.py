@@ -22,7 +22,7 @@ def implemented(
     function = FUNCTIONS[task]
     if not there:
         missing = f"not implemented: the file has no function {function}{instead(function, text)}"
-        return [not_implemented(task, task, "there is no such function", missing)], False
+        return [not_implemented(task, "there is no such function", missing)], False
     if failed_calls(answers):
         return [failure(task, task, answers)], False
     if not any(
@@ -31,7 +31,7 @@ def implemented(
         if answer.balls
     ):
         idle = nothing(function, answers.values())
-        return [not_implemented(task, task, "nothing is changed", idle)], False
+        return [not_implemented(task, "nothing is changed", idle)], False
     return [arguments(task, function, answers.values())], True
 
 
@@ -47,13 +47,15 @@ def failure(task: str, part: str, answers: dict[str, Answer]) -> CheckRow:
     failed = failed_calls(answers)
     got = f"it fails in {len(failed)} of {len(answers)} calls"
     why = next(answer.failed for answer in failed.values())
-    return not_implemented(task, part, got, f"{FUNCTIONS[task]}: {why}")
+    asked = f"Does {FUNCTIONS[task]} come back from every call?"
+    cause = f"{FUNCTIONS[task]}: {why}"
+    return judged("implemented", part, asked, got, "yes", False, cause)
 
 
-def not_implemented(task: str, part: str, got: str, cause: str) -> CheckRow:
-    """The fault of a function that does not do its task, or fails in it."""
-    asked = f"Does {FUNCTIONS[task]} do something with the spheres it is given?"
-    return judged("implemented", part, asked, got, "it changes them", False, cause)
+def not_implemented(task: str, got: str, cause: str) -> CheckRow:
+    """The fault of a function that is missing, or changes nothing."""
+    asked = f"Does {FUNCTIONS[task]} change the spheres it is given?"
+    return judged("implemented", task, asked, got, "it changes them", False, cause)
 
 
 def same_again(

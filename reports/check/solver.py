@@ -161,7 +161,7 @@ def task_2(
     collisions."""
     mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
     if failed_calls(mine):
-        return with_not_asked(rows_until_failure(process, mine, source), NO_FURTHER), None
+        return with_not_asked(rows_until_failure(process, mine, source), HIDDEN), None
     rows, usable = implemented("2a", process.functions["collide"], mine, text)
     if not usable:
         return with_not_asked(rows, NO_FURTHER), None
@@ -179,6 +179,7 @@ def task_2(
 
 
 NO_FURTHER = "the collision function cannot be judged further"
+HIDDEN = "the collision function fails, so that this cannot be seen"
 
 
 def with_not_asked(rows: list[CheckRow], why: str) -> list[CheckRow]:

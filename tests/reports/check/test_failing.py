@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from reports.check.page import write_page
 from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT
@@ -103,6 +104,7 @@ def test_a_failure_in_2c_costs_2c_and_leaves_2a_and_2b_with_their_points(tmp_pat
             {"    J = -(1": "    while vn:\n        pass\n    J = -(1"},
             [RIGHT, RIGHT, FAULT, NOT_ASKED],
             id="endless in 2c, Python",
+            marks=pytest.mark.long,
         ),
         pytest.param(
             JS,
@@ -183,3 +185,14 @@ def test_a_displacement_that_the_failure_may_have_cut_off_is_not_judged(
     assert [row.cause for row in one.of("2b")] == [
         "the call fails before it has moved both spheres"
     ]
+
+
+@pytest.mark.slow
+def test_the_page_does_not_say_that_a_scene_was_searched_where_none_can_be_played(tmp_path: Path):
+    """A file that fails in a collision plays no scene."""
+    one = checked(tmp_path, JS, TOO_FAR | THROWS_IN_C)
+    write_page(tmp_path / "check.html", one, [])
+    said = (tmp_path / "check.html").read_text()
+
+    assert "No scene was played with this file. The rows below show the faults." in said
+    assert "was found that shows" not in said
