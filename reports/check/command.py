@@ -52,7 +52,7 @@ HANDED_IN = (
 
 
 class Output(NamedTuple):
-    """What is written: the option that asks for it, its format, and where; None: printed."""
+    """An output: the option that asks for it, its format, and its file; None if it is printed."""
 
     option: str
     format: str
@@ -156,8 +156,8 @@ def marks_of(
 
 
 def submission_of(path: Path) -> list[Path]:
-    """The solver of one student: `path`, or the one in that folder; among several the one that is
-    named as the exercise says. The folder itself if that leaves none, or several."""
+    """The solver of one student: the file `path`, or the only solver in that folder, or the only
+    one there that is named as the exercise says; else the folder itself."""
     if not path.is_dir():
         return files_of(path)
     found = solvers_below(path)
@@ -176,10 +176,10 @@ def one_of_several(folder: Path) -> FileCheck:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits
-    2 without any.
+    """The file, or all solvers below a folder, in order of their names; exits 2 if there is none.
 
-    Where most solvers have a folder of their own, a folder without one stands among them.
+    Links to nothing are among them, and so is what stands for a student without a solver: an
+    archive, a PDF, or a folder as `is_missing` says.
     """
     try:
         there = path.exists()
@@ -205,7 +205,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def solvers_below(folder: Path) -> list[Path]:
-    """The files that may be solvers, links to nothing too, in order of their names."""
+    """The files that may be solvers, and links to nothing, in order of their names."""
     return sorted(
         file
         for file in folder.rglob("*")
@@ -217,13 +217,13 @@ def solvers_below(folder: Path) -> list[Path]:
 
 
 def visible(paths: Iterable[Path]) -> list[Path]:
-    """Those that a person may have put there."""
+    """Those that a person, not a program, may have put there."""
     return [path for path in paths if not path.name.startswith(NOBODYS)]
 
 
 def is_missing(path: Path, foldered: bool) -> bool:
-    """Whether a folder without a solver stands for a student: where most students have a folder,
-    or if it is empty or holds what is handed in by mistake."""
+    """Whether a folder without a solver stands for a student: if most students have a folder
+    (`foldered`), if it is empty, or if it holds what students hand in instead of a solver."""
     if not path.is_dir():
         return False
     inside = visible(path.rglob("*"))
@@ -242,8 +242,8 @@ def others_in(folder: Path, files: Sequence[Path]) -> list[str]:
 
 
 def places_for(page: Path | None, outputs: Sequence[Output]) -> None:
-    """Exit 2, before anything is checked, if what is to be written has no place or would take
-    somebody else's."""
+    """Exit 2, before anything is checked, if an output cannot be written, or would replace a file
+    that is none of ours."""
     taken = {} if page is None else {os.path.realpath(page): "is where the page goes"}
     if page is not None:
         place_for("--page", page, PAGE, "page of a check")

@@ -1,5 +1,5 @@
-"""Writes check.html: what was found in one file, and the smallest scene that shows it, yours beside
-the exact one."""
+"""Writes check.html: what was found in one file, and the smallest scenes that show it, with the
+file's motion beside the exact one."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first
-wrong collision."""
+"""Whole scenes: how far a solver's motion is from the exact one, beside what its step size
+explains; and its first wrong collision."""
 
 from __future__ import annotations
 
@@ -218,8 +218,8 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
 
 
 def first_wrong(scenario: Scenario, contacts: Array, dt: float, part: str = "") -> str:
-    """The first contact that is not what the formula makes of the state before it, in a sentence;
-    "" if none. `part`: only what is wrong in this part of task 2, as in `contact_faults`."""
+    """A sentence on the first contact whose outcome is not that of the formula; "" if none is.
+    `part`: looks only for what is wrong in this part of task 2, as in `contact_faults`."""
     scene = scenario.scene
     for row in contacts:
         step, i, j = int(row[0]), int(row[1]), int(row[2])

@@ -65,9 +65,9 @@ BOTH = "2c and 2d"
 def smallest_scenes(
     process: SolverProcess, e: float, findings: Sequence[CheckRow], afresh: bool = False
 ) -> list[Smallest]:
-    """Of each fault the smallest scene that shows it, as far as one is found; one scene for a fault
-    in 2c and one in 2d, if both can be told from it. Of the loop there is none: a scene is played
-    by the loop of the exercise."""
+    """For each fault the smallest scene that shows it, if one is found. A fault in 2c and one in 2d
+    share a scene, in which both can be told. A fault of the loop has none: scenes are played by the
+    exercise's own loop."""
     search = partial(smallest_scene, process, e, afresh)
     of = {part: k for k, part in reversed([*enumerate(map(part_of, findings), 1)])}
     if list(of) == [None]:  # a single fault may show in anything
@@ -135,8 +135,8 @@ def size(example: Example) -> tuple[int, int]:
 
 @contextmanager
 def homeless() -> Iterator[None]:
-    """Hypothesis keeps what it has read in .hypothesis of the folder the user works in; here in one
-    that goes."""
+    """Hypothesis writes into a folder .hypothesis where the user works; within this it writes into
+    a temporary one."""
     with TemporaryDirectory() as home:
         set_hypothesis_home_dir(home)
         try:
@@ -148,8 +148,8 @@ def homeless() -> Iterator[None]:
 def without_idlers(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
-    """The scene without the spheres that the fault does not need: the time may be up before
-    hypothesis sees to it."""
+    """The scene without the spheres that the fault does not need. Hypothesis removes them, too, but
+    may run out of time."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
         if fewer and fault_of(play, fewer, thrust, e, part):

@@ -193,7 +193,7 @@ def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
 
 
 def bare(text: str, comment: str) -> str:
-    """A text without spaces and without its lines that are comments; one behind code stays, as
-    what begins it may also stand in a string."""
+    """A text without spaces and without lines that are comments. A comment after code stays: its
+    sign may be inside a string."""
     lines = ("".join(line.split()) for line in text.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith(comment))
