@@ -9,10 +9,10 @@ import numpy as np
 
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
+from reports.check import impulse, projection
 from reports.check.detection import detection_rows
 from reports.check.functions import arguments, failed_calls, failure
 from reports.check.lines import SHOWN, Source
-from reports.check.projection import rows_before_failure
 from reports.check.questions import (
     COLLISIONS,
     LIMIT,
@@ -33,10 +33,11 @@ FAR = "reach/25"  # two spheres four times as far from each other, in x and in y
 def rows_until_failure(
     process: SolverProcess, answers: dict[str, Answer], source: Source
 ) -> list[CheckRow]:
-    """The fault in the part that fails, and the rows of (a) and (b) if they come before it.
+    """The fault in the part that fails, and the rows of the parts before it, as far as they can be
+    judged.
 
-    A pair for which the call fails is taken to collide, and is displaced as far as the call had
-    moved it. Raises `SolverFailed` if the process is lost.
+    A pair for which the call fails is taken to collide, and has the places and the velocities that
+    the call had given it. Raises `SolverFailed` if the process is lost.
     """
     failed = failed_calls(answers)
     shown = SHOWN["2"] if SHOWN["2"] in failed else next(iter(failed))
@@ -57,7 +58,9 @@ def rows_until_failure(
         return rows
     rows += [arguments("2a", "sphereSphereCollisionHandling", left.values()), *detection]
     if part != "2b":
-        rows += rows_before_failure(left)
+        rows += projection.rows_before_failure(left)
+    if part == "2d":
+        rows += impulse.rows_before_failure(left)
     return sorted(rows, key=lambda row: row.task)
 
 

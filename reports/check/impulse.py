@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adapters.own_solver.restitution import EXERCISE
 from reports.check.collisions import PairCollision, changes, collision_of
 from reports.check.impacts import IMPULSES, SEPARATING, UPDATES, Finding, tangent
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
@@ -104,6 +105,33 @@ def impulse_rows(
     ]
 
 
+def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
+    """The row of (c) where the function fails in (d): J is right, if in every collision one of the
+    spheres got it before the failure; restitution and energy then need no rows. Else nothing: J is
+    not known."""
+    if not all(answers[name].balls for name in COLLISIONS):
+        return []
+    seen = [
+        (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
+        for name, q in COLLISIONS.items()
+    ]
+    right = [IMPULSES[""](pair, EXERCISE) for pair, _ in seen]
+    for_a = [pair.ma * change[0] for pair, change in seen]
+    for_b = [-pair.mb * change[1] for pair, change in seen]
+    if not (near(for_a, right) or near(for_b, right)):
+        return []
+    pair, wanted = seen[0][0], f"{shown(right[0] @ seen[0][0].n)} N s"
+    got = f"{wanted} along the normal"
+    return [judged("impulse", "2c", asked_of_impulse(pair), got, wanted, True)]
+
+
+def asked_of_impulse(pair: PairCollision) -> str:
+    """The question on J."""
+    return (
+        f"What impulse does A get from B, for masses of {shown(pair.ma)} and {shown(pair.mb)} kg?"
+    )
+
+
 def seen_in(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> Seen:
     """The collision to show, and the mistakes in it."""
     e = found.e if found else restitution.own
@@ -137,11 +165,10 @@ def swapped(name: str) -> str:
 
 def normal_impulse(seen: Seen) -> CheckRow:
     """J."""
-    masses = f"{shown(seen.pair.ma)} and {shown(seen.pair.mb)} kg"
     return judged(
         "impulse",
         "2c",
-        f"What impulse does A get from B, for masses of {masses}?",
+        asked_of_impulse(seen.pair),
         f"{shown(seen.shown_impulse @ seen.pair.n)} N s along the normal",
         f"{shown(seen.right_impulse @ seen.pair.n)} N s",
         # what is wrong across the normal is the next row's
@@ -230,15 +257,11 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     a, b = (any(both) for both in zip(*lost.values()))
     why = "(a field that does not exist, a division by zero?)"
     if a and b:
-        asked = (
-            f"What impulse does A get from B, for masses of {shown(collision.ma)} and"
-            f" {shown(collision.mb)} kg?"
-        )
         return [
             judged(
                 "impulse",
                 "2c",
-                asked,
+                asked_of_impulse(collision),
                 f"{shown(collision.ma * came[0])} N s",
                 f"{shown(P)} N s",
                 False,

@@ -59,7 +59,19 @@ def test_a_failure_in_2c_costs_2c_and_leaves_2a_and_2b_with_their_points(tmp_pat
 @pytest.mark.parametrize(
     ("text", "changes", "expected"),
     [
-        pytest.param(JS, THROWS_IN_D, [RIGHT, RIGHT, NOT_ASKED, FAULT], id="2d"),
+        pytest.param(JS, THROWS_IN_D, [RIGHT, RIGHT, RIGHT, FAULT], id="2d, after A has got J"),
+        pytest.param(
+            JS,
+            {"sphereA.velocity.x += J": "sphereA.velocity.x += j"},
+            [RIGHT, RIGHT, NOT_ASKED, FAULT],
+            id="2d",
+        ),
+        pytest.param(
+            JS,
+            {"(1 + restitution)": "1"} | THROWS_IN_D,
+            [RIGHT, RIGHT, NOT_ASKED, FAULT],
+            id="2d, after A has got a wrong J",
+        ),
         pytest.param(
             PY, {"(1 + RESTITUTION)": "(1 + e)"}, [RIGHT, RIGHT, FAULT, NOT_ASKED], id="2c, Python"
         ),
@@ -136,7 +148,7 @@ def test_the_parts_before_a_failure_are_right_and_those_after_it_are_not_asked(
         ),
         pytest.param(
             DOUBLED | THROWS_IN_D,
-            [FAULT, RIGHT, NOT_ASKED, FAULT],
+            [FAULT, RIGHT, RIGHT, FAULT],
             ["the sizes are doubled", "j is not defined"],
             id="2a and 2d",
         ),
