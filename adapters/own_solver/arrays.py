@@ -28,8 +28,10 @@ def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Call
 
     def act(spheres: list[Any], where: World, dt: float) -> None:
         disks = disks_of(spheres)
-        module.advance(disks, where, dt, 1)
-        write_back(disks, spheres)
+        try:
+            module.advance(disks, where, dt, 1)
+        finally:  # what it had done when it failed is judged, too
+            write_back(disks, spheres)
 
     def everybody() -> list[Any]:
         return [module.ufo, *module.asteroids]

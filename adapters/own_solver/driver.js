@@ -31,6 +31,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   let file;  // the solver's functions and globals, once it is loaded
   let world;  // the scene being played
   let accesses = "";  // what the last traced call read and wrote
+  let asked = empty();  // the spheres of the last question, which a call that failed may have changed
 
   function snapshot() {
     const found = setPrototypeOf({}, null), names = keys(BUILT_IN);
@@ -175,6 +176,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
         if (question.watch) watch(spheres, calls);
       } else {
         for (let i = 0; i < question.spheres.length; i++) spheres[i] = sphere(question.spheres[i]);
+        asked = spheres;
         known = witness();
       }
       for (let k = 0; k < question.calls.length; k++) {
@@ -307,7 +309,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   const commands = {
-    ask, trace, accesses: traceOf, load, step, play, read: () => rows(world.spheres),
+    ask, left: () => rows(asked), trace, accesses: traceOf, load, step, play, read: () => rows(world.spheres),
     contacts: () => reported(world.log, 0),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };

@@ -171,7 +171,7 @@ class PythonSolver:
         returned, error = False, None
         seed()
         before = self.numbers()
-        spheres = self.placed(question)
+        self.asked = spheres = self.placed(question)
         calls = self.watched(spheres) if question.get("watch") else []
         known = None if question["world"] else self.globals()
         try:
@@ -205,6 +205,10 @@ class PythonSolver:
             "calls": calls,
             "error": error,
         }
+
+    def left(self, _argument: Any = None) -> list[list[float]]:
+        """The spheres of the last question, which a call that failed may have changed."""
+        return [row_of(s) for s in self.asked]
 
     def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
         """Call a function of the file on some of the spheres; what it returns."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from reports.check.marks import Marked, number
 from reports.check.page import GENERATOR
 from reports.check.rows import TASKS
-from reports.check.terminal import same_code
+from reports.check.terminal import same_code, sentence_on
 from reports.check.verdict import headline
 from reports.page.documents import render
 from reports.run.made import sealed
@@ -49,6 +49,7 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
         points=bars(distribution(marked)),
         causes=bars(causes(marked)),
         copies=same_code(root, checks),
+        not_read=sentence_on(marked[0].not_read) if marked[0].not_read else "",
         number=number,
         version=version("crosscheck2d"),
     )

@@ -22,19 +22,18 @@ from reports.check.functions import keeps_state
 from reports.check.marks import Marked, id_of, place_of
 from reports.check.points import DEFAULT, BadPoints, Points, read_points
 from reports.check.rows import CheckRow
-from reports.check.terminal import print_scene
+from reports.check.terminal import print_scene, sentence_on
 from reports.check.verdict import FileCheck, check_file, named, nothing_in
 from reports.run.made import may_overwrite
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
-from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 
 if TYPE_CHECKING:
-    from reports.check.smallest import Smallest
+    from reports.check.smallest_scene import Smallest
 
 # What an earlier page of ours begins with, and nothing else does: it may be written over.
 PAGE = b'<meta name="generator" content="crosscheck check">'
@@ -53,7 +52,7 @@ HANDED_IN = (
 
 
 class Output(NamedTuple):
-    """What is written: the option that asks for it, its format, and where; None: printed."""
+    """An output: the option that asks for it, its format, and its file; None if it is printed."""
 
     option: str
     format: str
@@ -80,15 +79,15 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     checks = [one_of_several(path)] if single and files[0].is_dir() else checked(files)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
-    marked = marks_of(path, checks, grading)
+    not_read = others_in(path, files) if several else []
+    marked = marks_of(path, checks, grading, not_read)
     printed = [one.format for one in outputs if one.path is None] or ["table"]
     if printed == ["table"]:
         show(marked)
-        if several and (left := others_in(path, files)):
-            said = f"No .js and no .py file, so not read: {named(left)}."
-            Console().print(said, highlight=False)
     else:
         sys.stdout.write(FORMATS[printed[0]].text(marked))
+        if not_read:
+            say(sentence_on(not_read))
     for one in outputs:
         if one.path is not None:
             write(one, FORMATS[one.format].text(marked))
@@ -138,7 +137,9 @@ def grading_of(points: Path | None, id_pattern: str, hints: str) -> Grading:
 HINTS = ("full", "low")
 
 
-def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[Marked]:
+def marks_of(
+    path: Path, checks: Sequence[FileCheck], grading: Grading, not_read: Sequence[str]
+) -> list[Marked]:
     """The marks of each file; says on standard error where an id is not sure to be one."""
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
@@ -148,12 +149,15 @@ def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[
             say(f"--id-pattern does not match {named(odd)}: its folder or file name is the id")
     if twice := [name for name, times in Counter(ids).items() if times > 1]:
         say(f"the same id for several files: {named(twice)}")
-    return [Marked(name, one, path, grading.points, grading.low) for name, one in zip(ids, checks)]
+    return [
+        Marked(name, one, path, grading.points, grading.low, not_read)
+        for name, one in zip(ids, checks)
+    ]
 
 
 def submission_of(path: Path) -> list[Path]:
-    """The solver of one student: `path`, or the one in that folder; among several the one that is
-    named as the exercise says. The folder itself if that leaves none, or several."""
+    """The solver of one student: the file `path`, or the only solver in that folder, or the only
+    one there that is named as the exercise says; else the folder itself."""
     if not path.is_dir():
         return files_of(path)
     found = solvers_below(path)
@@ -172,10 +176,10 @@ def one_of_several(folder: Path) -> FileCheck:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, links to nothing too, in order of their names; exits
-    2 without any.
+    """The file, or all solvers below a folder, in order of their names; exits 2 if there is none.
 
-    Where most solvers have a folder of their own, a folder without one stands among them.
+    Links to nothing are among them, and so is what stands for a student without a solver: an
+    archive, a PDF, or a folder as `is_missing` says.
     """
     try:
         there = path.exists()
@@ -201,7 +205,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def solvers_below(folder: Path) -> list[Path]:
-    """The files that may be solvers, links to nothing too, in order of their names."""
+    """The files that may be solvers, and links to nothing, in order of their names."""
     return sorted(
         file
         for file in folder.rglob("*")
@@ -213,13 +217,13 @@ def solvers_below(folder: Path) -> list[Path]:
 
 
 def visible(paths: Iterable[Path]) -> list[Path]:
-    """Those that a person may have put there."""
+    """Those that a person, not a program, may have put there."""
     return [path for path in paths if not path.name.startswith(NOBODYS)]
 
 
 def is_missing(path: Path, foldered: bool) -> bool:
-    """Whether a folder without a solver stands for a student: where most students have a folder,
-    or if it is empty or holds what is handed in by mistake."""
+    """Whether a folder without a solver stands for a student: if most students have a folder
+    (`foldered`), if it is empty, or if it holds what students hand in instead of a solver."""
     if not path.is_dir():
         return False
     inside = visible(path.rglob("*"))
@@ -227,17 +231,19 @@ def is_missing(path: Path, foldered: bool) -> bool:
 
 
 def others_in(folder: Path, files: Sequence[Path]) -> list[str]:
-    """The names of what lies in the folder itself, can be no solver and has no row."""
+    """The names of what lies in the folder itself and has no row: files that can be no solver, and
+    folders that hold none, which end in a slash."""
+    with_row = {file.relative_to(folder).parts[0] for file in files}
     return sorted(
-        one.name
+        f"{one.name}/" if one.is_dir() else one.name
         for one in visible(folder.iterdir())
-        if one.is_file() and one.suffix.lower() not in KINDS and one not in files
+        if one.name not in with_row and (one.is_dir() or one.suffix.lower() not in KINDS)
     )
 
 
 def places_for(page: Path | None, outputs: Sequence[Output]) -> None:
-    """Exit 2, before anything is checked, if what is to be written has no place or would take
-    somebody else's."""
+    """Exit 2, before anything is checked, if an output cannot be written, or would replace a file
+    that is none of ours."""
     taken = {} if page is None else {os.path.realpath(page): "is where the page goes"}
     if page is not None:
         place_for("--page", page, PAGE, "page of a check")

@@ -8,7 +8,8 @@ from itertools import product
 import numpy as np
 
 from adapters.own_solver.restitution import code_of
-from reports.check.questions import QUESTIONS, Answer, Ball, named
+from reports.check.functions import failed_calls
+from reports.check.questions import QUESTIONS, Answer, Ball, Question, named
 from reports.check.rows import CheckRow, judged, near, shown
 
 Rule = Callable[[float, float, float, float], bool | None]
@@ -103,12 +104,18 @@ def acts(question: tuple[Ball, ...], after: list[Ball]) -> bool:
     return any(not (near(b.x, a.x) and near(b.v, a.v)) for a, b in zip(question, after))
 
 
+def reacted(question: Question, answer: Answer) -> bool:
+    """Whether a pair is taken to collide: it changes, or the call fails in what follows the
+    comparison."""
+    return bool(answer.failed) or acts(question.balls, answer.last)
+
+
 def detection_rows(answers: dict[str, Answer], text: str) -> list[CheckRow]:
     """The rows of (a); `text` of the file."""
     return [
         reach(answers, (XOR if "^" in code_of(text) else {}) | RULES),
         touch(answers["touch"]),
-        same_centre(answers["same centre"]),
+        same_centre(answers["same centre"], bool(failed_calls(answers))),
     ]
 
 
@@ -118,7 +125,7 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
     for question, answer in named(answers, "reach/"):
         a, b = question.balls
         (dx, dy), size = np.subtract(a.x, b.x), (a.r, b.r)
-        seen.append(((dx, dy, *size), bool(answer.balls) and acts(question.balls, answer.last)))
+        seen.append(((dx, dy, *size), reacted(question, answer)))
     cause = next(
         (name for name, rule in rules.items() if all(rule(*q) in (was, None) for q, was in seen)),
         None,
@@ -160,14 +167,14 @@ def mixed_up(answers: dict[str, Answer]) -> bool:
     for question, answer in named(answers, "reach/"):
         a, b = question.balls
         summed = float(np.hypot(*np.add(a.x, b.x)))
-        if (summed < a.r + b.r) != (bool(answer.balls) and acts(question.balls, answer.last)):
+        if (summed < a.r + b.r) != reacted(question, answer):
             return False
     return True
 
 
 def touch(answer: Answer) -> CheckRow:
-    """Exactly touching: free."""
-    reacts = acts(QUESTIONS["touch"].balls, answer.last)
+    """Whether spheres that just touch collide: a free choice."""
+    reacts = reacted(QUESTIONS["touch"], answer)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
     sign = "<=" if reacts else "<"
     said = f"the comparison is the one with {sign}"
@@ -175,15 +182,20 @@ def touch(answer: Answer) -> CheckRow:
     return CheckRow("just touching", "2a", asked, got, "yes or no", "free choice", said)
 
 
-def same_centre(answer: Answer) -> CheckRow:
-    """Two spheres at one place have no normal, and the exercise does not say what becomes of
-    them."""
+def same_centre(answer: Answer, others_fail: bool) -> CheckRow:
+    """Two spheres at one place have no normal, and the exercise does not say what becomes of them;
+    but the call must come back. `others_fail`: it fails for other pairs, too."""
     asked = "What becomes of two spheres whose centres are at the same place?"
+    if answer.failed and answer.failed.kind == "timeout" and not others_fail:
+        cause = f"for two spheres at the same place the function {answer.failed}"
+        return judged("same centre", "2a", asked, "the call goes on", "anything", False, cause)
     values = [] if answer.failed else [x for b in answer.last for x in (*b.x, *b.v, b.alpha, b.w)]
     guarded = bool(values) and bool(np.isfinite(values).all())
     said = (
         "this case has a guard"
         if guarded
+        else "the call fails as it does for other pairs, so that a guard cannot be seen"
+        if answer.failed and others_fail
         else "there is no guard for this case; the direction between the two is 0 / 0"
     )
     got = (

@@ -1,4 +1,4 @@
-"""What speaks for a fault, as lines of text."""
+"""The evidence of a fault, as lines of text."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from reports.check.rows import CheckRow
 
 
 def evidence(row: CheckRow) -> list[str]:
-    """What speaks for a fault, a line each: the numbers, the file's lines, the formula."""
+    """The evidence of a fault, a line each: the numbers, the file's lines, the formula."""
     lines = [f"came: {row.got}", f"expected: {row.expected}"]
     lines += [f"line {line}: {text}" for line, text in row.lines]
     lines += [f"exercise: {row.formula}"] * bool(row.formula)

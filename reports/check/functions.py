@@ -15,48 +15,54 @@ MAY_FAIL = ("same centre",)  # is judged by a row of its own
 
 
 def implemented(
-    task: str,
-    there: bool,
-    answers: dict[str, Answer],
-    text: str,
-    part: Callable[[str], str],
+    task: str, there: bool, answers: dict[str, Answer], text: str
 ) -> tuple[list[CheckRow], bool]:
-    """The rows on the function of a task and its arguments, and whether it can be judged further.
-
-    part: of the task, in which the call of a question failed.
-    """
+    """The rows on the function of a task and its arguments, and whether it can be judged
+    further."""
     function = FUNCTIONS[task]
-    asked = f"Does {function} do something with the spheres it is given?"
-
-    def fault(got: str, cause: str, where: str = task) -> tuple[list[CheckRow], bool]:
-        return [judged("implemented", where, asked, got, "it changes them", False, cause)], False
-
     if not there:
-        return fault(
-            "there is no such function",
-            f"not implemented: the file has no function {function}{instead(function, text)}",
-        )
-    failed = {
-        name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL
-    }
-    if failed:
-        name, answer = next(iter(failed.items()))
-        got = f"it fails in {len(failed)} of {len(answers)} calls"
-        return fault(got, f"{function}: {answer.failed}", part(name))
+        missing = f"not implemented: the file has no function {function}{instead(function, text)}"
+        return [not_implemented(task, "there is no such function", missing)], False
+    if failed_calls(answers):
+        return [failure(task, task, answers)], False
     if not any(
         changed(QUESTIONS[name].balls, answer.last)
         for name, answer in answers.items()
         if answer.balls
     ):
-        return fault("nothing is changed", nothing(function, answers.values()))
+        idle = nothing(function, answers.values())
+        return [not_implemented(task, "nothing is changed", idle)], False
     return [arguments(task, function, answers.values())], True
+
+
+def failed_calls(answers: dict[str, Answer]) -> dict[str, Answer]:
+    """The answers of calls that failed, of those that a right function comes back from."""
+    return {
+        name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL
+    }
+
+
+def failure(task: str, part: str, answers: dict[str, Answer]) -> CheckRow:
+    """The fault of a function that fails in a part of its task."""
+    failed = failed_calls(answers)
+    got = f"it fails in {len(failed)} of {len(answers)} calls"
+    why = next(answer.failed for answer in failed.values())
+    asked = f"Does {FUNCTIONS[task]} come back from every call?"
+    cause = f"{FUNCTIONS[task]}: {why}"
+    return judged("implemented", part, asked, got, "yes", False, cause)
+
+
+def not_implemented(task: str, got: str, cause: str) -> CheckRow:
+    """The fault of a function that is missing, or changes nothing."""
+    asked = f"Does {FUNCTIONS[task]} change the spheres it is given?"
+    return judged("implemented", task, asked, got, "it changes them", False, cause)
 
 
 def same_again(
     function: str, answers: dict[str, Answer], others: dict[str, Answer]
 ) -> list[CheckRow]:
-    """A fault where answers depend on what was asked before, in the part that it changes; else
-    nothing. `others`: the answers that came otherwise."""
+    """A fault if answers depend on what was asked before, in the part of the task that they change;
+    else nothing. `others`: the answers that differ."""
     mine = {name: other for name, other in others.items() if name in answers}
     if not mine:
         return []

@@ -1,5 +1,5 @@
-"""What a solver may take for the impulse of a collision, and what it may do with it; and which of
-that it does.
+"""Known mistakes in the impulse of a collision and in the new velocities, as formulas; and which
+of them a solver makes.
 
 J = -(1 + e) (vA - vB).n / (1/mA + 1/mB), vA' = vA + J n / mA, vB' = vB - J n / mB, n the unit
 vector from B to A (Newton's law of impact; Landau & Lifshitz, Mechanics, 17).
@@ -225,7 +225,7 @@ class Finding:
             none.
         task: of the update.
         e: the restitution used.
-        law, change: what it takes for the impulse, and what it does with it.
+        law, change: its formula for the impulse, and for the change of both velocities by it.
     """
 
     impulse: str

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from adapters.own_solver.restitution import EXERCISE
 from reports.check.collisions import PairCollision, changes, collision_of
 from reports.check.impacts import IMPULSES, SEPARATING, UPDATES, Finding, tangent
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
@@ -104,6 +105,33 @@ def impulse_rows(
     ]
 
 
+def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
+    """The row of (c) where the function fails in (d): J is right, if in every collision one of the
+    spheres got it before the failure; restitution and energy then need no rows. Else nothing: J is
+    not known."""
+    if not all(answers[name].balls for name in COLLISIONS):
+        return []
+    seen = [
+        (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
+        for name, q in COLLISIONS.items()
+    ]
+    right = [IMPULSES[""](pair, EXERCISE) for pair, _ in seen]
+    for_a = [pair.ma * change[0] for pair, change in seen]
+    for_b = [-pair.mb * change[1] for pair, change in seen]
+    if not (near(for_a, right) or near(for_b, right)):
+        return []
+    pair, wanted = seen[0][0], f"{shown(right[0] @ seen[0][0].n)} N s"
+    got = f"{wanted} along the normal"
+    return [judged("impulse", "2c", asked_of_impulse(pair), got, wanted, True)]
+
+
+def asked_of_impulse(pair: PairCollision) -> str:
+    """The question on J."""
+    return (
+        f"What impulse does A get from B, for masses of {shown(pair.ma)} and {shown(pair.mb)} kg?"
+    )
+
+
 def seen_in(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> Seen:
     """The collision to show, and the mistakes in it."""
     e = found.e if found else restitution.own
@@ -137,11 +165,10 @@ def swapped(name: str) -> str:
 
 def normal_impulse(seen: Seen) -> CheckRow:
     """J."""
-    masses = f"{shown(seen.pair.ma)} and {shown(seen.pair.mb)} kg"
     return judged(
         "impulse",
         "2c",
-        f"What impulse does A get from B, for masses of {masses}?",
+        asked_of_impulse(seen.pair),
         f"{shown(seen.shown_impulse @ seen.pair.n)} N s along the normal",
         f"{shown(seen.right_impulse @ seen.pair.n)} N s",
         # what is wrong across the normal is the next row's
@@ -192,7 +219,8 @@ def new_velocity(seen: Seen, k: int) -> CheckRow:
     return judged(
         f"velocity of {'AB'[k]}",
         "2d",
-        f"What velocity has {'AB'[k]} after the collision, by the impulse that the file computes?",
+        f"What is the velocity of {'AB'[k]} after the collision, by the impulse that the file"
+        " computes?",
         f"{shown(seen.after[k])} m/s",
         f"{shown(before + change)} m/s",
         seen.right_d or near(seen.change[k], change),
@@ -229,15 +257,11 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     a, b = (any(both) for both in zip(*lost.values()))
     why = "(a field that does not exist, a division by zero?)"
     if a and b:
-        asked = (
-            f"What impulse does A get from B, for masses of {shown(collision.ma)} and"
-            f" {shown(collision.mb)} kg?"
-        )
         return [
             judged(
                 "impulse",
                 "2c",
-                asked,
+                asked_of_impulse(collision),
                 f"{shown(collision.ma * came[0])} N s",
                 f"{shown(P)} N s",
                 False,
@@ -253,7 +277,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
         judged(
             f"velocity of {who}",
             "2d",
-            f"What velocity has {who} after the collision?",
+            f"What is the velocity of {who} after the collision?",
             f"{shown(after[int(b)].v)} m/s",
             f"{shown(right)} m/s",
             False,
@@ -263,8 +287,8 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
 
 
 def partly(answers: dict[str, Answer], e: float) -> str:
-    """Where no single mistake gives all collisions: whether some of them are right, or the order of
-    A and B matters."""
+    """Where no single mistake gives all collisions: that the order of A and B matters, that only
+    the tangent is wrong, or that some collisions are right; else ""."""
     if not alike_if_swapped(answers):
         return UNALIKE
     if only_across(answers, e):
@@ -312,7 +336,7 @@ def energy(collision: PairCollision, came: Array) -> float:
 
 def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> CheckRow:
     """On pairs that move apart: nothing, or the printed formula; both are free."""
-    asked = "What impulse gets a pair that overlaps and moves apart?"
+    asked = "Which impulse acts on a pair that overlaps and moves apart?"
     expected = "none, or that of the formula"
     seen = [
         (
@@ -351,8 +375,8 @@ def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(CO
 
 
 def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
-    """Who is called A must not matter to the velocities. Where both get opposite impulses (d) is
-    right, and it is the impulse that depends on it."""
+    """The velocities must not depend on which sphere is called A. If both get opposite impulses,
+    (d) is right, and the impulse is what depends on it."""
     first = next((name for name in COLLISIONS if not alike_if_swapped(answers, [name])), FIRST)
     task, mistake = ("2c", seen.impulse) if seen.opposite else ("2d", seen.update)
     return judged(

@@ -36,7 +36,7 @@ class Access(NamedTuple):
 
     @property
     def line(self) -> int:
-        """Where it stands; 0 if nobody can tell."""
+        """The line that reads or writes; 0 if it is not known."""
         return self.lines[0] if self.lines else 0
 
 
@@ -56,8 +56,8 @@ def accesses_of(process: SolverProcess, question: Question) -> list[Access]:
 
 
 def outside_helpers(seen: list[Access]) -> list[Access]:
-    """The accesses, those of a line that writes positions and velocities alike moved to the line
-    that called it: such a helper sets whatever vector it is given."""
+    """The accesses. A line that writes positions and velocities alike is in a helper, which sets
+    any vector: its accesses get the line that called it."""
     written: dict[int, set[str]] = {}
     for access in seen:
         if access.kind == "w":
@@ -172,8 +172,8 @@ def detecting(seen: Sequence[Access]) -> list[int]:
 
 
 def displacing(seen: Sequence[Access], cause: str) -> list[int]:
-    """The lines that write positions; of one sphere, if only that one is at fault. Before them the
-    last that reads sizes, where the overlap is computed, if the cause is in that."""
+    """The lines that write positions, of both spheres or of the one that is at fault. If the cause
+    is in the overlap, they come after the line that computes it: the last that reads sizes."""
     who = re.match(r"(?:only )?([AB])\b", cause)
     spheres = {"AB".index(who[1])} if who else {0, 1}
     writes = [a.line for a in seen if is_write(a, "position") and a.sphere in spheres]
@@ -182,8 +182,8 @@ def displacing(seen: Sequence[Access], cause: str) -> list[int]:
 
 
 def impelling(seen: Sequence[Access], cause: str) -> list[int]:
-    """The lines that compute the impulse from the velocities or the masses, whichever the cause is
-    about; where there is none the lines that write velocities."""
+    """The lines that compute the impulse: those that read velocities or those that read masses, as
+    the cause says. If there are none, the lines that write velocities."""
     displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
     moving = {a.line for a in seen if is_write(a, "position")}
     writes = [a.line for a in seen if is_write(a, "velocity")]

@@ -159,9 +159,10 @@ def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str
 
 
 def against_itself(question: Question, came: dict[str, Answer]) -> CheckRow | None:
-    """What comes of a sphere that is given to the collision function twice; None if none is.
+    """What becomes of a sphere that is given to the collision function twice; None if none is.
 
-    Nobody is near anybody else, so that whatever is struck was struck by itself.
+    No two spheres are near each other here, so that a sphere which changes has collided with
+    itself.
     """
     alone = [call[1] for call in came["watched"].calls if is_with_itself(call)]
     if not alone:
@@ -184,7 +185,7 @@ def is_with_itself(call: tuple[Any, ...]) -> bool:
 
 
 def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
-    """Every pair that is put together reacts, and nobody else."""
+    """Every pair that is made to overlap collides, and no other sphere changes."""
     silent, others = [], []
     for name, question in asked.items():
         if not name.startswith("pair"):
@@ -198,7 +199,7 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
     got = (
         f"no collision of {', '.join(silent)}"
         if silent
-        else f"another sphere is struck: {others[0]}"
+        else f"a third sphere changes, too: {others[0]}"
         if others
         else "yes"
     )
@@ -242,8 +243,8 @@ def integration_first(asked: dict[str, Question], came: dict[str, Answer]) -> Ch
 
 
 def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
-    """A step sets who is beyond an edge where projectObjects does; all are at rest, so that only
-    this moves them."""
+    """A step sets a sphere beyond an edge to the place where projectObjects sets it; all spheres
+    are at rest, so that nothing else moves them."""
     wrong = [k for k, (a, b) in enumerate(zip(came.last, alone.last)) if not near(a.x, b.x)]
     got = f"{name_of(wrong[0])} is at {shown(came.last[wrong[0]].x)} m" if wrong else "yes"
     expected = (
@@ -253,7 +254,7 @@ def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
     return judged(
         "edges in a step",
         "loop",
-        "Does a step set who is beyond an edge where projectObjects does?",
+        "Is a sphere beyond an edge where projectObjects sets it, after a step?",
         got,
         expected,
         not wrong,

@@ -45,7 +45,7 @@ class Marked:
     """A check with the student's id and the points.
 
     root: the file or folder that was given; worth: what each question gives; low: whether feedback
-    leaves out causes, lines and formulas.
+    leaves out causes, lines and formulas; not_read: what else lies in `root` and has no row.
     """
 
     id: str
@@ -53,6 +53,7 @@ class Marked:
     root: Path
     worth: Points
     low: bool = False
+    not_read: Sequence[str] = ()
 
     @cached_property
     def tasks(self) -> list[TaskMark]:
@@ -138,10 +139,10 @@ def follows(row: CheckRow) -> bool:
 def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark:
     """The mark of a task, whose questions give `worth` points each.
 
-    A question that could not be asked gives none. A cause costs once, the dearest of the questions
-    that it spoils; one that spoils only questions without points costs as much as the cheapest that
-    has some; a task that is not implemented, or fails, all. What follows from a fault costs
-    nothing.
+    A question that could not be asked gives none. A cause costs the points of one question: of
+    those that it spoils the one with most points, or, if these have none, the question of the task
+    with fewest. A task that is not implemented, or fails, costs all of its points. What follows
+    from a fault costs nothing.
     """
     most, rows = sum(worth.values()), check.of(task)
     cheapest = min(filter(None, worth.values()), default=0.0)
@@ -161,8 +162,8 @@ def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark
 
 
 def asked(name: str, rows: Sequence[CheckRow]) -> bool:
-    """Whether a question was asked, of the rows of its task: one that has no row was not where
-    others of the task were not, either."""
+    """Whether a question was asked, by the rows of its task. One without a row counts as asked if
+    every row of the task was."""
     verdicts = {row.name: row.verdict for row in rows}
     if name in verdicts:
         return OUTCOMES[verdicts[name]].points != "not judged"

@@ -143,7 +143,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     after = [a for _, _, a in seen]
     velocity = law_row(
         "velocity",
-        "What velocity has a sphere after one step under a force?",
+        "What is the velocity of a sphere after one step under a force?",
         "m/s",
         UNDER_FORCE,
         linear,
@@ -152,7 +152,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     )
     spin = law_row(
         "spin",
-        "What angular velocity has a sphere after one step under a torque?",
+        "What is the angular velocity of a sphere after one step under a torque?",
         "rad/s",
         UNDER_TORQUE,
         angular,
@@ -161,7 +161,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
     )
     angle = law_row(
         "angle",
-        "What angle has a sphere after that step, by the angular velocity that it has then?",
+        "What is the angle of a sphere after that step, by its new angular velocity?",
         "rad",
         MOVED,
         angles,
@@ -172,7 +172,7 @@ def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
         velocity,
         law_row(
             "position",
-            "Where is a sphere after that step, by the velocity that it has then?",
+            "Where is a sphere after that step, by its new velocity?",
             "m",
             MOVED,
             places,

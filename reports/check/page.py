@@ -1,5 +1,5 @@
-"""Writes check.html: what was found in one file, and the smallest scene that shows it, yours beside
-the exact one."""
+"""Writes check.html: what was found in one file, and the smallest scenes that show it, with the
+file's motion beside the exact one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import NamedTuple
 from adapters.run import Run
 from reports.check.rows import TASKS, Verdict, shown
 from reports.check.scene_words import faults_of, scene_lines, together
-from reports.check.smallest import DT, Smallest
+from reports.check.smallest_scene import DT, Smallest
 from reports.check.verdict import FileCheck
 from reports.page import style
 from reports.page.documents import ENGINE, render

@@ -1,5 +1,5 @@
-"""Slips in one part of the formulas of a collision: in one product of a scalar product, in one
-velocity of one sphere."""
+"""Mistakes in one part of a formula: in one product of the scalar product, or in one component of
+one velocity."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ COMPONENTS: dict[str, Callable[..., float]] = {
 def components(
     seen: Sequence[tuple[PairCollision, Array]], right: Impulse, e: float
 ) -> tuple[str, Change] | None:
-    """What is done to each part of both velocities, with the right impulse; None if one of them
-    follows no law."""
+    """The mistakes in the components of both velocities, if the impulse is right, and what they do
+    together; None if a component follows no law of `COMPONENTS`."""
     found = {}
     for who, axis in product((0, 1), (0, 1)):
         came = [change[who, axis] for _, change in seen]

@@ -15,8 +15,8 @@ from scenarios.model import Array
 
 
 class Shift(NamedTuple):
-    """How far a pair was moved: A along the normal, B against it, both in m; and the largest way
-    across it."""
+    """The displacement of a pair: of A along the normal, of B against it, and the larger one across
+    it; and before it the overlap, the distance and the sum of the sizes. All in m."""
 
     a: float
     b: float
@@ -88,13 +88,56 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
+TAKEN_TO_BE_APART = "the overlapping pairs of these questions are taken to be apart"
+
+
+def reacts(answers: dict[str, Answer]) -> bool:
+    """Whether the function does something with every pair that collides; to fail is something."""
+    return all(
+        answers[name].failed
+        or not np.array_equal(
+            [b.numbers() for b in answers[name].last], [b.numbers() for b in question.balls]
+        )
+        for name, question in COLLISIONS.items()
+    )
+
+
+def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
+    """The rows of (b) where the function fails later, by the places at which it left the
+    spheres."""
+    if not reacts(answers):
+        return [not_asked("one point", "2b", TAKEN_TO_BE_APART)]
+    named_here = (*COLLISIONS, "at rest to each other", "separate")
+    readable = all(answers[name].balls for name in named_here)
+    if not readable or not all(
+        displaced(question.balls, answers[name]) for name, question in COLLISIONS.items()
+    ):
+        return [not_asked("one point", "2b", "the call fails before it has moved both spheres")]
+    return projection_rows(answers, None)
+
+
+def displaced(before: tuple[Ball, ...], answer: Answer) -> bool:
+    """Whether a call that failed had displaced a pair before: the pair is in its right place, or
+    all four coordinates are others. Any other place may be one on the way."""
+    if not answer.failed:
+        return True
+    shift = shift_of(before, answer.last)
+    moved = np.not_equal([b.x for b in before], [b.x for b in answer.last])
+    return bool(moved.all()) or in_one_point(shift)
+
+
+def in_one_point(shift: Shift) -> bool:
+    """Whether two spheres that overlapped touch after their displacement along the normal."""
+    return near(shift.a + shift.b, shift.overlap, 0.1) and near(shift.across, 0.0, 0.1)
+
+
 def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[CheckRow]:
     """The rows of (b); `found`: what the velocities say."""
     seen = [
         (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
         for name, q in COLLISIONS.items()
     ]
-    met = [near(s.a + s.b, s.overlap, 0.1) and near(s.across, 0.0, 0.1) for _, s, _ in seen]
+    met = [in_one_point(shift) for _, shift, _ in seen]
     balls, shift, after = seen[met.index(False) if False in met else 0]
     distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
     along = all(near(s.across, 0.0, 0.1) for _, s, _ in seen)
@@ -129,10 +172,12 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
 
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
-    """What a pair at relative rest says of the displacement; nothing if the impulse explains it or
-    is not a number."""
+    """The row on a pair at relative rest: its displacement changes no velocity. None if a mistake
+    in the impulse explains the change, or velocities are not numbers."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
+    if not kept and answers["at rest to each other"].failed:
+        return [not_asked("velocities", "2b", "the call fails after it has changed velocities")]
     numbers = bool(np.isfinite([b.v for b in after]).all())
     if not kept and (explained or not finite(answers, "v")):
         return []
@@ -173,7 +218,7 @@ def no_numbers(seen: Pairs) -> str:
 
 
 def half_of_one(seen: Pairs) -> str:
-    """That one sphere stays where it is and the other does only its half."""
+    """That one sphere stays where it is and the other is moved by half of the overlap."""
     halved = all(near(s.a + s.b, s.overlap / 2, 0.1) for _, s, _ in seen)
     for who, still in (("A", "b"), ("B", "a")):
         if halved and all(abs(getattr(s, still)) <= 1e-9 for _, s, _ in seen):
@@ -182,14 +227,14 @@ def half_of_one(seen: Pairs) -> str:
 
 
 def b_as_a(seen: Pairs) -> str:
-    """That both go the same way, together by as much as the overlap."""
+    """That both are moved the same way, by distances that add up to the overlap."""
     alike = (near(abs(s.a) + abs(s.b), s.overlap, 0.1) and s.a * s.b < 0 for _, s, _ in seen)
     return "B is moved the same way as A: its sign is wrong" if all(alike) else ""
 
 
 def wrong_total(seen: Pairs) -> str:
-    """The formula of `TOTALS` that gives the way of both together, of pairs moved along their
-    normals."""
+    """The formula of `TOTALS` that gives the displacement of both together, if all pairs are moved
+    along their normals."""
     if not all(near(s.across, 0.0, 0.1) for _, s, _ in seen):
         return ""
     with np.errstate(all="ignore"):
@@ -260,7 +305,7 @@ def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
 
 
 def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
-    """Who is moved how far: free; said with what it does to the centre of mass."""
+    """How the overlap is shared, and what that does to the centre of mass: a free choice."""
     a, b = balls
     share = shift.a / shift.overlap
     known = {
@@ -296,9 +341,11 @@ ONE = (
 
 
 def separation(answer: Answer) -> CheckRow:
-    """A pair that overlaps and moves apart: displaced or left; free, as nothing is lost by it."""
+    """Whether a pair is displaced that overlaps and moves apart: a free choice."""
     shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
+    if answer.failed and not moved:
+        return not_asked("separating pair", "2b", "the call fails before it moves such a pair")
     said = (
         "it is displaced like any other pair"
         if moved

@@ -72,7 +72,7 @@ class RowItem(pytest.Item):
     def repr_failure(
         self, excinfo: pytest.ExceptionInfo[BaseException], *given: Any, **named: Any
     ) -> str:
-        """The row in words, without a stack that is not the solver's."""
+        """The row in words, without a traceback, which would not be that of the solver."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))
         from reports.check.evidence import evidence

@@ -1,4 +1,5 @@
-"""The tiny states a solver is asked about, and its answers, which must not depend on each other."""
+"""The questions: a few spheres each, on which a solver's functions are called; and its answers,
+which must not depend on the question before."""
 
 from __future__ import annotations
 
@@ -82,7 +83,8 @@ class Answer:
     """What came of a question.
 
     Attributes:
-        balls: the spheres after each call.
+        balls: the spheres after each call; of a question that failed those of the calls before, or
+            as `left_by` of failing.py finds them.
         returned: whether a function gave back an object.
         strayed: whether the file's own ufo or asteroids changed, though they had no part in it.
         strange: fields that the spheres did not have before.
@@ -175,7 +177,6 @@ def questions() -> dict[str, Question]:
         "turned far": forced(0.1, F=(0.0, 0.0), torque=0.0, alpha=6.2, w=2.0),
         "turned back": forced(0.1, F=(0.0, 0.0), torque=0.0, alpha=-3.1, w=-2.0),
         "touch": pair(Ball((0.0, 0.0), (1.0, 0.0), r=0.25), Ball((0.75, 0.0), (-1.0, 0.0), r=0.5)),
-        "same centre": pair(Ball((0.1, 0.2), (1.0, 0.5)), Ball((0.1, 0.2), (-0.5, 0.3), m=2.0)),
         "at rest to each other": meeting((1.3, 5.1), (0.3, 0.2), (0.3, 0.2), 0.5),
         "separate": meeting((1.3, 5.1), (-1.1, 0.2), (0.7, 0.4), 0.5),
         "separate, other numbers": meeting((2.2, 1.7), (-0.3, -0.9), (0.2, 1.1), 1.3),
@@ -195,6 +196,8 @@ def questions() -> dict[str, Question]:
         found[f"reach/{k}"] = pair(
             a, Ball(tuple(np.array(a.x) + d * n), tuple(-0.9 * n), r=rb, m=2.1)
         )
+    # last: where this call never comes back, the others were answered before
+    found["same centre"] = pair(Ball((0.1, 0.2), (1.0, 0.5)), Ball((0.1, 0.2), (-0.5, 0.3), m=2.0))
     return found
 
 
@@ -234,12 +237,12 @@ def fresh_world(process: SolverProcess) -> list[Request]:
 def ask_in_two_orders(
     process: SolverProcess, asked: dict[str, Question]
 ) -> tuple[dict[str, Answer], dict[str, Answer]]:
-    """The answers of a fresh world to each question, and those that came otherwise where more was
-    asked before.
+    """The answer to each question, asked first in a fresh world; and the answers that differ when
+    other questions come before.
 
-    A fresh world takes V8 10 ms. So all are asked in one world and then, in the other order, in a
-    second one: where both answer the same, what was asked before does not matter. Where they do
-    not, each question gets a world of its own.
+    A fresh world takes V8 10 ms. So all questions are asked in one world, and in the reverse order
+    in a second one. If both give the same answers, what was asked before does not matter. If not,
+    each question is asked again in a world of its own.
     """
     process.request(fresh_world(process))
     answers = ask(process, asked)
@@ -260,7 +263,7 @@ def ask_in_two_orders(
     return alone, others
 
 
-BY_CHANCE = ("same centre",)  # who has no direction may draw one
+BY_CHANCE = ("same centre",)  # where there is no normal, a solver may choose one at random
 
 
 def alike(one: Answer, other: Answer) -> bool:
@@ -274,7 +277,7 @@ def alike(one: Answer, other: Answer) -> bool:
 
 
 def stuck(answers: dict[str, Answer]) -> bool:
-    """Whether a call had to be stopped: whatever makes it again would have to be stopped, too."""
+    """Whether a call had to be stopped; if it is made again, it must be stopped again."""
     return any(
         answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
     )

@@ -19,12 +19,12 @@ from reports.check.rows import CheckRow, judged, near, shown
 
 @dataclass(frozen=True)
 class Restitution:
-    """Of a file.
+    """The restitution of a file.
 
     Attributes:
-        read: what its text says, and what came of a pair that closes at 2 m/s.
-        absurd: whether what came is not from 0 to 1, and a name such as e or restitution gets it.
-        slow, fast: what comes of pairs that close at 2 mm/s and at 200 m/s.
+        read: what its text says, and what a pair has that closes at 2 m/s.
+        absurd: whether that is not from 0 to 1, and the text gives it to a name such as e.
+        slow, fast: what pairs have that close at 2 mm/s and at 200 m/s.
     """
 
     read: OwnRestitution
@@ -39,14 +39,14 @@ class Restitution:
 
     @property
     def own(self) -> float:
-        """The value that the file states, or the exercise's if it states none: a number that only
-        occurs may be any other."""
+        """The value that the file states, or the exercise's if it states none: any other number in
+        the file may mean something else."""
         return self.read.own if self.read.stated and self.read.own is not None else EXERCISE
 
     @property
     def candidates(self) -> list[float]:
-        """The values a collision is explained by: the file's own first, then what came, if nothing
-        contradicts it."""
+        """The values of e that are tried to explain collisions: the file's own, then the one that
+        came, unless the file states another."""
         free = 0 <= self.came <= 1 and not self.read.stated
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
@@ -101,7 +101,7 @@ class Restitution:
         return judged(
             "restitution at other speeds",
             "2c",
-            "Have the same two spheres that restitution at 2 mm/s and at 200 m/s, too?",
+            "Do the same two spheres have that restitution at 2 mm/s and at 200 m/s, too?",
             f"{shown(self.slow)} and {shown(self.fast)}",
             f"{shown(self.came)}, as at 2 m/s",
             near([self.slow, self.fast], self.came),

@@ -8,7 +8,7 @@ from reports.check.rows import shown
 from scenarios.model import Scenario
 
 if TYPE_CHECKING:
-    from reports.check.smallest import Smallest
+    from reports.check.smallest_scene import Smallest
 
 
 def scene_lines(scenario: Scenario) -> list[str]:

@@ -1,5 +1,5 @@
-"""Whole scenes: a solver's motion against the exact one, within what dt explains, and its first
-wrong collision."""
+"""Whole scenes: how far a solver's motion is from the exact one, beside what its step size
+explains; and its first wrong collision."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_a
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.truth.closed_forms import world_thrusts
-from scenarios.truth.exact import computed
+from scenarios.truth.exact import OracleTruth
 from scenarios.truth.record import TruthRecord
 
 DT = 1e-3  # s, the exercise's
@@ -218,8 +218,8 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
 
 
 def first_wrong(scenario: Scenario, contacts: Array, dt: float, part: str = "") -> str:
-    """The first contact that is not what the formula makes of the state before it, in a sentence;
-    "" if none. `part`: only what is wrong in this part of task 2, as in `contact_faults`."""
+    """A sentence on the first contact whose outcome is not that of the formula; "" if none is.
+    `part`: looks only for what is wrong in this part of task 2, as in `contact_faults`."""
     scene = scenario.scene
     for row in contacts:
         step, i, j = int(row[0]), int(row[1]), int(row[2])
@@ -320,7 +320,7 @@ MET: dict[str, tuple[Any, ...]] = {
 @lru_cache(maxsize=8)
 def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
     """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or
-    many digits."""
+    many digits, which are computed once for each `e` and kept in the cache."""
     forced = Scenario(
         name="forced",
         asks="Where is a sphere after a second of a constant force and torque?",
@@ -341,7 +341,7 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
             sample_interval=INTERVAL,
         )
         try:
-            found.append((scenario, computed(scenario)))
+            found.append((scenario, OracleTruth(scenario).record()))
         except NoTruth:  # e = 0 leaves touching spheres, whose motion the oracle does not follow
             continue
     return tuple(found)

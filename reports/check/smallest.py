@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from operator import itemgetter
 from tempfile import TemporaryDirectory
@@ -21,13 +21,11 @@ from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
 from reports.check.rows import SAME_AGAIN, TOLERANCE, CheckRow, near, shown
 from reports.check.scenes import SceneAnswer, first_wrong, play_scene, scene_of, truth_of
+from reports.check.smallest_scene import DT, Smallest
 from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed
 
-# s, coarse: a scene is played in milliseconds, and a collision found late is judged by the state it
-# is found in
-DT = 1e-2
 SECONDS = 1.5  # for drawing and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s
 EXAMPLES = 400
@@ -49,21 +47,6 @@ FIRST: list[Example] = [
 ]
 
 
-@dataclass(frozen=True)
-class Smallest:
-    """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where
-    there is one.
-
-    of: the numbers, from 1, of the faults that it shows.
-    """
-
-    scenario: Scenario
-    fault: str
-    yours: Trajectory
-    truth: Trajectory | None
-    of: tuple[int, ...] = (1,)
-
-
 # Task, or row of a task -> what a scene shows of it: where a flight leads, how it turns, an overlap
 # that is seen or not, a distance, velocities, momentum.
 PARTS = {"1": "1", "2a": "2a", "2b": "2b", "2c": "2c", "2d": "2d", "file": "", "scenes": ""}
@@ -82,9 +65,9 @@ BOTH = "2c and 2d"
 def smallest_scenes(
     process: SolverProcess, e: float, findings: Sequence[CheckRow], afresh: bool = False
 ) -> list[Smallest]:
-    """Of each fault the smallest scene that shows it, as far as one is found; one scene for a fault
-    in 2c and one in 2d, if both can be told from it. Of the loop there is none: a scene is played
-    by the loop of the exercise."""
+    """For each fault the smallest scene that shows it, if one is found. A fault in 2c and one in 2d
+    share a scene, in which both can be told. A fault of the loop has none: scenes are played by the
+    exercise's own loop."""
     search = partial(smallest_scene, process, e, afresh)
     of = {part: k for k, part in reversed([*enumerate(map(part_of, findings), 1)])}
     if list(of) == [None]:  # a single fault may show in anything
@@ -152,8 +135,8 @@ def size(example: Example) -> tuple[int, int]:
 
 @contextmanager
 def homeless() -> Iterator[None]:
-    """Hypothesis keeps what it has read in .hypothesis of the folder the user works in; here in one
-    that goes."""
+    """Hypothesis writes into a folder .hypothesis where the user works; within this it writes into
+    a temporary one."""
     with TemporaryDirectory() as home:
         set_hypothesis_home_dir(home)
         try:
@@ -165,8 +148,8 @@ def homeless() -> Iterator[None]:
 def without_idlers(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
-    """The scene without the spheres that the fault does not need: the time may be up before
-    hypothesis sees to it."""
+    """The scene without the spheres that the fault does not need. Hypothesis removes them, too, but
+    may run out of time."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
         if fewer and fault_of(play, fewer, thrust, e, part):

@@ -6,21 +6,25 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of, own_text
 from reports.check.consequences import with_consequences
 from reports.check.detection import detection_rows
-from reports.check.functions import implemented, same_again
+from reports.check.failing import rows_until_failure
+from reports.check.functions import failed_calls, implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_rows
-from reports.check.lines import SHOWN, Source
+from reports.check.lines import Source
 from reports.check.loop import loop_rows
 from reports.check.motion import TURNED, motion_rows
-from reports.check.projection import moved_together, projection_rows
-from reports.check.questions import COLLISIONS, QUESTIONS, Answer, ask_in_two_orders, stuck
+from reports.check.projection import (
+    TAKEN_TO_BE_APART,
+    moved_together,
+    projection_rows,
+    reacts,
+)
+from reports.check.questions import QUESTIONS, Answer, ask_in_two_orders, stuck
 from reports.check.restitution import Restitution, restitution_of
 from reports.check.rows import CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
@@ -57,14 +61,17 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
         return [loads(process), lost], None
 
 
-LOADS = "Can the file be loaded, and does it leave the language as it is?"
+LOADS = "Can the file be loaded, and does it leave the built-in functions as they are?"
 
 
 def rows_of(
     process: SolverProcess, text: str, with_beside: str
 ) -> tuple[list[CheckRow], float | None]:
-    """The rows of a file that is loaded, and its restitution; `with_beside`: its text with that of
-    its own modules. Raises `SolverFailed` if its process is lost."""
+    """The rows of a file that is loaded, and its restitution.
+
+    text: of the file; with_beside: the same with the modules that it imports from its folder.
+    Raises `SolverFailed` if its process is lost.
+    """
     asked = {
         k: q
         for k, q in QUESTIONS.items()
@@ -97,10 +104,8 @@ def with_lines(rows: list[CheckRow], source: Source) -> list[CheckRow]:
 
 
 def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
-    """The rows, the first fault with a word on a condition that sets a variable, if the file has
-    one.
-
-    Python takes no such condition.
+    """The rows; if a condition of the file has = where == may be meant, the cause of the first
+    fault says so. Python loads no file with such a condition.
     """
     slip, faulty = (
         SET_IN_CONDITION.search(code_of(text)),
@@ -137,9 +142,9 @@ def loads(process: SolverProcess) -> CheckRow:
 def task_1(
     process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], text: str
 ) -> list[CheckRow]:
-    """The rows of integrate; `others`: the answers that came otherwise after other questions."""
+    """The rows of integrate; `others`: the answers that differ when other questions come first."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
-    rows, usable = implemented("1", process.functions["integrate"], mine, text, lambda name: "1")
+    rows, usable = implemented("1", process.functions["integrate"], mine, text)
     if not usable:
         return [*rows, not_asked("velocity", "1", "integrate cannot be judged further")]
     return [*rows, *same_again("integrate", mine, others), *motion_rows(mine)]
@@ -152,22 +157,17 @@ def task_2(
     source: Source,
     with_beside: str,
 ) -> tuple[list[CheckRow], Restitution | None]:
-    """The rows of the collision function, and its restitution where it has one."""
+    """The rows of the collision function, and its restitution if one can be read from its
+    collisions."""
     mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
-
-    def part(name: str) -> str:
-        question = SHOWN["2"] if mine[SHOWN["2"]].failed else name
-        failed = mine[question].failed
-        return source.part_of(question, failed.line if failed else 0)
-
-    rows, usable = implemented("2a", process.functions["collide"], mine, text, part)
+    if failed_calls(mine):
+        return with_not_asked(rows_until_failure(process, mine, source), HIDDEN), None
+    rows, usable = implemented("2a", process.functions["collide"], mine, text)
     if not usable:
-        why = "the collision function cannot be judged further"
-        return rows + not_asked_of_task_2(rows[0].task, why), None
+        return with_not_asked(rows, NO_FURTHER), None
     rows += detection_rows(mine, text)
     if not reacts(mine):
-        why = "the overlapping pairs of these questions are taken to be apart"
-        return rows + not_asked_of_task_2("2a", why), None
+        return with_not_asked(rows, TAKEN_TO_BE_APART), None
     restitution = restitution_of(with_beside, mine)
     found = explain(mine, restitution)
     if found is not None and found.impulse == APPROACH and moved_together(mine):
@@ -178,17 +178,13 @@ def task_2(
     return sorted(rows, key=lambda row: row.task), restitution
 
 
-def not_asked_of_task_2(but: str, why: str) -> list[CheckRow]:
-    """A row for each part of task 2 that could not be asked, without the part that says why."""
+NO_FURTHER = "the collision function cannot be judged further"
+HIDDEN = "the collision function fails, so that this cannot be seen"
+
+
+def with_not_asked(rows: list[CheckRow], why: str) -> list[CheckRow]:
+    """The rows of task 2, with one for each part that has none: it was not asked."""
     first = {"2a": "overlap", "2b": "one point", "2c": "impulse", "2d": "velocity of A"}
-    return [not_asked(name, task, why) for task, name in first.items() if task != but]
-
-
-def reacts(answers: dict[str, Answer]) -> bool:
-    """Whether every pair that is asked about beyond detection does something."""
-    return all(
-        not np.array_equal(
-            [b.numbers() for b in answers[name].last], [b.numbers() for b in QUESTIONS[name].balls]
-        )
-        for name in COLLISIONS
-    )
+    judged_parts = {row.task for row in rows}
+    added = [not_asked(name, part, why) for part, name in first.items() if part not in judged_parts]
+    return sorted([*rows, *added], key=lambda row: row.task)

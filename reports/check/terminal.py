@@ -14,14 +14,14 @@ from adapters.own_solver.file import printable
 from reports.check.outcomes import OUTCOMES
 from reports.check.rows import TASKS, CheckRow
 from reports.check.scene_words import faults_of, scene_lines, together
-from reports.check.verdict import FileCheck, headline, numbers_of
+from reports.check.verdict import FileCheck, headline, named, numbers_of
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
 from reports.terminal.tables import print_table
 
 if TYPE_CHECKING:
-    from reports.check.smallest import Smallest
+    from reports.check.smallest_scene import Smallest
 
 STYLE = {
     "right": "green",
@@ -31,8 +31,8 @@ STYLE = {
     "not asked": "dim",
 }
 LEGEND = (
-    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked:"
-    " the file has no such part, or cannot be judged that far."
+    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked,"
+    " as the file has no such part, or a FAULT hides it."
 )
 
 
@@ -124,17 +124,17 @@ def name_in(folder: Path, one: FileCheck) -> str:
 
 
 def elided(name: str, room: int) -> str:
-    """A name that fits, without its middle if it is too long: who it is and which file stand at its
-    ends."""
+    """A name that fits into `room` columns; a longer one loses its middle, as student and file
+    stand at its ends."""
     if len(name) <= room:
         return name
     end = max(room // 2, 1)
     return f"{name[: max(room - end - 1, 1)]}…{name[-end:]}"
 
 
-def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
+def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[str] = ()) -> None:
     """A row a file, a verdict for every task; below, what the signs mean, of each the sentence to
-    begin with, and which are copies."""
+    begin with, which are copies, and what else lies in the folder."""
     console = Console()
     widest = {
         task: max(len(task), *(len(OUTCOMES[one.tasks[task]].short) for one in checks))
@@ -165,6 +165,13 @@ def print_class(folder: Path, checks: Sequence[FileCheck]) -> None:
     console.print(total(checks), highlight=False)
     if any(one.faults for one in checks):
         console.print("crosscheck check FILE shows the lines and the numbers of one.")
+    if not_read:
+        console.print(sentence_on(not_read), highlight=False)
+
+
+def sentence_on(not_read: Sequence[str]) -> str:
+    """What lies in the folder of a class and has no row."""
+    return f"Not read, as no .js and no .py file: {named(not_read)}."
 
 
 def total(checks: Sequence[FileCheck]) -> str:
@@ -186,7 +193,7 @@ def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
 
 
 def bare(text: str, comment: str) -> str:
-    """A text without spaces and without its lines that are comments; one behind code stays, as
-    what begins it may also stand in a string."""
+    """A text without spaces and without lines that are comments. A comment after code stays: its
+    sign may be inside a string."""
     lines = ("".join(line.split()) for line in text.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith(comment))

@@ -22,10 +22,15 @@ NAMED = 3  # files that are none
 
 @dataclass(frozen=True)
 class FileCheck:
-    """One file, its rows and the restitution its scenes have; or why it is no solver at all, and
-    then no rows.
+    """The check of one file.
 
-    solver: the text that was checked; None if there is none. seconds: that the check took.
+    Attributes:
+        path: of the file.
+        rows: what was checked; none of a file that is no solver.
+        refused: why it is no solver; "" if it is one.
+        restitution: that its whole scenes are judged by; None where they cannot be.
+        solver: the text that was checked; None if there is none.
+        seconds: that the check took.
     """
 
     path: Path
@@ -57,7 +62,7 @@ class FileCheck:
 
     @property
     def loaded(self) -> bool:
-        """Whether anything beyond the file itself could be looked at."""
+        """Whether the file could be loaded, so that its tasks have rows."""
         return any(row.task != "file" for row in self.rows)
 
     def of(self, task: str) -> list[CheckRow]:
@@ -71,8 +76,8 @@ class FileCheck:
 
     @property
     def sentences(self) -> list[str]:
-        """At most `MOST`, the one to begin with first: a mistake once, without what only follows
-        from it."""
+        """At most `MOST` sentences, in the order of the tasks. Each cause has one; what follows
+        from a fault has none."""
         if self.refused:
             return [self.refused]
         if not self.faults:
@@ -150,7 +155,7 @@ def task_title(task: str) -> str:
 
 
 def check_file(path: Path) -> FileCheck:
-    """The check of one file, whatever it is; of a folder, that there is none."""
+    """The check of one file, with the time it took; a folder is refused, as it is no file."""
     began = perf_counter()
     return replace(check_of(path), seconds=perf_counter() - began)
 

@@ -25,6 +25,7 @@ def as_json(marked: Sequence[Marked]) -> dict[str, Any]:
         "crosscheck": version("crosscheck2d"),
         "passed": all(one.check.passed for one in marked),
         "files": [file_as_json(one) for one in marked],
+        "not_read": list(marked[0].not_read),
     }
 
 

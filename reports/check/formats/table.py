@@ -23,4 +23,4 @@ def table_text(marked: Sequence[Marked]) -> str:
 def show(marked: Sequence[Marked]) -> None:
     """Print it."""
     root, checks = marked[0].root, [one.check for one in marked]
-    print_class(root, checks) if root.is_dir() else print_file(checks[0])
+    print_class(root, checks, marked[0].not_read) if root.is_dir() else print_file(checks[0])

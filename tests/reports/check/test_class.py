@@ -3,6 +3,7 @@ they handed in."""
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -102,8 +103,38 @@ def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
     found = command.files_of(tmp_path)
 
     assert [one.name for one in found] == ["anna.js", "cem.pdf", "dora.ZIP", "empty", "zipped"]
-    assert command.others_in(tmp_path, found) == ["marks.csv"]
+    assert command.others_in(tmp_path, found) == ["marks.csv", "pictures/"]
     assert check_file(tmp_path / "dora.ZIP").refused.endswith("a solver is a .js or a .py file")
+
+
+def test_every_output_names_what_was_not_read(tmp_path: Path):
+    """A text, and a folder without a solver: in the table, printed or written, on the page, in
+    JSON; beside the formats that have no place for it, on standard error. A class without such
+    files is told nothing."""
+    group = tmp_path / "class"
+    group.mkdir()
+    (group / "pictures").mkdir()
+    (group / "pictures" / "ufo.png").write_bytes(b"")
+    (group / "anna.js").write_text("x = 1\n")
+    (group / "m.txt").write_text("")
+    words = ["check", group, "--page", "p.html", "--format", "table", "--out", "t.txt"]
+    printed = crosscheck(*words, cwd=tmp_path)
+    outputs = {
+        name: crosscheck("check", group, "--format", name, cwd=tmp_path)
+        for name in ("json", "csv", "junit")
+    }
+    said = "Not read, as no .js and no .py file: m.txt, pictures/."
+
+    (group / "m.txt").unlink()
+    shutil.rmtree(group / "pictures")
+    clean = crosscheck("check", group, "--format", "json", cwd=tmp_path)
+
+    assert said in printed.stdout
+    assert said in (tmp_path / "t.txt").read_text()
+    assert said in (tmp_path / "p.html").read_text()
+    assert all(said in done.stderr for done in outputs.values())
+    assert json.loads(outputs["json"].stdout)["not_read"] == ["m.txt", "pictures/"]
+    assert (json.loads(clean.stdout)["not_read"], "Not read" in clean.stderr) == ([], False)
 
 
 def test_one_loose_file_hides_no_folder_without_a_solver(tmp_path: Path):

@@ -83,12 +83,12 @@ def test_a_sphere_against_itself_is_free_where_it_changes_nothing(checks: dict[s
 
 
 def test_an_error_in_the_code_of_2d_is_filed_under_2d(checks: dict[str, FileCheck]):
-    """Not under 2a, where the function begins; with the line that failed."""
+    """Not under 2a, where the function begins, which is right; with the line that failed."""
     row = begin_with(checks["typo_in_d.js"])
 
     assert row.task == "2d"
     assert row.lines == [(64, "sphereA.velocity.x += j / sphereA.mass * nx;")]
-    assert checks["typo_in_d.js"].tasks["2a"] == "not asked"
+    assert checks["typo_in_d.js"].tasks["2a"] == "right"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,8 @@ from adapters.own_solver.process import SolverProcess
 from reports.check import command
 from reports.check.formats.questions_json import SCHEMA
 from reports.check.rows import CheckRow
-from reports.check.smallest import Smallest, smallest_scene, smallest_scenes
+from reports.check.smallest import smallest_scene, smallest_scenes
+from reports.check.smallest_scene import Smallest
 from reports.check.verdict import check_file
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, on_terminal, process
