@@ -20,7 +20,7 @@ async function showPanels(section, scene, name) {
   section.querySelector(".asks").textContent = document.getElementById(`s-${name}`).querySelector(".asks").textContent;
   section.querySelector(".says").textContent = scene.says;
   section.querySelector(".more").href = `#s-${name}`;
-  const shown = { ...scene, pack, tracks: tracksOf(pack, scene), marked: framesAt(pack, scene.until, Number(section.dataset.marked)) };
+  const shown = { ...scene, pack, timed: "timed" in section.dataset, tracks: tracksOf(pack, scene), marked: framesAt(pack, scene.until, Number(section.dataset.marked)) };
   for (const panel of section.querySelectorAll(".panel")) {
     panel.hidden = !(panel.dataset.name in scene.engines);
     if (!panel.hidden) fillPanel(panel, shown);
@@ -34,7 +34,8 @@ function fillPanel(panel, shown) {
   const text = panel.querySelector(".outcome-of");
   text.replaceChildren();
   if (outcome) text.append(bold(outcome), reason && `: ${reason}`);
-  else text.append("error: ", bold(error), document.createElement("br"), cost ? `cost: ${cost}` : "not timed");
+  else text.append("error: ", bold(error));
+  if (!outcome && shown.timed) text.append(document.createElement("br"), cost ? `cost: ${cost}` : "not timed");
   text.classList.toggle("outcome", Boolean(outcome));
   panel.querySelector(".paths").replaceChildren(pictureOf(name, shown));
 }
@@ -64,23 +65,15 @@ function tracksOf(pack, scene) {
       path: (disk) => over(place(disk, 0), place(disk, 1)),
       x: (disk) => over(frames.map((k) => pack.t[k]), place(disk, 0)),
       y: (disk) => over(frames.map((k) => pack.t[k]), place(disk, 1)),
-      angle: (disk) => over(frames.map((k) => pack.t[k]), anglesOf(pack, layer, frames, disk)),
     }[scene.axes];
     return [layer.name, scene.disks.map(track)];
   }));
 }
 
-// rad, with whole turns.
-function anglesOf(pack, layer, frames, disk) {
-  if (!layer.turns) return frames.map(() => 0);
-  let turns = layer.angle[disk] / 65536;
-  return frames.map((k) => 2 * Math.PI * (turns += k ? turnBetween(pack, layer, k - 1, disk) : 0));
-}
-
-// The frames nearest to so many instants, of which `until` is the last.
+// The frames nearest to so many instants, evenly spread up to `until`.
 function framesAt(pack, until, count) {
   const far = (k, t) => Math.abs(pack.t[k] - t);
-  return Array.from({ length: count }, (_, j) => until * (j + 1) / count)
+  return Array.from({ length: count }, (_, j) => until * (j + 0.5) / count)
     .map((t) => pack.t.reduce((best, _, k) => far(k, t) < far(best, t) ? k : best, 0));
 }
 
@@ -166,9 +159,9 @@ function drawAxesOf(picture, titles, x, y) {
   picture.append(drawing("text", { x: 2, y: 11 }, titles[1]));
 }
 
-// Three or so, 1, 2 or 5 times a power of ten apart.
+// Four or so, 1, 2 or 5 times a power of ten apart.
 function ticksOf({ from, to }) {
-  const least = (to - from) / 3.5, unit = 10 ** Math.floor(Math.log10(least));
+  const least = (to - from) / 4.5, unit = 10 ** Math.floor(Math.log10(least));
   const step = unit * [1, 2, 5, 10].find((k) => k * unit >= least);
   const [first, last] = [Math.ceil(from / step - 1e-9), Math.floor(to / step + 1e-9)];
   return Array.from({ length: last - first + 1 }, (_, k) => (first + k) * step);

@@ -41,12 +41,14 @@ class Panels(NamedTuple):
         groups: heading -> scenes, for the picker.
         first: the scene that it opens with.
         packed: scene -> `to_json` of what its panels show, deflated.
+        timed: whether any scene has costs.
         javascript: whether to name the engines that play with the extra `js`.
     """
 
     groups: Mapping[str, Sequence[str]]
     first: str
     packed: str
+    timed: bool
     javascript: bool
 
 
@@ -56,7 +58,7 @@ class Drawn:
 
     Attributes:
         disks: whose centres.
-        axes: "path": y over x; "x", "y", "angle": that over time.
+        axes: "path": y over x; "x", "y": that over time.
         titles: of the two axes, with units.
         box: left, bottom, right, top of the axes, in these units.
         until: s, where the exact answer ends.
@@ -98,8 +100,11 @@ def panels(
     }
     return Panels(
         groups=grouped(list(drawn), timed),
-        first=max(timed or drawn, key=lambda name: telling(drawn[name])),
+        first=max(
+            drawn, key=lambda name: (len(drawn[name].apart), name in timed, telling(drawn[name]))
+        ),
         packed=deflated(json.dumps(packed, separators=(",", ":"))),
+        timed=bool(timed),
         javascript=set(DISTINCT) <= set(names) and not set(FETCHED) & set(names),
     )
 
@@ -171,14 +176,11 @@ def disks_of(scenario: Scenario, runs: Sequence[Run], centre: Trajectory) -> NDA
 
 
 def axes_of(centre: Trajectory, disks: NDArray[np.int64]) -> str:
-    """A path in the plane, or where the disks keep to a line the coordinate along it; where none of
-    them moves their angle, if they turn."""
+    """A path in the plane, or where the disks keep to a line the coordinate along it."""
     across, up = np.ptp(centre.position[:, disks], axis=0).max(axis=0)
-    if max(across, up) == 0:
-        return "angle" if np.ptp(centre.angle[:, disks], axis=0).any() else "y"
     if up < NARROW * across:
         return "x"
-    return "y" if across < NARROW * up else "path"
+    return "y" if across <= NARROW * up else "path"
 
 
 def titles_of(axes: str, scenario: Scenario) -> tuple[str, str]:
@@ -187,8 +189,7 @@ def titles_of(axes: str, scenario: Scenario) -> tuple[str, str]:
         return "x (m)", "y (m)"
     gravity = scenario.scene.gravity
     falls = gravity[0] == 0 > gravity[1]
-    named = {"x": "x (m)", "y": "height (m)" if falls else "y (m)", "angle": "angle (rad)"}
-    return "time (s)", named[axes]
+    return "time (s)", "x (m)" if axes == "x" else "height (m)" if falls else "y (m)"
 
 
 def seen(axes: str, trajectory: Trajectory, disks: NDArray[np.int64], samples: int) -> Array:
@@ -196,8 +197,7 @@ def seen(axes: str, trajectory: Trajectory, disks: NDArray[np.int64], samples: i
     position = trajectory.position[:samples, disks]
     if axes == "path":
         return position.reshape(-1, 2)
-    values = {"x": position[..., 0], "y": position[..., 1]}.get(axes)
-    values = trajectory.angle[:samples, disks] if values is None else values
+    values = position[..., 0 if axes == "x" else 1]
     t = np.repeat(trajectory.t[:samples], len(disks))
     return np.stack([t, values.ravel()], axis=1)
 
@@ -249,19 +249,15 @@ def said_of(comparison: Comparison, drawn: Drawn) -> str:
     """What the panels of a scene show, as a sentence."""
     scenario = comparison.scenario
     moving = int((~scenario.scene.static).sum())
-    line = {
-        "path": "path",
-        "x": "x over time",
-        "y": f"{drawn.titles[1].partition(' ')[0]} over time",
-        "angle": "angle over time",
-    }[drawn.axes]
+    named = drawn.titles[1].partition(" ")[0]
+    line = "the path" if drawn.axes == "path" else f"{named} over time"
     if moving > FEW:
         who = (
-            f"the {line} of disk {drawn.disks[0]}, one of {moving}: in most engines it is the"
+            f"{line} of disk {drawn.disks[0]}, one of {moving}: in most engines it is the"
             " farthest from its place"
         )
     else:
-        who = f"the {line} of {'the disk' if moving == 1 else 'each disk'}"
+        who = f"{line} of {'the disk' if moving == 1 else 'each disk'}"
     ends = ""
     if comparison.truth is None:
         ends = "; there is no exact answer"

@@ -48,17 +48,10 @@ function readPack(bytes) {
   return pack;
 }
 
-// m, where the frames of a layer have the centre of a disk; axis 0 is x, 1 is y.
+// m, where a frame of a layer has the centre of a disk; axis 0 is x, 1 is y.
 function placeOf(pack, layer, frame, disk, axis) {
   const steps = layer.grid[(frame * pack.radius.length + disk) * 2 + axis];
   return layer.low[axis] + (steps / 65535) * layer.span[axis];
-}
-
-// Of a turn, from a frame to the next: the shorter way round.
-function turnBetween(pack, layer, frame, disk) {
-  const n = pack.radius.length;
-  const gap = layer.angle[(frame + 1) * n + disk] - layer.angle[frame * n + disk];
-  return (((gap + 98304) & 65535) - 32768) / 65536;
 }
 
 class Player {
@@ -182,10 +175,12 @@ class Player {
   }
 
   angle(layer, disk) {
+    const n = this.pack.radius.length;
     const [k, share] = this.frameAt(this.time);
-    const here = layer.angle[k * this.pack.radius.length + disk] / 65536;
-    const turn = k + 1 < layer.frames ? turnBetween(this.pack, layer, k, disk) : 0;
-    return (here + share * turn) * 2 * Math.PI;
+    const here = layer.angle[k * n + disk];
+    const next = k + 1 < layer.frames ? layer.angle[(k + 1) * n + disk] : here;
+    const turn = ((next - here + 98304) & 65535) - 32768;  // the shorter way round
+    return ((here + share * turn) / 65536) * 2 * Math.PI;
   }
 
   show(name, visible) {

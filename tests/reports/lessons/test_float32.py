@@ -34,7 +34,7 @@ ROWS = kept().set_index(["scenario", "profile", "substeps"])
 def differing(fresh: dict[str, float | str | int], columns: tuple[str, ...]) -> list[str]:
     """The numbers that are not those that are kept."""
     row = ROWS.loc[(fresh["scenario"], fresh["profile"], fresh["substeps"])]
-    # six digits are kept, of which the last is rounded; what is below 1e-9 radii is the rounding of exact answers
+    # Six digits are kept, the last of them rounded; 1e-9 radii is how exact the exact answers are.
     return [
         each for each in columns if not np.isclose(fresh[each], row[each], rtol=6e-6, atol=1e-9)
     ]
