@@ -194,17 +194,17 @@ def in_markdown(table: pd.DataFrame) -> str:
 def short_form(table: pd.DataFrame) -> str:
     """The outside engines in a row each, with the columns of `SHORT`: as shipped, and behind an
     arrow as matched where that differs."""
-    rows = table.set_index("engine")
+    rows = {str(row["engine"]): row for row in table.to_dict("records")}
     headings = [f"read on {table.date.max()}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
     for engine, called in FAMILIES.items():
-        profiles = [rows.loc[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
-        library = str(profiles[0].versions).partition(",")[0]
+        profiles = [rows[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
+        library = str(profiles[0]["versions"]).partition(",")[0]
         cells = [f"{called} ({library})" if called else library]
         cells += [
             " → ".join(dict.fromkeys(cell(key, row[key]) for row in profiles)) for key in SHORT
         ]
-        lines.append(f"| {' | '.join([*cells, str(profiles[0].numbers)])} |")
+        lines.append(f"| {' | '.join([*cells, str(profiles[0]['numbers'])])} |")
     return "\n".join(lines)
 
 

@@ -98,11 +98,12 @@ def errors_of_box2d(name: str, profile: str) -> Array:
 def shares_of(profile: str) -> dict[str, float]:
     """Scene -> the error of Box2D less that of planck, over that of Box2D, at the middle step size;
     from the smallest share to the largest. A scene in which Box2D is exact has none."""
-    rows = kept()[kept().profile == profile]
-    found = {}
-    for row in rows.itertuples():
-        if row.substeps == known(str(row.scenario))[0].middle_substeps and row.box2d_radii:
-            found[str(row.scenario)] = 1 - float(row.planck_radii) / float(row.box2d_radii)
+    found: dict[str, float] = {}
+    for row in kept().to_dict("records"):
+        name = str(row["scenario"])
+        usual = row["substeps"] == known(name)[0].middle_substeps
+        if row["profile"] == profile and usual and row["box2d_radii"]:
+            found[name] = 1 - row["planck_radii"] / row["box2d_radii"]
     return dict(sorted(found.items(), key=lambda one: abs(one[1])))
 
 
