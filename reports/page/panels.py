@@ -101,8 +101,8 @@ def panels(
     return Panels(
         groups=grouped(list(drawn), timed),
         first=max(
-            drawn, key=lambda name: (len(drawn[name].apart), name in timed, telling(drawn[name]))
-        ),
+            shown, key=lambda each: merit(each, drawn[each.scenario.name], costs)
+        ).scenario.name,
         packed=deflated(json.dumps(packed, separators=(",", ":"))),
         timed=bool(timed),
         javascript=set(DISTINCT) <= set(names) and not set(FETCHED) & set(names),
@@ -118,11 +118,16 @@ def grouped(scenes: Sequence[str], timed: Sequence[str]) -> dict[str, list[str]]
     return groups
 
 
-def telling(drawn: Drawn) -> int:
-    """How well a scene tells engines apart: of those that are visibly off and those that are not,
-    the fewer."""
+def merit(
+    comparison: Comparison, drawn: Drawn, costs: Mapping[str, Any]
+) -> tuple[bool, int, bool, int]:
+    """What makes a scene the first to be shown, the most important first: an exact answer, engines
+    that play it, costs, and engines that can be told apart in it: of those that are visibly off and
+    those that are not, the fewer."""
     off = sum(share > VISIBLE for share in drawn.apart.values())
-    return min(off, len(drawn.apart) - off)
+    played_by = len(drawn.apart)
+    exact, timed = comparison.truth is not None, comparison.scenario.name in costs
+    return exact, played_by, timed, min(off, played_by - off)
 
 
 def costs_of(clock: Clock) -> dict[str, dict[tuple[str, float], float]]:

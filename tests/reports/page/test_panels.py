@@ -26,7 +26,7 @@ from reports.run.timing_pass import COLUMNS
 from scenarios.catalogue import scenario
 from scenarios.no_truth import answered
 from tests.reports.page.browsing import opened, overhang
-from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, PLAYED
+from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, PLAYED, write_small
 
 QUIET, LOUD = noise_of([0.97, 1.0, 1.02]), noise_of([0.7, 1.0, 1.3])
 
@@ -150,13 +150,19 @@ def made_tables(comparisons: list[Comparison], clock: Clock) -> panels.Panels:
 
 
 def test_the_section_opens_with_a_scene_that_tells_engines_apart():
-    """Not with one in which all are where they should be, nor with one in which all are off."""
-    drawn = drawn_of(simply("free_fall", "reference:exercise"))
-    alike, apart = ({"a": 0.0, "b": share, "c": 0.0} for share in (0.001, 0.5))
+    """Which has an exact answer, and which most engines play; not one in which all are where they
+    should be, nor one in which all are off."""
+    one = simply("free_fall", "reference:exercise")
+    drawn = drawn_of(one)
 
-    assert panels.telling(replace(drawn, apart=apart)) == 1
-    assert panels.telling(replace(drawn, apart=alike)) == 0
-    assert panels.telling(replace(drawn, apart=dict.fromkeys("abc", 0.5))) == 0
+    def merit(*shares: float, truth: bool = True) -> tuple[bool, int, bool, int]:
+        apart = {str(k): share for k, share in enumerate(shares)}
+        scene = one if truth else replace(one, truth=None)
+        return panels.merit(scene, replace(drawn, apart=apart), {})
+
+    assert merit(0.0, 0.5, 0.0) > merit(0.0, 0.001, 0.0) == merit(0.5, 0.5, 0.5)
+    assert merit(0.0, 0.0) > merit(0.5)
+    assert merit(0.5) > merit(0.0, 0.5, truth=False)
 
 
 def test_a_single_engine_and_a_run_of_nothing_have_no_panels():
@@ -303,6 +309,29 @@ def test_panels_are_told_apart_without_colour(desktop: Page):
     )
 
     assert len(set(signs)) == len(PLAYED)
+
+
+@pytest.mark.slow
+def test_costs_stand_below_the_panels_of_a_scene_that_was_timed(
+    browser: Browser, comparisons: list[Comparison], tmp_path: Path
+):
+    """In another one it is said of each engine that it was not."""
+    row = [HEAD_ON, *PLAYED[0].split(":"), comparisons[0].middle_dt, 1.0, 5]
+    table = pd.DataFrame([[*row, 12.5, 12.0, 13.0, 1.0, 2.0, 0.0, np.nan]], columns=COLUMNS)
+    write_small(tmp_path / "r.html", comparisons, clock=Clock(table, QUIET, 12.0))
+    page, heard = opened(browser, (tmp_path / "r.html").as_uri())
+    said = {}
+    for name in (HEAD_ON, ORBIT):
+        chosen(page, name)
+        texts = page.locator("#panels .outcome-of").all_inner_texts()[: len(PLAYED)]
+        said[name] = [text.split("\n")[-1] for text in texts]
+    page.context.close()
+
+    assert said == {
+        HEAD_ON: ["cost: 12 µs", "not timed", "not timed"],
+        ORBIT: ["not timed"] * len(PLAYED),
+    }
+    assert heard == []
 
 
 TOPS = """() => [...document.querySelectorAll('#panels .panel')]
