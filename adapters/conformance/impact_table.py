@@ -1,7 +1,7 @@
 """What each engine does with e, as the probes read it: a row an engine, kept in impact_table.csv.
 
 `uv run --extra js python -m adapters.conformance.impact_table` asks all engines anew, and writes
-the file and the table of adapters/README.md; it takes half a minute.
+the file, the table of adapters/README.md and the short one of README.md; it takes half a minute.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ from adapters.engines import ENGINES, FETCHED
 from adapters.friction import Frictionless
 
 KEPT = Path(__file__).with_name("impact_table.csv")
-README = Path(__file__).parent.parent / "README.md"
+README = Path(__file__).parents[1] / "README.md"
 BEGIN, END = "<!-- impact table -->\n", "<!-- end of impact table -->"
+FRONT = Path(__file__).parents[2] / "README.md"  # of the repository, with the short form
+SHORT_BEGIN, SHORT_END = "<!-- short form -->\n\n", "\n\n"
 SLOWEST, FASTEST = 1e-3, 100.0  # m/s, between which a threshold is looked for
 NEAR = 0.05  # of e: what is nearer to that at `FASTEST` is the same
 BOUNCES = 5
@@ -134,6 +136,16 @@ COLUMNS: dict[str, Column] = {
     "spin": Column("300 rad/s after 4 steps", reading("fast_spin")),
 }
 
+SHORT = ("threshold", "energy", "friction_unasked", "friction_1", "spin", "e_small")
+FAMILIES = {  # engine -> what the short form calls it, where its package has another name
+    "pymunk": "",
+    "box2d": "Box2D 2.3",
+    "box2d_v3": "Box2D 3.1",
+    "planck": "",
+    "matter": "",
+    "rapier2d": "Rapier",
+}
+
 
 def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
     """What is read of one engine, with the date and its versions."""
@@ -179,6 +191,23 @@ def in_markdown(table: pd.DataFrame) -> str:
     return "\n".join([*lines, "", *wrap(read, 120)]) + "\n"
 
 
+def short_form(table: pd.DataFrame) -> str:
+    """The outside engines in a row each, with the columns of `SHORT`: as shipped, and behind an
+    arrow as matched where that differs."""
+    rows = {str(row["engine"]): row for row in table.to_dict("records")}
+    headings = [f"read on {table.date.max()}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
+    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
+    for engine, called in FAMILIES.items():
+        profiles = [rows[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
+        library = str(profiles[0]["versions"]).partition(",")[0]
+        cells = [f"{called} ({library})" if called else library]
+        cells += [
+            " → ".join(dict.fromkeys(cell(key, row[key]) for row in profiles)) for key in SHORT
+        ]
+        lines.append(f"| {' | '.join([*cells, str(profiles[0]['numbers'])])} |")
+    return "\n".join(lines)
+
+
 def cell(column: str, value: float) -> str:
     """A number to three digits; "-" for none."""
     if np.isnan(value):
@@ -189,17 +218,28 @@ def cell(column: str, value: float) -> str:
 
 
 def with_table(text: str, table: pd.DataFrame) -> str:
-    """The text of README with this table in its place."""
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return before + BEGIN + in_markdown(table) + END + after
+    """The text of README of this folder's parent with this table in its place."""
+    return placed(text, BEGIN, in_markdown(table), END)
+
+
+def with_short_form(text: str, table: pd.DataFrame) -> str:
+    """The text of the repository's README with the short form of this table in its place."""
+    return placed(text, SHORT_BEGIN, short_form(table), SHORT_END)
+
+
+def placed(text: str, begin: str, what: str, end: str) -> str:
+    """The text with `what` between the first `begin` and the `end` that follows it."""
+    before, _, rest = text.partition(begin)
+    _, _, after = rest.partition(end)
+    return before + begin + what + end + after
 
 
 def main() -> None:
-    """Ask all engines, and write the file and the table."""
+    """Ask all engines, and write the file and both tables."""
     table = table_of(ENGINES | FETCHED)
     table.to_csv(KEPT, index=False, float_format="%.10g")
-    README.write_text(with_table(README.read_text(encoding="utf-8"), kept()), encoding="utf-8")
+    for path, filled in ((README, with_table), (FRONT, with_short_form)):
+        path.write_text(filled(path.read_text(encoding="utf-8"), kept()), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from reports.lessons.limits import LIMITS
 from reports.lessons.mechanisms.cap import CAP
 from reports.lessons.mechanisms.correction import CORRECTION
 from reports.lessons.mechanisms.digits import DIGITS
+from reports.lessons.mechanisms.float32 import SINGLE
 from reports.lessons.mechanisms.gravity import GRAVITY
 from reports.lessons.mechanisms.mixing import MIXING_RULE
 from reports.lessons.mechanisms.order import ORDER
@@ -38,6 +39,7 @@ ALL = (
     DIGITS,
     CAP,
     ROW,
+    SINGLE,
     HORIZON,
     LIMITS,
     BOUNCE,

@@ -217,6 +217,8 @@ class Lesson:
         sliders: what can be changed.
         names: who may be drawn, in the order of the legend.
         show: settings (key -> value) -> what is shown.
+        recorded: whose numbers are not of a run of now, and when and with what they were made; a
+            sentence, or "".
     """
 
     name: str
@@ -227,6 +229,7 @@ class Lesson:
     sliders: Sequence[Slider]
     names: Sequence[str]
     show: Callable[[Settings], Shown]
+    recorded: str = ""
 
     def at(self, places: Sequence[int]) -> Shown:
         """What is shown with the sliders at these indices.

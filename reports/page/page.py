@@ -16,6 +16,7 @@ from reports.page.documents import CHARTED, render
 from reports.page.first_screen import first_screen
 from reports.page.links import neighbours
 from reports.page.page_tables import page_tables
+from reports.page.panels import MARKED, panels
 from reports.page.sections import by_family, sections_of
 from reports.terminal.foreign_text import put_text
 
@@ -51,16 +52,19 @@ def write_page(
         on_paper: the scenarios that have half a page each where the page is printed.
     """
     names = overview.names_of(comparisons)
+    tables = page_tables(comparisons, untrusted, conformance, known_answers)
     html = render(
         "page/page.html.j2",
         generator=GENERATOR,
-        scripts=CHARTED,
+        scripts=(*CHARTED, "page/panels.js"),
         looks=style.looks_of((*names, style.TRUTH)),
         plotly=True,
         names=names,
         untrusted=untrusted,
         first=first_screen(comparisons, untrusted, clock, findings, said),
-        tables=page_tables(comparisons, untrusted, conformance, known_answers),
+        tables=tables,
+        panels=panels(comparisons, names, tables.heat_map, clock),
+        marked=MARKED,
         families=by_family(sections_of(comparisons)),
         lessons=lessons,
         links=neighbours(path, "report"),

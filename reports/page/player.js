@@ -48,6 +48,12 @@ function readPack(bytes) {
   return pack;
 }
 
+// m, where a frame of a layer has the centre of a disk; axis 0 is x, 1 is y.
+function placeOf(pack, layer, frame, disk, axis) {
+  const steps = layer.grid[(frame * pack.radius.length + disk) * 2 + axis];
+  return layer.low[axis] + (steps / 65535) * layer.span[axis];
+}
+
 class Player {
   constructor(element, pack, looks) {
     Object.assign(this, { element, looks, playing: false, speed: 1, hidden: new Set() });
@@ -148,10 +154,7 @@ class Player {
 
   ended(layer) { return this.time > this.pack.t[layer.frames - 1] + 1e-9; }
 
-  coordinate(layer, frame, disk, axis) {
-    const steps = layer.grid[(frame * this.pack.radius.length + disk) * 2 + axis];
-    return layer.low[axis] + (steps / 65535) * layer.span[axis];
-  }
+  coordinate(layer, frame, disk, axis) { return placeOf(this.pack, layer, frame, disk, axis); }
 
   // [[x, y], ...] m of an engine's disks now; on a straight line between the packed samples. null once it has ended.
   positions(name) {

@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from adapters.conformance import impact_table
-from adapters.conformance.impact_table import COLUMNS, README, in_markdown, kept, row_of_table
+from adapters.conformance.impact_table import (
+    COLUMNS,
+    FAMILIES,
+    FRONT,
+    README,
+    SHORT,
+    in_markdown,
+    kept,
+    row_of_table,
+    short_form,
+)
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, changed
 from adapters.npm_packages import missing
@@ -60,6 +70,37 @@ def test_the_table_has_every_engine_and_readme_shows_it():
     """In their order, and nothing that is not in the file."""
     assert list(TABLE.index) == list(ROWS)
     assert in_markdown(kept()) in README.read_text("utf-8")
+
+
+def test_the_front_page_shows_the_short_form():
+    """Every outside engine in a row of its own, with the date and its version; a number that is not
+    in the file would be noticed."""
+    text = FRONT.read_text("utf-8")
+    outside = {name.split(":")[0] for name, row in ROWS.items() if row.distributions or row.package}
+    other = kept()
+    other.loc[other.engine == "planck:matched", "energy"] += 1
+
+    assert short_form(kept()) in text
+    assert short_form(other) not in text
+    assert set(FAMILIES) == outside
+
+
+@pytest.mark.parametrize("engine", FAMILIES)
+def test_a_row_of_the_short_form_has_both_profiles_where_they_differ(engine):
+    """Before the arrow the number as shipped, behind it as matched; one number where both agree."""
+    row = short_form(kept()).splitlines()[2 + list(FAMILIES).index(engine)].strip("| ").split(" | ")
+    shown = dict(zip(SHORT, (each.split(" → ") for each in row[1:-1]), strict=True))
+    both = [TABLE.loc[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
+
+    assert str(both[0].versions).split(",")[0] in row[0]
+    for key, texts in shown.items():
+        numbers = [float(each.removesuffix(" %")) if each != "-" else np.nan for each in texts]
+        expected = [each[key] for each in both]
+        # three digits, or a tenth of a percent
+        near = partial(pytest.approx, rel=5e-3, abs=0.051 if key == "energy" else 1e-6, nan_ok=True)
+        assert numbers == near(expected[: len(numbers)]), key
+        if len(numbers) == 1:
+            assert numbers == near(expected[1:]), key
 
 
 def test_the_table_takes_its_place_and_leaves_the_rest_of_a_text():

@@ -209,6 +209,14 @@ NO_CLAIM = {
         "A wall of Box2D": "defines the skin; the second claim has what becomes of it",
         "It matters most": "the second claim has its numbers",
     },
+    "float32": {
+        "Box2D 2.3 computes": "names its numbers; test_float32.py plays both",
+        "Planck is Box2D 2.3": "says what planck is",
+        "Both have the same settings": "test_planck_differs_from_box2d_by_float32_alone",
+        "The error of Box2D less": "defines the share; the first claim has it",
+        "A smaller step makes": "says why; the claim on half the step has it",
+        "It also makes more steps": "counts steps; the claim on their number has what comes of it",
+    },
     "rolling": {
         "From then on": "defines to roll; the second claim says when",
         "A disk with back spin": "the second claim says whether it does",

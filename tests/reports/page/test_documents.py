@@ -22,6 +22,7 @@ PARTS = {
     "lessons/conventions.html.j2",
     "page/error_cost.html.j2",
     "page/own_solvers.html.j2",
+    "page/panels.html.j2",
     "speed/budget.html.j2",
 }
 

@@ -191,6 +191,19 @@ def test_charts_follow_the_dark(page: Page) -> None:
     )
 
 
+def test_every_engine_has_a_panel_of_the_same_scene(page: Page) -> None:
+    """Before anything is scrolled to: the exact answer in each, and the path of who played."""
+    page.wait_for_function("() => document.getElementById('panels').dataset.shown")
+    panels = page.locator("#panels .panel:visible")
+    drawn = panels.evaluate_all(
+        "all => all.map(each => [each.dataset.name, each.querySelectorAll('.track').length > 0,"
+        " each.querySelectorAll('.exact').length > 0])"
+    )
+
+    failed = ["box2d_v3:shipped", "box2d_v3:matched"]
+    assert drawn == [[name, True, True] for name in PLAYED] + [[n, False, True] for n in failed]
+
+
 def test_the_index_finds_scenarios(page: Page) -> None:
     """What is typed leaves the scenarios with these words, by name or by question."""
     page.locator("#index input").fill("unstable line")

@@ -1,0 +1,223 @@
+"""Lesson 6.10: what float32 costs, by Box2D 2.3 and planck, the same algorithm in float64."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Simulation,
+    Slider,
+)
+from reports.lessons.mechanisms.planck import (
+    BOX2D,
+    COMMAND,
+    LADDER,
+    PLANCK,
+    PROFILES,
+    SCENES,
+    kept,
+    known,
+    off,
+    recorded,
+    run_of,
+)
+from reports.page.style import TRUTH, number
+from scenarios.model import Array
+
+APART = "between the two"
+ALIKE = 0.02  # of an error: where float32 changes none of a scene by more, one sentence says so
+
+
+def show_float32(settings: Settings) -> Shown:
+    """The error of both at every step size, and float32's share of it in every scene."""
+    name, profile = settings["scene"], settings["profile"]
+    scene, truth = known(name)
+    box2d = f"{BOX2D}:{profile}"
+    rows = kept().set_index(["scenario", "profile"]).loc[(name, profile)]
+    rows = rows[rows.substeps.isin(LADDER)]
+    ms = 1e3 * scene.sample_interval / rows.substeps.to_numpy(float)
+    curves = [
+        Curve(f"{PLANCK}:{profile}", ms, rows.planck_radii.to_numpy(float), dots=True),
+        Curve(box2d, ms, errors_of_box2d(name, profile), dots=True),
+        Curve(APART, ms, rows.apart_radii.to_numpy(float), dots=True),
+    ]
+    middle = scene.middle_substeps
+    film = Simulation(
+        replace(scene, substeps=(middle,)), [run_of(BOX2D, profile, name, middle)], truth
+    ).film
+    shares = shares_of(profile)
+    percent = 100 * np.abs(list(shares.values()))
+    return Shown(
+        [
+            LessonChart(
+                "Largest error of a disk",
+                "step size in ms",
+                "radii",
+                curves,
+                "xy",
+                guides=[("x", 1e3 * scene.dt(middle), "middle")],
+                reverse=True,
+            ),
+            LessonChart(
+                "Share of float32 in the error of Box2D, all scenes",
+                "scenes, from the smallest share",
+                "%",
+                [Curve(box2d, np.arange(1, len(percent) + 1), percent, dots=True)],
+                "y",
+                guides=[("y", 1.0, "1 %")],
+            ),
+        ],
+        film,
+        [
+            (f"share of float32 in the error of {box2d}", "below 0: float32 makes it smaller"),
+            *((each, f"{number(100 * share, 2)} %") for each, share in reversed(shares.items())),
+        ],
+        [*claims_of(name, profile, curves, LADDER.index(middle)), claim_of_all(profile, percent)],
+    )
+
+
+@cache
+def errors_of_box2d(name: str, profile: str) -> Array:
+    """Radii, at each step size of `LADDER`, on this machine."""
+    scene, truth = known(name)
+    assert truth is not None
+    runs = [run_of(BOX2D, profile, name, substeps) for substeps in LADDER]
+    return np.array([off(run, truth, scene).max() for run in runs])
+
+
+@cache
+def shares_of(profile: str) -> dict[str, float]:
+    """Scene -> the error of Box2D less that of planck, over that of Box2D, at the middle step size;
+    from the smallest share to the largest. A scene in which Box2D is exact has none."""
+    found: dict[str, float] = {}
+    for row in kept().to_dict("records"):
+        name = str(row["scenario"])
+        usual = row["substeps"] == known(name)[0].middle_substeps
+        if row["profile"] == profile and usual and row["box2d_radii"]:
+            found[name] = 1 - row["planck_radii"] / row["box2d_radii"]
+    return dict(sorted(found.items(), key=lambda one: abs(one[1])))
+
+
+def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list[Claim]:
+    """What the errors of a scene show; `middle`: the place of the middle step size."""
+    planck, box2d = f"{PLANCK}:{profile}", f"{BOX2D}:{profile}"
+    p, b, apart = (np.asarray(curve.y, float) for curve in curves)
+    ms = np.asarray(curves[0].x, float)
+
+    def share(shown: Shown) -> Array:
+        return np.abs(1 - shown.y(planck) / shown.y(box2d))
+
+    def ends(values: Array) -> float:
+        return float(values[-1] / values[0])
+
+    usual = float(abs(1 - p[middle] / b[middle]))
+    claims = [
+        Claim(
+            f"At the middle step size, {number(ms[middle])} ms, {planck} is"
+            f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: float32 is"
+            f" {number(100 * usual, 2)} % of that error.",
+            lambda shown: abs(share(shown)[middle] - usual) <= 1e-9,
+        )
+    ]
+    if name == "free_fall":
+        claims.append(
+            Claim(
+                f"Half the step is half the error of {planck}, at every step size.",
+                lambda shown: np.abs(shown.y(planck)[:-1] / shown.y(planck)[1:] - 2).max() < 1e-3,
+            )
+        )
+    worst = float(np.abs(1 - p / b).max())
+    if worst <= ALIKE:
+        claims.append(
+            Claim(
+                "Float32 matters little here: at no step size it is more than"
+                f" {number(100 * worst, 2)} % of the error.",
+                lambda shown: share(shown).max() <= worst * (1 + 1e-9),
+            )
+        )
+        return claims
+    best = int(np.argmin(b))
+    times = float(b[-1] / p[-1])
+    claims.append(
+        Claim(
+            f"{box2d} is nearest to the exact answer at {number(ms[best], 2)} ms. Smaller steps"
+            f" make its error larger: at {number(ms[-1], 2)} ms it is {number(times, 2)} times"
+            f" that of {planck}.",
+            lambda shown: (
+                int(np.argmin(shown.y(box2d))) == best < len(ms) - 1
+                and abs(shown.y(box2d)[-1] / shown.y(planck)[-1] / times - 1) <= 1e-9
+            ),
+        )
+    )
+    growth = ends(apart)
+    if growth > 1:
+        claims.append(
+            Claim(
+                "The distance between the two grows with the number of steps:"
+                f" {LADDER[-1]} times as many steps make it {number(growth, 2)} times as large.",
+                lambda shown: (
+                    abs(ends(shown.y(APART)) / growth - 1) <= 1e-9
+                    and ends(shown.x(APART)) == 1 / LADDER[-1]
+                    and np.polyfit(np.log(shown.x(APART)), np.log(shown.y(APART)), 1)[0] < -0.5
+                ),
+            )
+        )
+    return claims
+
+
+def claim_of_all(profile: str, percent: Array) -> Claim:
+    """In how many scenes float32 matters at the middle step size."""
+    small, large = int((percent < 1).sum()), int((percent > 10).sum())
+    names = list(shares_of(profile))[len(percent) - large :]
+    box2d = f"{BOX2D}:{profile}"
+    most = f"; it is more than a tenth in {', '.join(reversed(names))}" if names else ""
+    return Claim(
+        f"In {small} of {len(percent)} scenes float32 is less than 1 % of the error of {box2d} at"
+        f" the middle step size{most}.",
+        lambda shown: (
+            int((shown.y(box2d, 1) < 1).sum()) == small
+            and int((shown.y(box2d, 1) > 10).sum()) == large
+        ),
+    )
+
+
+SINGLE = Lesson(
+    name="float32",
+    number="6.10",
+    title="planck against Box2D 2.3: what float32 costs",
+    asks="How much of an error is the rounding of float32?",
+    text=(
+        (
+            "Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which"
+            " computes in float64. Both have the same settings here, so they differ by rounding"
+            " alone: the error of Box2D less that of planck is the <b>share of float32</b>."
+        ),
+        (
+            "A smaller step makes the error of the method smaller. It also makes more steps, and"
+            " each step rounds. See [digits] for what rounding does far from the origin."
+        ),
+    ),
+    sliders=(
+        Slider("scene", "Scene", SCENES, 0),
+        Slider("profile", "Profile", PROFILES, 0),
+    ),
+    names=(
+        *(f"{engine}:{profile}" for profile in PROFILES for engine in (PLANCK, BOX2D)),
+        APART,
+        TRUTH,
+    ),
+    show=show_float32,
+    recorded=(
+        "The numbers of planck, the distance between the two and the share of float32 in all scenes"
+        f" were recorded on {recorded()}, by {COMMAND}."
+    ),
+)
