@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from scenarios.model import Array, Scene, State
+if TYPE_CHECKING:  # numpy loads for 0.2 s, and the process of an Exercise.js does without
+    from scenarios.model import Array, Scene, State
 
 # In `settings`, in place of the resolved value, where the engine does not report it:
 NOT_READABLE = "not readable"  # the binding has no getter

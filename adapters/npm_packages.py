@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engine import Unsupported
-from scenarios.truth.cache import folder
 
 HERE = Path(__file__).parent / "javascript"
 PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
@@ -56,6 +55,9 @@ def version_of(package: str) -> str:
 
 def place() -> Path:
     """Where the packages of these two files belong; raises `NotInstalled` if there is no cache."""
+    # it loads numpy, which the process of an Exercise.js does without
+    from scenarios.truth.cache import folder
+
     kept = folder()
     if kept is None:
         raise NotInstalled("not installed: no folder for it; set CROSSCHECK_CACHE to one")

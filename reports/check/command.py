@@ -9,11 +9,20 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from adapters.own_solver.file import KINDS, SolverFailed, SolverText, dangling, printable
+from adapters.own_solver.file import (
+    KINDS,
+    NotASolver,
+    SolverFailed,
+    SolverText,
+    dangling,
+    printable,
+    read_solver,
+)
 from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess
 from reports.check.formats.formats import FORMATS
@@ -277,16 +286,39 @@ def is_handed_out(file: Path) -> bool:
 
 def checked(files: Sequence[Path]) -> list[FileCheck]:
     """The checks in order, as many at once as there are cores, in workers: those can be stopped
-    whatever they do."""
-    tasks: dict[Hashable, Any] = {file: partial(check_file, file) for file in files}
+    whatever they do. Of files with the same text one is judged, and speaks for all."""
+    alike: dict[Hashable, list[Path]] = {}
+    for file in files:
+        alike.setdefault(identity_of(file), []).append(file)
+    tasks: dict[Hashable, Any] = {k: partial(check_file, same[0]) for k, same in alike.items()}
     done: dict[Path, FileCheck] = {}
-    results = run_all(tasks, min(os.cpu_count() or 1, len(files)), CHECKING)
+    results = run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)
     with closing(results), Progress() as progress:
-        progress.start(len(files), len(files), f"checking {printable(files[0].name)}")
-        for file, one in results:
-            done[file] = not_checked(file, one) if isinstance(one, Failure) else one
-            progress.done(f"checked {printable(str(file.relative_to(file.parent.parent)))}")
+        progress.start(len(tasks), len(tasks), f"checking {printable(files[0].name)}")
+        for key, one in results:
+            first = alike[key][0]
+            found = not_checked(first, one) if isinstance(one, Failure) else one
+            done |= {first: found} | {file: named_for(file, found) for file in alike[key][1:]}
+            progress.done(f"checked {printable(str(first.relative_to(first.parent.parent)))}")
     return [done[file] for file in files]
+
+
+def identity_of(file: Path) -> Hashable:
+    """What is the same of two files only if a check cannot tell them apart; of what is no solver's
+    text its own path. A Python file can see its name."""
+    try:
+        solver = read_solver(file)
+    except NotASolver:
+        return file
+    name = file.name if solver.kind == "python" else ""
+    return solver.kind, solver.text, solver.beside, name
+
+
+def named_for(file: Path, one: FileCheck) -> FileCheck:
+    """The check of a file with the same text, as that of this file."""
+    solver = None if one.solver is None else read_solver(file)
+    refused = one.refused.replace(printable(str(one.path)), printable(str(file)))
+    return replace(one, path=file, solver=solver, refused=refused)
 
 
 def not_checked(file: Path, failure: Failure) -> FileCheck:

@@ -171,6 +171,7 @@ def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path) -> NoRetu
         with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
             carry_out(plan, means, journal, progress)
             report = make_report(part, progress.say, LESSONS)
+            journal.close()
             replace_folder(part, out, RUN)
     except (NoScheduler, OtherVersions) as fault:
         say(f"{fault}. {what_is_kept(out)}")

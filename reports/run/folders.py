@@ -169,12 +169,17 @@ def open_again(out: Path) -> Journal:
 
 
 def reopened(journal: Journal, out: Path) -> None:
-    """Rename a finished run to OUT.part, with its journal locked, so that it can be completed."""
+    """Rename a finished run to OUT.part, so that it can be completed; raises `FolderTaken` if
+    another process locks the journal, which is closed for that moment."""
     part = part_of(out)
     if journal.path.parent == out:
         with unbroken():
+            journal.close()
             out.rename(part)
-            journal.path = part / JOURNAL
+            try:
+                journal.open(part)
+            except Busy:
+                raise FolderTaken(f"{out} is being written by another crosscheck") from None
     begun(part, RUN, out)
 
 

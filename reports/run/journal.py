@@ -17,6 +17,7 @@ from adapters.system import BINARY, lock
 from scenarios.regular import opened
 
 JOURNAL = "journal.jsonl"
+CLOSED = -1
 
 
 class Busy(Exception):
@@ -33,6 +34,10 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it
         cannot be had."""
+        self.open(folder)
+
+    def open(self, folder: Path) -> None:
+        """Open it in a folder; raises as the journal itself."""
         self.path = folder / JOURNAL
         self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
         try:
@@ -43,7 +48,7 @@ class Journal:
         except BlockingIOError:
             moved = True
         if moved:  # by the one who held the lock, when it was done
-            os.close(self.file)
+            self.close()
             raise Busy
         whole = self.path.read_bytes()
         os.ftruncate(self.file, whole.rfind(b"\n") + 1)
@@ -52,7 +57,13 @@ class Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self.file)
+        self.close()
+
+    def close(self) -> None:
+        """Close it, if it is open: Windows moves no folder in which a file is open."""
+        if self.file != CLOSED:
+            os.close(self.file)
+            self.file = CLOSED
 
     def append(self, line: dict[str, Any]) -> None:
         """Add a line, and hand it to the system; raises `OSError` and leaves no part of it if that

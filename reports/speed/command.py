@@ -79,6 +79,7 @@ def run_speed(
         if not results.measured.errors.size:
             nothing_measured(part, results)
         write_all(part, results, header)
+        journal.close()
         replace_folder(part, out, SPEED)
     print_summary(results, str(out / PAGE))
     sys.exit(DONE)

@@ -116,6 +116,7 @@ def find(plan: StabilityPlan, resume: bool, out: Path) -> NoReturn:
             found = write_files(part)
         except SceneFileError as fault:  # it was there when all began
             raise Unusable(str(fault)) from fault
+        journal.close()
         replace_folder(part, out, STABILITY)
     finish(found, out)
 

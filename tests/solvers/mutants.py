@@ -34,14 +34,19 @@ class Mutant(NamedTuple):
     also: Sequence[tuple[str, str]] = ()
     second: tuple[str, str] | None = None
 
-    def write(self, folder: Path) -> Path:
-        """The faulty file in `folder`."""
+    @property
+    def text(self) -> str:
+        """The faulty file."""
         text = (HERE / "correct" / self.base).read_text()
         for old, new in [(self.old, self.new), *self.also]:
             assert old in text, f"{self.name}: the patch does not fit {self.base}"
             text = text.replace(old, new)
+        return text
+
+    def write(self, folder: Path) -> Path:
+        """The faulty file in `folder`."""
         path = folder / self.name
-        path.write_text(text)
+        path.write_text(self.text)
         shutil.copy(GL_MATRIX, folder)
         return path
 
