@@ -308,8 +308,18 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     return `{"rows":${rows(world.spheres)},"collisions":${reported(world.collisions, heard)}}`;
   }
 
+  // Where everything is at the beginning and after each of `count` calls of `step`: one request for a whole scene.
+  function samples({ step: steps, count }) {
+    let all = rows(world.spheres);
+    for (let k = 0; k < count; k++) {
+      step(steps);
+      all += "," + rows(world.spheres);
+    }
+    return "[" + all + "]";
+  }
+
   const commands = {
-    ask, left: () => rows(asked), trace, accesses: traceOf, load, step, play, read: () => rows(world.spheres),
+    ask, left: () => rows(asked), trace, accesses: traceOf, load, step, play, samples, read: () => rows(world.spheres),
     contacts: () => reported(world.log, 0),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };

@@ -346,6 +346,14 @@ class PythonSolver:
             self.step(step)
         return {"rows": self.read(), "collisions": self.collision_rows[argument["heard"] :]}
 
+    def samples(self, argument: dict[str, Any]) -> list[list[list[float]]]:
+        """Where everything is at the beginning and after each of `count` calls of `step`."""
+        all_rows = [self.read()]
+        for _ in range(argument["count"]):
+            self.step(argument["step"])
+            all_rows.append(self.read())
+        return all_rows
+
     def read(self, _argument: Any = None) -> list[list[float]]:
         """The scene's spheres as they are."""
         return [row_of(s) for s in self.spheres]

@@ -24,7 +24,7 @@ from adapters.own_solver.file import (
     read_solver,
 )
 from adapters.own_solver.gl_matrix import HANDED_OUT
-from adapters.own_solver.process import SolverProcess
+from adapters.own_solver.process import SolverProcess, keep_processes
 from reports.check.formats.formats import FORMATS
 from reports.check.formats.table import show
 from reports.check.functions import keeps_state
@@ -290,7 +290,7 @@ def checked(files: Sequence[Path]) -> list[FileCheck]:
     alike: dict[Hashable, list[Path]] = {}
     for file in files:
         alike.setdefault(identity_of(file), []).append(file)
-    tasks: dict[Hashable, Any] = {k: partial(check_file, same[0]) for k, same in alike.items()}
+    tasks: dict[Hashable, Any] = {k: partial(check_here, same[0]) for k, same in alike.items()}
     done: dict[Path, FileCheck] = {}
     results = run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)
     with closing(results), Progress() as progress:
@@ -301,6 +301,12 @@ def checked(files: Sequence[Path]) -> list[FileCheck]:
             done |= {first: found} | {file: named_for(file, found) for file in alike[key][1:]}
             progress.done(f"checked {printable(str(first.relative_to(first.parent.parent)))}")
     return [done[file] for file in files]
+
+
+def check_here(file: Path) -> FileCheck:
+    """In a worker: the check of a file; where it can be, by the process of the file before."""
+    keep_processes()
+    return check_file(file)
 
 
 def identity_of(file: Path) -> Hashable:

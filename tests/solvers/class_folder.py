@@ -10,7 +10,15 @@ from pathlib import Path
 
 from tests.solvers.mutants import CORRECT, GL_MATRIX, MUTANTS
 
-NAMES = ("Jörg Müller", "Anne-Lise O'Neil", "Nguyễn Văn An", "Łukasz", "van der Berg", "Zoë", "李雷")
+NAMES = (
+    "Jörg Müller",
+    "Anne-Lise O'Neil",
+    "Nguyễn Văn An",
+    "Łukasz",
+    "van der Berg",
+    "Zoë",
+    "李雷",
+)
 FILES = ("Exercise", "Exercise (1)", "meine lösung", "final FINAL", r"back\slash")
 FILES_OF_NOBODY = (".DS_Store", "Thumbs.db", "~$notes.docx", "._Exercise.js")
 # Every so many students hand in the same file as the one before, or no file that can be checked.
