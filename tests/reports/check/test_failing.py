@@ -203,8 +203,8 @@ def test_a_displacement_that_the_failure_may_have_cut_off_is_not_judged(
 
 
 def test_a_call_that_was_stopped_before_it_did_anything_is_asked_again():
-    """On a busy machine. Not where it had moved a sphere, or came back; nor an overlapping pair that
-    only tells whether it is taken to collide."""
+    """On a busy machine. Not where it had moved a sphere, or came back; nor an overlapping pair
+    that only tells whether it is taken to collide."""
     stopped = SolverFailed("timeout", "does not come back")
     names = ("separate", "collision/shallow", "collision/upwards", OVERLAPPING, FAR, "same centre")
     still = {name: list(QUESTIONS[name].balls) for name in names}
