@@ -14,7 +14,6 @@ from reports.check.detection import detection_rows
 from reports.check.functions import arguments, failed_calls, failure
 from reports.check.lines import SHOWN, Source
 from reports.check.questions import (
-    COLLISIONS,
     LIMIT,
     QUESTIONS,
     Answer,
@@ -46,11 +45,13 @@ def rows_until_failure(
     part = source.part_of(shown, stopped.line)
     detection: list[CheckRow] = []
     if stopped.kind != "memory":  # after which nobody knows what state the process is in
-        left = left_by(process, [FAR, SHOWN["2"]], stuck(answers))
+        limit = SOON if stuck(answers) else LIMIT
+        left = left_by(process, [FAR, SHOWN["2"]], limit)
         if fails_at_once(left):
             part = "2a"
         else:
-            left |= left_by(process, needed(answers), stuck(answers))
+            left |= left_by(process, needed(answers), limit)
+            left |= left_by(process, doubtful(left), LIMIT)
             detection = detection_rows(left, source.text)
             part = beyond_detection(part, detection, left)
     rows = [failure("2a", part, answers)]
@@ -64,19 +65,18 @@ def rows_until_failure(
     return sorted(rows, key=lambda row: row.task)
 
 
-def left_by(process: SolverProcess, names: Iterable[str], endless: bool) -> dict[str, Answer]:
+def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[str, Answer]:
     """The answers to these questions in a fresh world; of a call that fails with the spheres as it
     has left them, if they still have all their numbers.
 
-    endless: whether some calls never come back. Each question is a request of its own: the worker
-    answers none after a call that it had to stop.
+    limit: s that a call may take. Each question is a request of its own: the worker answers none
+    after a call that it had to stop.
     """
     process.request(fresh_world(process))
-    limit = SOON if endless else LIMIT
     found: dict[str, Answer] = {}
     for name in names:
         reply, spheres = process.request(
-            [("ask", QUESTIONS[name].request, limit), ("left", None, limit)]
+            [("ask", QUESTIONS[name].request, limit), ("left", None, LIMIT)]
         )
         found[name] = answered(reply)
         if found[name].failed and not isinstance(spheres, SolverFailed):
@@ -88,14 +88,29 @@ def needed(answers: dict[str, Answer]) -> list[str]:
     """The questions that (a) and (b) are judged by; where each call has to be waited for, one in
     four of the pairs that tell which are taken to collide."""
     pairs = [name for name in answers if name.startswith("reach/")]
-    others = ("touch", "same centre", "at rest to each other", "separate")
-    return [*others, *COLLISIONS, *pairs[:: 4 if stuck(answers) else 1]]
+    return ["touch", "same centre", *projection.DISPLACED, *pairs[:: 4 if stuck(answers) else 1]]
 
 
 def fails_at_once(left: dict[str, Answer]) -> bool:
     """Whether the call fails for two spheres that are far from each other as it does for two that
     overlap, before it moves any: it fails before it knows which of the two it has."""
     return all(bool(left[name].failed) and not moved(left, name) for name in (FAR, SHOWN["2"]))
+
+
+def doubtful(left: dict[str, Answer]) -> list[str]:
+    """The questions to ask once more with more time: those whose call failed before it moved a
+    sphere, except overlapping pairs that only tell whether they are taken to collide.
+
+    On a busy machine a call may be stopped before it has done anything.
+    """
+    idle = (name for name, answer in left.items() if answer.failed and not moved(left, name))
+    return [name for name in idle if name in projection.DISPLACED or apart(name)]
+
+
+def apart(name: str) -> bool:
+    """Whether the two spheres of a question do not overlap."""
+    a, b = QUESTIONS[name].balls
+    return bool(np.hypot(*np.subtract(a.x, b.x)) > a.r + b.r)
 
 
 def moved(left: dict[str, Answer], name: str) -> bool:

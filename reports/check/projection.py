@@ -88,6 +88,7 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
+DISPLACED = ("at rest to each other", "separate", *COLLISIONS)  # the questions that (b) needs
 TAKEN_TO_BE_APART = "the overlapping pairs of these questions are taken to be apart"
 
 
@@ -107,8 +108,7 @@ def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
     spheres."""
     if not reacts(answers):
         return [not_asked("one point", "2b", TAKEN_TO_BE_APART)]
-    named_here = (*COLLISIONS, "at rest to each other", "separate")
-    readable = all(answers[name].balls for name in named_here)
+    readable = all(answers[name].balls for name in DISPLACED)
     if not readable or not all(
         displaced(question.balls, answers[name]) for name, question in COLLISIONS.items()
     ):

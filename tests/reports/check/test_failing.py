@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from adapters.own_solver.file import SolverFailed
+from reports.check.failing import FAR, doubtful
 from reports.check.page import write_page
+from reports.check.questions import QUESTIONS, Answer
 from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT
@@ -197,6 +200,25 @@ def test_a_displacement_that_the_failure_may_have_cut_off_is_not_judged(
     assert [row.cause for row in one.of("2b")] == [
         "the call fails before it has moved both spheres"
     ]
+
+
+def test_a_call_that_was_stopped_before_it_did_anything_is_asked_again():
+    """On a busy machine. Not where it had moved a sphere, or came back; nor an overlapping pair
+    that only tells whether it is taken to collide."""
+    stopped = SolverFailed("timeout", "does not come back")
+    names = ("separate", "collision/shallow", "collision/upwards", OVERLAPPING, FAR, "same centre")
+    still = {name: list(QUESTIONS[name].balls) for name in names}
+    a, b = still["collision/upwards"]
+    moved = [[a._replace(x=(9.0, 9.0)), b]]
+    left = {name: Answer([balls], failed=stopped) for name, balls in still.items()}
+    left["collision/upwards"] = Answer(moved, failed=stopped)
+    left["separate"] = Answer([still["separate"]])
+
+    assert doubtful(left) == ["collision/shallow", FAR]
+    assert doubtful(left | {FAR: Answer([], failed=stopped)}) == ["collision/shallow", FAR]
+
+
+OVERLAPPING = "reach/0"
 
 
 @pytest.mark.slow
