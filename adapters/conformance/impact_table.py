@@ -137,14 +137,13 @@ COLUMNS: dict[str, Column] = {
 }
 
 SHORT = ("threshold", "energy", "friction_unasked", "friction_1", "spin", "e_small")
-FAMILIES = {  # engine -> what the short form calls it, where its package has another name
-    "pymunk": "",
-    "box2d": "Box2D 2.3",
-    "box2d_v3": "Box2D 3.1",
-    "planck": "",
-    "matter": "",
-    "rapier2d": "Rapier",
-}
+OUTSIDE = list(  # the engines that are not of this project
+    dict.fromkeys(
+        name.partition(":")[0]
+        for name, row in (ENGINES | FETCHED).items()
+        if row.distributions or row.package
+    )
+)
 
 
 def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
@@ -197,10 +196,10 @@ def short_form(table: pd.DataFrame) -> str:
     rows = {str(row["engine"]): row for row in table.to_dict("records")}
     headings = [f"read on {table.date.max()}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
-    for engine, called in FAMILIES.items():
+    for engine in OUTSIDE:
         profiles = [rows[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
         library = str(profiles[0]["versions"]).partition(",")[0]
-        cells = [f"{called} ({library})" if called else library]
+        cells = [f"`{engine}` ({library})"]
         cells += [
             " → ".join(dict.fromkeys(cell(key, row[key]) for row in profiles)) for key in SHORT
         ]

@@ -150,12 +150,16 @@ def drawn_of(comparison: Comparison) -> Drawn:
     axes = axes_of(centre, disks)
     lines = [seen(axes, run.trajectory, disks, len(centre)) for run in runs if run.trajectory]
     box = box_of(seen(axes, centre, disks, len(centre)), lines, scenario.scene.radius[disks].max())
+    # Where nothing was played but the start, an axis of time has a length all the same.
+    until = float(centre.t[-1]) or scenario.sample_interval
+    if axes != "path":
+        box[2] = until
     return Drawn(
         disks=disks.tolist(),
         axes=axes,
         titles=titles_of(axes, scenario),
         box=box.tolist(),
-        until=float(centre.t[-1]),
+        until=until,
         apart={
             run.name: float(deviation(run.trajectory, centre, scenario.scene)[:, disks].max())
             / float((box[2:] - box[:2]).max() if axes == "path" else box[3] - box[1])

@@ -24,11 +24,12 @@ from reports.lessons.mechanisms.planck import (
     PLANCK,
     PROFILES,
     SCENES,
+    apart,
     kept,
     known,
-    off,
     recorded,
     run_of,
+    whole,
 )
 from reports.page.style import TRUTH, number
 from scenarios.model import Array
@@ -88,10 +89,8 @@ def show_float32(settings: Settings) -> Shown:
 @cache
 def errors_of_box2d(name: str, profile: str) -> Array:
     """Radii, at each step size of `LADDER`, on this machine."""
-    scene, truth = known(name)
-    assert truth is not None
     runs = [run_of(BOX2D, profile, name, substeps) for substeps in LADDER]
-    return np.array([off(run, truth, scene).max() for run in runs])
+    return np.array([apart(whole(run), known(name)[1], name) for run in runs])
 
 
 @cache
@@ -110,7 +109,7 @@ def shares_of(profile: str) -> dict[str, float]:
 def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list[Claim]:
     """What the errors of a scene show; `middle`: the place of the middle step size."""
     planck, box2d = f"{PLANCK}:{profile}", f"{BOX2D}:{profile}"
-    p, b, apart = (np.asarray(curve.y, float) for curve in curves)
+    p, b, between = (np.asarray(curve.y, float) for curve in curves)
     ms = np.asarray(curves[0].x, float)
 
     def share(shown: Shown) -> Array:
@@ -158,7 +157,7 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
             ),
         )
     )
-    growth = ends(apart)
+    growth = ends(between)
     if growth > 1:
         claims.append(
             Claim(

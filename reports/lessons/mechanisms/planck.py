@@ -13,7 +13,6 @@ from functools import cache
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from adapters.engine_row import EngineRow
@@ -23,7 +22,7 @@ from adapters.run import Run
 from reports.compare.laws import deviation
 from reports.terminal.foreign_text import put_text
 from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Array, Scenario, Trajectory
+from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
 
 KEPT = Path(__file__).with_name("planck.csv")
@@ -48,34 +47,34 @@ def run_of(engine: str, profile: str, name: str, substeps: int) -> Run:
     return play_once(rows[called].make, called, scene, scene.dt(substeps))
 
 
-def off(run: Run, other: Trajectory, scene: Scenario) -> Array:
-    """(k,) radii: the largest distance of any disk from where `other` has it, up to the end of
-    the exact answer; one nan if the run was not played to its end."""
-    truth = known(scene.name)[1]
-    if run.status != "ok" or run.trajectory is None or truth is None:
-        return np.array([np.nan])
-    apart = deviation(run.trajectory, other, scene.scene)[: len(truth)]
-    largest: Array = (apart / scene.scene.radius).max(axis=1)
-    return largest
+def whole(run: Run) -> Trajectory | None:
+    """What was played; None if that does not go to the end of the scene."""
+    return run.trajectory if run.status == "ok" else None
+
+
+def apart(one: Trajectory | None, other: Trajectory | None, name: str) -> float:
+    """Radii: the largest distance of any disk between the two, up to the end of the exact answer;
+    nan if there is none of them."""
+    scenario, truth = known(name)
+    if one is None or other is None or truth is None:
+        return float("nan")
+    distances = deviation(one, other, scenario.scene)[: len(truth)]
+    return float((distances / scenario.scene.radius).max())
 
 
 def measured(name: str, profile: str, substeps: int) -> dict[str, float | str | int]:
     """A row of the table: the error of both engines, and how far they are apart."""
-    scene, truth = known(name)
-    assert truth is not None
-    planck, box2d = (run_of(engine, profile, name, substeps) for engine in (PLANCK, BOX2D))
-    found = {
-        "planck_radii": off(planck, truth, scene),
-        "box2d_radii": off(box2d, truth, scene),
-        "apart_radii": off(planck, box2d.trajectory or truth, scene) + 0 * off(box2d, truth, scene),
-    }
-    row: dict[str, float | str | int] = {
+    scenario, truth = known(name)
+    planck, box2d = (whole(run_of(each, profile, name, substeps)) for each in (PLANCK, BOX2D))
+    return {
         "scenario": name,
         "profile": profile,
         "substeps": substeps,
-        "dt_s": scene.dt(substeps),
+        "dt_s": scenario.dt(substeps),
+        "planck_radii": apart(planck, truth, name),
+        "box2d_radii": apart(box2d, truth, name),
+        "apart_radii": apart(planck, box2d, name),
     }
-    return row | {column: float(values.max()) for column, values in found.items()}
 
 
 def table() -> pd.DataFrame:

@@ -15,12 +15,13 @@ from reports.lessons.mechanisms.planck import (
     LADDER,
     PROFILES,
     SCENES,
+    apart,
     kept,
     known,
     measured,
-    off,
     recorded,
     run_of,
+    whole,
 )
 from scenarios.catalogue import SCENARIOS
 from tests.test_readme import TEXTS
@@ -42,11 +43,8 @@ def differing(fresh: dict[str, float | str | int], columns: tuple[str, ...]) -> 
 
 def box2d_alone(name: str, profile: str, substeps: int) -> dict[str, float | str | int]:
     """Its part of a row, for which no npm package is needed."""
-    scene, truth = known(name)
-    assert truth is not None
-    error = off(run_of(BOX2D, profile, name, substeps), truth, scene).max()
-    key = {"scenario": name, "profile": profile, "substeps": substeps}
-    return key | {"box2d_radii": float(error)}
+    error = apart(whole(run_of(BOX2D, profile, name, substeps)), known(name)[1], name)
+    return {"scenario": name, "profile": profile, "substeps": substeps, "box2d_radii": error}
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,21 @@ def test_of_many_disks_the_one_is_drawn_that_is_farthest_from_its_place():
     assert drawn_of(fixed).disks == np.flatnonzero(~fixed.scenario.scene.static).tolist()
 
 
+def test_where_nothing_was_played_but_the_start_the_axes_have_a_length():
+    """Of a run that ended at once, in a scene without an exact answer; a path of no length is
+    drawn over time."""
+    one = simply("free_fall", "reference:exercise")
+    whole = one.runs[0].trajectory
+    assert whole is not None
+    names = ("t", "position", "velocity", "angle", "angular_velocity")
+    start = replace(whole, **{name: getattr(whole, name)[:1] for name in names})
+    drawn = drawn_of(replace(one, truth=None, runs=[replace(one.runs[0], trajectory=start)]))
+
+    assert drawn.axes == "y"
+    assert drawn.until == drawn.box[2] == one.scenario.sample_interval
+    assert drawn.box[3] > drawn.box[1]
+
+
 def test_an_engine_that_goes_far_does_not_shrink_the_others():
     """The axes hold all of the exact answer, and half as much again for engines that go beyond."""
     one = simply("bouncing_ball_e09", "reference:exercise")
