@@ -89,7 +89,9 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     checks = [one_of_several(path)] if single and files[0].is_dir() else checked(files)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
-    marked = marks_of(path, checks, grading)
+    wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
+    scenes = scenes_of(checks[0]) if any(wanted) else []
+    marked = marks_of(path, checks, grading, scenes)
     printed = [one.format for one in outputs if one.path is None] or ["table"]
     if printed == ["table"]:
         show(marked)
@@ -104,7 +106,6 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     if page is not None and several:
         make_class_page(page, marked)
     elif page is not None:
-        scenes = scenes_of(checks[0])
         if scenes and printed == ["table"]:
             print_scene(scenes, page)
         make_page(page, checks[0], scenes)
@@ -147,8 +148,13 @@ def grading_of(points: Path | None, id_pattern: str, hints: str) -> Grading:
 HINTS = ("full", "low")
 
 
-def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[Marked]:
-    """The marks of each file; says on standard error where an id is not sure to be one."""
+def marks_of(
+    path: Path, checks: Sequence[FileCheck], grading: Grading, scenes: Sequence[Smallest]
+) -> list[Marked]:
+    """The marks of each file; says on standard error where an id is not sure to be one.
+
+    scenes: of a single file, those that show its faults.
+    """
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
     if pattern is not None:
@@ -157,7 +163,10 @@ def marks_of(path: Path, checks: Sequence[FileCheck], grading: Grading) -> list[
             say(f"--id-pattern does not match {named(odd)}: its folder or file name is the id")
     if twice := [name for name, times in Counter(ids).items() if times > 1]:
         say(f"the same id for several files: {named(twice)}")
-    return [Marked(name, one, path, grading.points, grading.low) for name, one in zip(ids, checks)]
+    return [
+        Marked(name, one, path, grading.points, grading.low, scenes)
+        for name, one in zip(ids, checks)
+    ]
 
 
 def submission_of(path: Path) -> list[Path]:

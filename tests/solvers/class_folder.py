@@ -10,7 +10,15 @@ from pathlib import Path
 
 from tests.solvers.mutants import CORRECT, GL_MATRIX, MUTANTS
 
-NAMES = ("Jörg Müller", "Anne-Lise O'Neil", "Nguyễn Văn An", "Łukasz", "van der Berg", "Zoë", "李雷")
+NAMES = (
+    "Jörg Müller",
+    "Anne-Lise O'Neil",
+    "Nguyễn Văn An",
+    "Łukasz",
+    "van der Berg",
+    "Zoë",
+    "李雷",
+)
 FILES = ("Exercise", "Exercise (1)", "meine lösung", "final FINAL", r"back\slash")
 FILES_OF_NOBODY = (".DS_Store", "Thumbs.db", "~$notes.docx", "._Exercise.js")
 # Every so many students hand in the same file as the one before, or no file that can be checked.
@@ -55,11 +63,11 @@ def signed(suffix: str, text: str, turn: int) -> str:
 
 
 def absent() -> Iterator[Callable[[Path], object]]:
-    """What is handed in instead of a solver, again and again: nothing, an archive, a PDF, an empty
+    """What is handed in instead of a solver, again and again: an archive, nothing, a PDF, an empty
     file."""
     while True:
-        yield lambda home: None
         yield archive
+        yield Path.exists  # nothing
         yield lambda home: (home / "Lösung.pdf").write_bytes(b"%PDF-1.4\n")
         yield lambda home: (home / "Exercise.js").write_text("")
 

@@ -31,9 +31,7 @@ def renamed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def test_a_run_that_goes_on_is_renamed_with_its_journal_closed(
-    tmp_path: Path, renamed: list[str]
-):
+def test_a_run_that_goes_on_is_renamed_with_its_journal_closed(tmp_path: Path, renamed: list[str]):
     """And locked again after it; the control renames a folder with an open journal."""
     (out := tmp_path / "out").mkdir()
     journal = Journal(out)
