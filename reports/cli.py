@@ -345,7 +345,9 @@ def check(
     ] = "full",
     scaffold: Annotated[
         str,
-        typer.Option(metavar="gradescope", help="Write an autograder to DIR, and check nothing."),
+        typer.Option(
+            metavar="gradescope|classroom", help="Write an autograder to DIR, and check nothing."
+        ),
     ] = "",
 ) -> None:
     """Check a hand-written solver of the exercise.

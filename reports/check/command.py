@@ -89,7 +89,9 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
     not_read = others_in(path, files) if several else []
-    marked = marks_of(path, checks, grading, not_read)
+    wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
+    scenes = scenes_of(checks[0]) if any(wanted) else []
+    marked = marks_of(path, checks, grading, not_read, scenes)
     printed = [one.format for one in outputs if one.path is None] or ["table"]
     if printed == ["table"]:
         show(marked)
@@ -103,7 +105,6 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     if page is not None and several:
         make_class_page(page, marked)
     elif page is not None:
-        scenes = scenes_of(checks[0])
         if scenes and printed == ["table"]:
             print_scene(scenes, page)
         make_page(page, checks[0], scenes)
@@ -147,9 +148,16 @@ HINTS = ("full", "low")
 
 
 def marks_of(
-    path: Path, checks: Sequence[FileCheck], grading: Grading, not_read: Sequence[str]
+    path: Path,
+    checks: Sequence[FileCheck],
+    grading: Grading,
+    not_read: Sequence[str],
+    scenes: Sequence[Smallest],
 ) -> list[Marked]:
-    """The marks of each file; says on standard error where an id is not sure to be one."""
+    """The marks of each file; says on standard error where an id is not sure to be one.
+
+    scenes: of a single file, those that show its faults.
+    """
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
     if pattern is not None:
@@ -159,7 +167,7 @@ def marks_of(
     if twice := [name for name, times in Counter(ids).items() if times > 1]:
         say(f"the same id for several files: {named(twice)}")
     return [
-        Marked(name, one, path, grading.points, grading.low, not_read)
+        Marked(name, one, path, grading.points, grading.low, not_read, scenes)
         for name, one in zip(ids, checks)
     ]
 

@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from reports.check.outcomes import OUTCOMES, Status
 from reports.check.points import Points
 from reports.check.rows import TASKS, UNKNOWN, CheckRow
 from reports.check.verdict import WITHOUT_NUMBERS, FileCheck, headline, numbers_of, task_title
+
+if TYPE_CHECKING:
+    from reports.check.smallest_scene import Smallest
 
 # Names of files that say nothing of who wrote them: then the folder does.
 ANYBODYS = ("exercise", "solver")
@@ -45,7 +48,8 @@ class Marked:
     """A check with the student's id and the points.
 
     root: the file or folder that was given; worth: what each question gives; low: whether feedback
-    leaves out causes, lines and formulas; not_read: what else lies in `root` and has no row.
+    leaves out causes, lines and formulas; not_read: what else lies in `root` and has no row;
+    scenes: the smallest that show its faults, if a format has them.
     """
 
     id: str
@@ -54,6 +58,7 @@ class Marked:
     worth: Points
     low: bool = False
     not_read: Sequence[str] = ()
+    scenes: Sequence[Smallest] = ()
 
     @cached_property
     def tasks(self) -> list[TaskMark]:

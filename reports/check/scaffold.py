@@ -3,43 +3,58 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 from reports.check.points import DEFAULT, BadPoints, read_points
 from reports.terminal.exits import refuse, say
 
 KINDS = Path(__file__).parent / "autograder"
-# Of each kind what is left to do.
-NEXT = {
-    "gradescope": (
+
+
+class Kind(NamedTuple):
+    """What is left to do by hand, and where in the folder the points go."""
+
+    next: str
+    points: str = "tasks.toml"
+
+
+SCAFFOLDS = {
+    "gradescope": Kind(
         "Now, where the project is: uv build --wheel --out-dir {folder}; then zip what is in"
         " {folder}, and upload the zip to Gradescope."
-    )
+    ),
+    "classroom": Kind(
+        "Now, where the project is: uv build --wheel --out-dir {folder}/.grading; then copy"
+        " {folder}/.github and {folder}/.grading into the template repository of the assignment.",
+        ".grading/tasks.toml",
+    ),
 }
 
 
 def write_scaffold(kind: str, folder: Path, points: Path | None, hints: str) -> None:
     """Write the files of a kind to a folder that is empty or not there; exits 2 if that is not
     possible."""
-    if kind not in NEXT:
-        refuse([f"--scaffold {kind}: is none of {', '.join(NEXT)}"])
+    if kind not in SCAFFOLDS:
+        refuse([f"--scaffold {kind}: is none of {', '.join(SCAFFOLDS)}"])
     try:
         read_points(points or DEFAULT)
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             refuse([f"{folder}: is there and not empty; name another folder"])
         folder.mkdir(parents=True, exist_ok=True)
-        for template in sorted((KINDS / kind).iterdir()):
+        for template in sorted(one for one in (KINDS / kind).rglob("*") if one.is_file()):
             text = template.read_text(encoding="utf-8").replace("HINTS", hints)
-            put(folder / template.name, text)
-        put(folder / "tasks.toml", (points or DEFAULT).read_text(encoding="utf-8"))
+            put(folder / template.relative_to(KINDS / kind), text)
+        put(folder / SCAFFOLDS[kind].points, (points or DEFAULT).read_text(encoding="utf-8"))
     except BadPoints as fault:
         refuse([f"--points {fault}"])
     except OSError as fault:
         refuse([f"{folder}: {fault.strerror or fault}; name a folder that can be written"])
-    say(NEXT[kind].format(folder=folder))
+    say(SCAFFOLDS[kind].next.format(folder=folder))
 
 
 def put(path: Path, text: str) -> None:
     """Write a file with the line ends of Linux; a script may be executed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
     if text.startswith("#!"):
         path.chmod(0o755)

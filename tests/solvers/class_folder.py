@@ -63,11 +63,11 @@ def signed(suffix: str, text: str, turn: int) -> str:
 
 
 def absent() -> Iterator[Callable[[Path], object]]:
-    """What is handed in instead of a solver, again and again: nothing, an archive, a PDF, an empty
+    """What is handed in instead of a solver, again and again: an archive, nothing, a PDF, an empty
     file."""
     while True:
-        yield lambda home: None
         yield archive
+        yield Path.exists  # nothing
         yield lambda home: (home / "Lösung.pdf").write_bytes(b"%PDF-1.4\n")
         yield lambda home: (home / "Exercise.js").write_text("")
 

@@ -24,12 +24,14 @@ class Format(NamedTuple):
             written over.
         single: whether it holds the marks of one student.
         sealed: whether a file that was changed since is known by its end, and kept.
+        scenes: whether it shows the smallest scene of each fault, which takes seconds to find.
     """
 
     text: Callable[[Sequence[Marked]], str]
     mark: bytes
     single: bool = False
     sealed: bool = False
+    scenes: bool = False
 
 
 FORMATS = {
@@ -37,7 +39,7 @@ FORMATS = {
     "json": Format(json_text, b'{\n  "crosscheck": '),
     "junit": Format(as_junit, JUNIT, sealed=True),
     "gradescope": Format(gradescope_text, b'{\n  "extra_data": {\n    "crosscheck"', single=True),
-    "prairielearn": Format(prairielearn_text, b'",\n  "gradable": ', single=True),
+    "prairielearn": Format(prairielearn_text, b'",\n  "gradable": ', single=True, scenes=True),
     "classroom": Format(classroom_text, b'",\n  "status": "', single=True),
     "csv": Format(csv_text, b"id,task "),
 }

@@ -1,4 +1,5 @@
-"""results.json of PrairieLearn's external grading: a test a task, and the score as a share of 1."""
+"""results.json of PrairieLearn's external grading: a test a task, the score as a share of 1, and a
+picture of the smallest scene that shows each fault."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 from reports.check.marks import Marked
+from reports.check.picture import data_url, label
 
 LARGEST = 1_000_000  # bytes that PrairieLearn reads
 LONGEST = 20_000  # characters of what is said of a task: eight tasks of four bytes a letter fit
@@ -35,4 +37,15 @@ def prairielearn_text(marked: Sequence[Marked]) -> str:
                 for mark in one.tasks
             ],
         }
+        if one.scenes:
+            results["images"] = [{"label": label(it), "url": data_url(it)} for it in one.scenes]
+    text = as_text(results)
+    while len(text.encode()) > LARGEST and results.get("images"):
+        results["images"].pop()
+        text = as_text(results)
+    return text
+
+
+def as_text(results: dict[str, Any]) -> str:
+    """The results as JSON."""
     return json.dumps(results, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

@@ -13,8 +13,7 @@ from reports.check.command import checked, named_for
 from reports.check.verdict import check_file
 from tests.bench.class_of_students import LARGEST, STUDENTS
 from tests.reports.terminal.command_line import crosscheck
-from tests.solvers.class_folder import COPIES, MISSING, write_class
-from tests.solvers.mutants import CORRECT
+from tests.solvers.class_folder import MISSING, write_class
 
 
 def test_files_with_the_same_text_are_judged_once_and_named_each(

@@ -1,16 +1,21 @@
-"""The autograder for Gradescope, run in a folder that stands for its container."""
+"""The autograders for Gradescope and GitHub Classroom, in folders that stand for their machines."""
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
+import jsonschema
 import pytest
+import yaml
 
 from reports.check.points import DEFAULT
+from tests.reports.check.test_marks import schema_of
 from tests.reports.check.test_outputs import RIGHT, WRONG
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
@@ -28,7 +33,7 @@ def test_a_scaffold_is_written_to_an_empty_folder_only(tmp_path: Path):
 
     assert [one.returncode for one in (first, again, other, bad)] == [0, 2, 2, 2]
     assert again.stderr == "new: is there and not empty; name another folder\n"
-    assert other.stderr == "--scaffold moodle: is none of gradescope\n"
+    assert other.stderr == "--scaffold moodle: is none of gradescope, classroom\n"
     assert "task 1: -1 is no number of points" in bad.stderr
     assert {name for name, runs in files.items() if runs} == {"setup.sh", "run_autograder"}
     assert (tmp_path / "new" / "tasks.toml").read_text() == DEFAULT.read_text()
@@ -69,3 +74,60 @@ def run(home: Path) -> int:
         capture_output=True,
         timeout=120,
     ).returncode
+
+
+def workflow(folder: Path) -> dict[str, Any]:
+    """The steps of the workflow that was written to a folder, by name or by what they use."""
+    written = (folder / ".github" / "workflows" / "classroom.yml").read_text(encoding="utf-8")
+    steps = yaml.safe_load(written)["jobs"]["check"]["steps"]
+    return {step.get("name") or step["uses"].partition("@")[0]: step for step in steps}
+
+
+def test_the_workflow_of_classroom_hands_its_results_to_the_reporter(tmp_path: Path):
+    """The reporter reads the variable that is named for the step that it is told of."""
+    done = crosscheck("check", "--scaffold", "classroom", "new", "--hints", "low", cwd=tmp_path)
+    steps = workflow(tmp_path / "new")
+    reporter = steps["classroom-resources/autograding-grading-reporter"]
+    (runner,) = reporter["with"]["runners"].split(",")
+    told = reporter["env"][f"{runner.upper()}_RESULTS"]
+
+    assert done.returncode == 0
+    assert told == f"${{{{ steps.{steps['Check']['id']}.outputs.result }}}}"
+    assert "--hints low" in steps["Check"]["run"]
+    assert (tmp_path / "new" / ".grading" / "tasks.toml").read_text() == DEFAULT.read_text()
+
+
+@pytest.mark.slow
+def test_the_step_of_classroom_answers_every_submission(tmp_path: Path):
+    """Played as GitHub plays it, in the student's repository: a right file, a wrong one, none; a
+    bad grader fails."""
+    crosscheck("check", "--scaffold", "classroom", "repository", cwd=tmp_path)
+    repository, output = tmp_path / "repository", tmp_path / "output"
+    script = workflow(repository)["Check"]["run"]
+    (tmp_path / "venv" / "bin").mkdir(parents=True)
+    (tmp_path / "venv" / "bin" / "crosscheck").symlink_to(CROSSCHECK)
+
+    def play() -> int:
+        output.write_text("")
+        return subprocess.run(
+            ["bash", "-e", "-o", "pipefail", "-c", script],
+            cwd=repository,
+            env=os.environ | {"RUNNER_TEMP": str(tmp_path), "GITHUB_OUTPUT": str(output)},
+            capture_output=True,
+            timeout=120,
+        ).returncode
+
+    scores = []
+    wrong = WRONG.write(tmp_path).read_text()
+    for text in (RIGHT.read_text(), wrong, None):
+        file = repository / "Exercise.js"
+        file.unlink() if text is None else file.write_text(text)
+        status = play()
+        name, _, result = output.read_text().partition("=")
+        results = json.loads(base64.b64decode(result))
+        jsonschema.validate(results, schema_of("classroom"))
+        scores.append((status, name, sum(test["score"] for test in results["tests"])))
+    (repository / ".grading" / "tasks.toml").write_text("1 = -1")
+
+    assert scores == [(0, "result", 20.0), (0, "result", 17.0), (0, "result", 0.0)]
+    assert play() != 0

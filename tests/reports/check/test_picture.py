@@ -1,0 +1,103 @@
+"""The picture of a smallest scene: a PNG that PrairieLearn shows."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from base64 import b64decode
+from dataclasses import replace
+from functools import cache
+
+import jsonschema
+import numpy as np
+import pytest
+
+from reports.check.formats import prairielearn
+from reports.check.formats.formats import FORMATS
+from reports.check.formats.prairielearn import LARGEST, LONGEST
+from reports.check.picture import EXACT, FARTHEST, START, YOURS, data_url, drawn, label, png
+from reports.check.smallest import Smallest, scenario_of
+from scenarios.model import Array, Trajectory
+from tests.reports.check.test_marks import marked, row, schema_of
+
+
+@cache
+def smallest() -> Smallest:
+    """A head-on pair; `yours` stays where it is."""
+    scenario = scenario_of([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0), 0.9, 0.02)
+    assert scenario is not None
+    count = len(scenario.times)
+    still = motion(scenario.times, np.repeat(scenario.scene.position[np.newaxis], count, axis=0))
+    moved = still.position + np.array([0.5, 0.0]) * scenario.times[:, np.newaxis, np.newaxis]
+    return Smallest(scenario, "sphere 0 rests", still, motion(scenario.times, moved))
+
+
+def motion(t: Array, position: Array) -> Trajectory:
+    """Spheres at these places that do not turn."""
+    zero = np.zeros(position.shape[:2])
+    return Trajectory(t, position, np.zeros_like(position), zero, zero)
+
+
+def read(data: bytes) -> Array:
+    """The pixels of a PNG without filters; each part has the checksum that its reader asks for."""
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    at, parts = 8, dict[bytes, bytes]()
+    while at < len(data):
+        (size,) = struct.unpack(">I", data[at : at + 4])
+        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
+        (check,) = struct.unpack(">I", data[at + 8 + size : at + 12 + size])
+        assert check == zlib.crc32(kind + body)
+        parts[kind], at = body, at + 12 + size
+    width, height = struct.unpack(">II", parts[b"IHDR"][:8])
+    rows = np.frombuffer(zlib.decompress(parts[b"IDAT"]), np.uint8).reshape(height, -1)
+    assert not rows[:, 0].any()
+    return rows[:, 1:].reshape(height, width, 3)
+
+
+def colours(pixels: Array) -> set[tuple[int, ...]]:
+    """Those that occur."""
+    return set(map(tuple, pixels.reshape(-1, 3).tolist()))
+
+
+def test_a_picture_shows_the_start_the_exact_answer_and_yours():
+    """In three colours, without the exact answer in two; in words which sphere is which."""
+    url = data_url(smallest())
+    seen = colours(read(b64decode(url.partition(",")[2])))
+    alone = colours(read(png(drawn(replace(smallest(), truth=None)))))
+
+    assert url.startswith("data:image/png;base64,")
+    assert {EXACT, YOURS} <= seen
+    assert EXACT not in alone
+    assert START not in {EXACT, YOURS}
+    assert "sphere 0 rests. Sphere 0 starts at (-0.5, 0) m" in label(smallest())
+
+
+@pytest.mark.parametrize("place", [np.nan, np.inf, -1e300, 10 * FARTHEST])
+def test_a_motion_that_leaves_for_nowhere_has_a_picture(place: float):
+    """Also if all of it is there; the picture keeps its size."""
+    yours = smallest().yours
+    gone = replace(yours, position=np.full_like(yours.position, place))
+    one = replace(smallest(), yours=gone, truth=None)
+
+    assert max(drawn(one).shape) <= max(drawn(smallest()).shape) + 1
+    assert np.isfinite(drawn(replace(one, truth=smallest().truth))).all()
+
+
+def test_the_loudest_file_and_its_pictures_fit_into_what_prairielearn_reads(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Pictures that do not are left out from the last on; as its schema says."""
+    said = "\N{PILE OF POO}" * LONGEST
+    loud = marked(*(row(task, "x", "fault", said) for task in ("1", "2a", "2b", "2c", "2d")))
+    loud = replace(loud, scenes=[smallest()] * 3)
+    whole, without = (FORMATS["prairielearn"].text([one]) for one in (loud, marked()))
+    size = len(whole.encode())
+    monkeypatch.setattr(prairielearn, "LARGEST", size - 1)
+    cut = json.loads(FORMATS["prairielearn"].text([loud]))
+
+    jsonschema.validate(json.loads(whole), schema_of("prairielearn"))
+    assert size <= LARGEST
+    assert len(json.loads(whole)["images"]) == 3
+    assert len(cut["images"]) == 2
+    assert "images" not in json.loads(without)
