@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import struct
-import zlib
 from base64 import b64decode
 from dataclasses import replace
 from functools import cache
+from io import BytesIO
 
 import jsonschema
 import numpy as np
 import pytest
+from PIL import Image
 
 from reports.check.formats import prairielearn
 from reports.check.formats.formats import FORMATS
@@ -39,32 +39,16 @@ def motion(t: Array, position: Array) -> Trajectory:
     return Trajectory(t, position, np.zeros_like(position), zero, zero)
 
 
-def read(data: bytes) -> Array:
-    """The pixels of a PNG without filters; each part has the checksum that its reader asks for."""
-    assert data.startswith(b"\x89PNG\r\n\x1a\n")
-    at, parts = 8, dict[bytes, bytes]()
-    while at < len(data):
-        (size,) = struct.unpack(">I", data[at : at + 4])
-        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
-        (check,) = struct.unpack(">I", data[at + 8 + size : at + 12 + size])
-        assert check == zlib.crc32(kind + body)
-        parts[kind], at = body, at + 12 + size
-    width, height = struct.unpack(">II", parts[b"IHDR"][:8])
-    rows = np.frombuffer(zlib.decompress(parts[b"IDAT"]), np.uint8).reshape(height, -1)
-    assert not rows[:, 0].any()
-    return rows[:, 1:].reshape(height, width, 3)
-
-
-def colours(pixels: Array) -> set[tuple[int, ...]]:
-    """Those that occur."""
-    return set(map(tuple, pixels.reshape(-1, 3).tolist()))
+def colours(data: bytes) -> set[tuple[int, ...]]:
+    """Those that occur in a PNG."""
+    return set(map(tuple, np.asarray(Image.open(BytesIO(data))).reshape(-1, 3).tolist()))
 
 
 def test_a_picture_shows_the_start_the_exact_answer_and_yours():
     """In three colours, without the exact answer in two; in words which sphere is which."""
     url = data_url(smallest())
-    seen = colours(read(b64decode(url.partition(",")[2])))
-    alone = colours(read(png(drawn(replace(smallest(), truth=None)))))
+    seen = colours(b64decode(url.partition(",")[2]))
+    alone = colours(png(drawn(replace(smallest(), truth=None))))
 
     assert url.startswith("data:image/png;base64,")
     assert {EXACT, YOURS} <= seen
@@ -80,8 +64,8 @@ def test_a_motion_that_leaves_for_nowhere_has_a_picture(place: float):
     gone = replace(yours, position=np.full_like(yours.position, place))
     one = replace(smallest(), yours=gone, truth=None)
 
-    assert max(drawn(one).shape) <= max(drawn(smallest()).shape) + 1
-    assert np.isfinite(drawn(replace(one, truth=smallest().truth))).all()
+    assert max(drawn(one).size) <= max(drawn(smallest()).size) + 1
+    assert EXACT in colours(png(drawn(replace(one, truth=smallest().truth))))
 
 
 def test_the_loudest_file_and_its_pictures_fit_into_what_prairielearn_reads(
