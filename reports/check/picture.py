@@ -86,7 +86,8 @@ class Paper:
             along = np.clip(x * n[0] + y * n[1], 0.0, radius)
             line = np.hypot(x - along * n[0], y - along * n[1])
             ring = np.abs(np.hypot(x, y) - radius)
-            return np.minimum(ring, line) * self.scale - width / 2
+            gap: Array = np.minimum(ring, line) * self.scale - width / 2
+            return gap
 
         self.ink(place, radius * self.scale + width, outside, colour)
 
