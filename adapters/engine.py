@@ -37,8 +37,7 @@ class ContactImpulse(NamedTuple):
 class Engine(Protocol):
     """The protocol: `load` once, then `step` and `read` any number of times, then `close`."""
 
-    # Whether collisions are logged; set before `load`. Off where speed is measured, because logging
-    # in Python takes longer than a whole step of some engines.
+    # Whether collisions are logged; set before `load`. Off for timings: it may outlast a step.
     listening: bool = True
     # s of the time of `step` that the adapter spent on `Scene.wrap`, where the engine itself has no
     # such edges. A measurement sets it to 0 first.

@@ -40,7 +40,7 @@ def prairielearn_text(marked: Sequence[Marked]) -> str:
         if one.scenes:
             results["images"] = [{"label": label(it), "url": data_url(it)} for it in one.scenes]
     text = as_text(results)
-    while len(text.encode()) > LARGEST and results.get("images"):
+    while len(text.encode(errors="backslashreplace")) > LARGEST and results.get("images"):
         results["images"].pop()
         text = as_text(results)
     return text
