@@ -40,11 +40,10 @@ SCENES = (
 """Scenes with different work for an engine, one at least in each situation of the report."""
 # Disks times steps, over all step sizes of a scene: of a scene with more only the first part is
 # timed, the same for every engine, as a second of a stack costs otherwise at the start than later.
-WORK = 60_000
-SLOW = (
-    0.5  # s of a part: what takes longer is not timed again, its cost is that of when it was played
-)
-SHARE = 0.1  # s of its own after which a cell sits out the rounds left: no single one takes all
+WORK = 30_000  # all of it takes a second and a half a round
+# s of a part: what takes longer is not timed again, its cost is that of when it was played
+SLOW = 0.1
+SHARE = 0.1  # s of its own after which a cell sits out the rounds left, but for the first three
 BUSY = 0.10  # a noise floor beyond it: no time is shown
 STARTING = 120.0  # s to import and compile the engines, before the first round
 
@@ -146,7 +145,7 @@ class Pass:
         ]
         what += besides(self.cells)
         left = self.seconds - (perf_counter() - started)  # the engines have been imported, too
-        samples = interleaved(what, ROUNDS, SHARE, self.seed, left, fewest=0)
+        samples = interleaved(what, ROUNDS, SHARE, self.seed, left)
         rounds: dict[Any, list[Sample]] = {}
         for sample in samples:
             rounds.setdefault(sample.key, []).append(sample)
