@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, FETCHED
 from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
@@ -146,8 +146,8 @@ INTERVENTIONS = {
             f"as {engine}:matched",
             engine=f"{engine}:matched",
         )
-        for engine in dict.fromkeys(name.partition(":")[0] for name in ENGINES)
-        if f"{engine}:shipped" in ENGINES and f"{engine}:matched" in ENGINES
+        for engine in dict.fromkeys(name.partition(":")[0] for name in (*ENGINES, *FETCHED))
+        if {f"{engine}:shipped", f"{engine}:matched"} <= {*ENGINES, *FETCHED}
     },
 }
 """In the order in which they are tried: what shows one thing alone comes first, a finer step where
