@@ -177,7 +177,7 @@ def reopened(journal: Journal, out: Path) -> None:
             journal.close()
             out.rename(part)
             try:
-                journal.open(part)
+                journal.open_in(part)
             except Busy:
                 raise FolderTaken(f"{out} is being written by another crosscheck") from None
     begun(part, RUN, out)

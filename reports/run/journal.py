@@ -34,9 +34,9 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it
         cannot be had."""
-        self.open(folder)
+        self.open_in(folder)
 
-    def open(self, folder: Path) -> None:
+    def open_in(self, folder: Path) -> None:
         """Open it in a folder; raises as the journal itself."""
         self.path = folder / JOURNAL
         self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
