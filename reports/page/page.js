@@ -124,24 +124,30 @@ function watchScenarios() {
     }
   }, { rootMargin: "600px" });
   const links = new Map([...document.querySelectorAll("#index a")].map((a) => [a.hash.slice(1), a]));
+  // What stands on a line a little below the top of the window: where a link leads to, however short it is.
+  const places = [...links.keys()].map((id) => document.getElementById(id)).filter(Boolean), onLine = new Set();
   const here = new IntersectionObserver((entries) => {
-    for (const entry of entries) {
-      const link = links.get(entry.target.id);
-      if (entry.isIntersecting) {
-        links.forEach((other) => other.removeAttribute("aria-current"));
-        link?.setAttribute("aria-current", "true");
-        keepInSight(link);
-      } else if (!entry.isIntersecting) players[entry.target.dataset.name]?.stop();
+    for (const { target, isIntersecting } of entries) {
+      if (isIntersecting) onLine.add(target);
+      else {
+        onLine.delete(target);
+        players[target.dataset.name]?.stop();
+      }
     }
-  }, { rootMargin: "-15% 0px -75% 0px" });
+    const link = links.get(places.findLast((place) => onLine.has(place))?.id);
+    if (!link) return;
+    links.forEach((other) => other.removeAttribute("aria-current"));
+    link.setAttribute("aria-current", "true");
+    keepInSight(link);
+  }, { rootMargin: "-6% 0px -93% 0px" });
   document.querySelectorAll(".scenario").forEach((scenario) => near.observe(scenario));
-  document.querySelectorAll("section[id]").forEach((section) => here.observe(section));
+  places.forEach((place) => here.observe(place));
 }
 
 // The index scrolls by itself, and never moves the page while it does.
 function keepInSight(link) {
   const list = document.querySelector("#index .list");
-  if (!link || list.clientHeight >= list.scrollHeight) return;
+  if (list.clientHeight >= list.scrollHeight) return;
   const [inner, outer] = [link.getBoundingClientRect(), list.getBoundingClientRect()];
   if (inner.top < outer.top || inner.bottom > outer.bottom) list.scrollTop += inner.top - outer.top - outer.height / 2;
 }

@@ -176,6 +176,18 @@ def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
 
 
 @pytest.mark.slow
+def test_the_index_marks_the_section_that_its_link_leads_to(page: Page) -> None:
+    """Short ones, too: of those the next one stands in the window as well."""
+    links = page.locator("#index a[href^='#']:visible")
+    current = "hash => document.querySelector('#index [aria-current]')?.hash === hash"
+
+    assert links.count() > 10
+    for link in links.all()[:-1]:  # the page ends before the last could come to the top
+        link.click()
+        page.wait_for_function(current, arg=link.get_attribute("href"))
+
+
+@pytest.mark.slow
 def test_charts_follow_the_dark(page: Page) -> None:
     """Where the reader turns to dark, the lines that are drawn take the colours of the dark."""
     with_engine(page, HEAD_ON)
