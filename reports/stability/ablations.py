@@ -20,7 +20,7 @@ from adapters.mechanisms.table import (
     FLIGHT,
     FRICTION,
     IMPULSE,
-    MECHANISMS,
+    KNOWN,
     POSITION_CORRECTION,
     RESTITUTION,
     SKIN,
@@ -62,6 +62,7 @@ SENTENCES = (
     (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
     (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
     (RESTITUTION, "box2d_v3:*", THRESHOLD, THRESHOLDS["box2d_v3"]),
+    (RESTITUTION, "planck:*", THRESHOLD, "planck Settings.velocityThreshold"),
     (IMPULSE, "reference:*", "walls come first, then pairs", "reference_impl/lesson.py"),
     (IMPULSE, "*", TOGETHER, OWN_ORDER),
     (POSITION_CORRECTION, "reference:*", AT_ONCE, "exercise 11, task 2"),
@@ -120,7 +121,7 @@ class Ablations:
             limit.failing,
             search.engine.split("+"),
         )
-        if seen is None or failing is None or seen[1].trajectory is None or name not in MECHANISMS:
+        if seen is None or failing is None or seen[1].trajectory is None or name not in KNOWN:
             return None
         judged, run = seen
         scene, runs = search.case.scene, failing.runs

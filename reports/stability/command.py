@@ -58,7 +58,7 @@ MARKS = {
 }
 """What stands in the table of limits -> what it means."""
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
-PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in ENGINES)
+PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in [*ENGINES, *FETCHED])
 STABILITY = Kind(
     "crosscheck stability",
     rf"journal\.jsonl|trajectories/.+(\.({PLAYED_BY})|-own)[^/.]*\.npz",
@@ -81,11 +81,8 @@ def find_limits(
     cases, maps, touching = checked(names, vary)
     form = "full" if full else "quick"
     chosen = checked_engines(engines)
-    if packaged := [name for name in chosen if name in FETCHED]:
-        how = "is not driven to its limits; crosscheck run and crosscheck speed play it"
-        refuse([f"--engine {name}: {how}" for name in packaged])
-    own = {name: row_of(name) for name in chosen if name not in ENGINES}
-    if files := [name.removesuffix(OWN) for name, row in own.items() if row.exercise]:
+    added = {name: row_of(name) for name in chosen if name not in ENGINES}
+    if files := [name.removesuffix(OWN) for name, row in added.items() if row.exercise]:
         how = (
             "a solver of the exercise is not driven to its limits: crosscheck check judges it,"
             " crosscheck run plays it"
@@ -94,7 +91,7 @@ def find_limits(
     plan = StabilityPlan(
         cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
     )
-    with taking_part(own):
+    with taking_part(added):
         find(plan, resume, out)
 
 

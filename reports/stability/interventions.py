@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, FETCHED
 from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
@@ -121,6 +121,15 @@ INTERVENTIONS = {
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
     ),
+    # Of matter a smaller step does not say what is at fault: its friction, its air and its resting
+    # threshold go with the step, too.
+    "finer_matter": Intervention(
+        "matter:*",
+        "[!d]*",
+        f"{NOT_KNOWN}; the step is too large for something in it",
+        "in steps of an eighth",
+        finer,
+    ),
     "finer": Intervention(
         "*",
         "[!d]*",
@@ -146,8 +155,8 @@ INTERVENTIONS = {
             f"as {engine}:matched",
             engine=f"{engine}:matched",
         )
-        for engine in dict.fromkeys(name.partition(":")[0] for name in ENGINES)
-        if f"{engine}:shipped" in ENGINES and f"{engine}:matched" in ENGINES
+        for engine in dict.fromkeys(name.partition(":")[0] for name in (*ENGINES, *FETCHED))
+        if {f"{engine}:shipped", f"{engine}:matched"} <= {*ENGINES, *FETCHED}
     },
 }
 """In the order in which they are tried: what shows one thing alone comes first, a finer step where

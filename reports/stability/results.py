@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, OWN
+from adapters.engines import ENGINES, FETCHED, OWN
+from adapters.npm_packages import version_of
 from reports.run.journal import JOURNAL, Journal, plain
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.machine import about
@@ -85,9 +86,17 @@ class StabilityPlan:
     command: str
 
     @property
-    def own(self) -> dict[str, EngineRow]:
-        """The rows of engines' own files, `PATH:own`, among `engines`."""
-        return {name: ENGINES[name] for name in self.engines if name.endswith(OWN)}
+    def added(self) -> dict[str, EngineRow]:
+        """The rows of engines' own files, `PATH:own`, and those of `FETCHED`, among `engines`."""
+        return {
+            name: ENGINES[name] for name in self.engines if name.endswith(OWN) or name in FETCHED
+        }
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """What decides the numbers, npm packages too."""
+        packages = dict.fromkeys(row.package for row in self.added.values() if row.package)
+        return {**about("", 0)["versions"], **{name: version_of(name) for name in packages}}
 
 
 @dataclass(frozen=True)
@@ -100,10 +109,10 @@ class Task:
     engine: str
     form: str
 
-    def __call__(self, folder: Path, own: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
-        """In the worker: do it, with the rows of engines' own files among the others; the first
+    def __call__(self, folder: Path, added: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
+        """In the worker: do it, with the rows that the plan adds among the others; the first
         failing run at the limit is saved."""
-        with taking_part(own):
+        with taking_part(added):
             return self.found(folder)
 
     def found(self, folder: Path) -> Limit | MapOf | LawOf:
@@ -136,18 +145,17 @@ def carry_out(
     """Do every task that is not in `done`; all results go into the journal's folder."""
     folder = journal.path.parent
     (folder / "trajectories").mkdir(exist_ok=True)
-    files = {
-        path: digest_of(path)
-        for path, _, _ in (name.rpartition(":") for name in (*plan.cases, *plan.own))
-        if path
-    }
-    header = about(plan.command, 0) | {"form": plan.form, "files": files}
+    named = [*plan.cases, *(name for name in plan.added if name not in FETCHED)]
+    paths = [name.rpartition(":")[0] for name in named]
+    files = {path: digest_of(path) for path in paths if path}
+    header = about(plan.command, 0)
+    header |= {"versions": plan.versions, "form": plan.form, "files": files}
     journal.append({"header": header})
     with writing(folder, ["machine.json"]):
         put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
     wanted = tasks_of(plan)
     tasks: dict[Any, Callable[[], Any]] = {
-        task: partial(task, folder, plan.own) for task in wanted if task not in done
+        task: partial(task, folder, plan.added) for task in wanted if task not in done
     }
     progress.start(len(tasks), len(wanted))
     with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:
@@ -290,9 +298,8 @@ def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
     """
     headers, results = journalled(folder)
     well = {task for task, result in results.items() if result.status == "ok"}
-    versions = about("", 0)["versions"]
     same = all(
-        header["versions"] == versions
+        header["versions"] == plan.versions
         and all(digest_of(path) == digest for path, digest in header["files"].items())
         for header in headers
     )

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from adapters.engine import Engine
 from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, changed
+from adapters.engines import ENGINES, changed, row_of
 from adapters.play import play_once
 from adapters.run import Run
 from scenarios.model import Scenario, Scene
@@ -70,8 +70,8 @@ VARIANTS: dict[str, Variant] = {
 
 @contextmanager
 def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
-    """Within it engines' own files, `PATH:own`, are put to the test in this process, as the rows of
-    `ENGINES` are."""
+    """Within it engines' own files, `PATH:own`, and rows of `FETCHED` are put to the test in this
+    process, as the rows of `ENGINES` are."""
     ENGINES.update(rows)
     VARIANTS.update({name: Variant(name, row.make) for name, row in rows.items()})
     try:
@@ -87,5 +87,5 @@ def played(variant: Variant, scenario: Scenario) -> Run:
 
 
 def play_as(engine: str, scenario: Scenario) -> Run:
-    """`played`, by a key of `VARIANTS`."""
-    return played(VARIANTS[engine], scenario)
+    """`played`, by a key of `VARIANTS`, or a row that does not take part."""
+    return played(VARIANTS.get(engine) or Variant(engine, row_of(engine).make), scenario)

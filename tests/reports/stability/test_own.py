@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adapters.engines import FETCHED
 from reports.cli import VARIED
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, tried_out
@@ -153,6 +154,7 @@ def test_every_change_is_tried_on_somebody():
         "box2d:matched",
         "box2d_v3:shipped",
         "box2d_v3:matched",
+        *FETCHED,
     )
     for name, intervention in INTERVENTIONS.items():
         assert any(
