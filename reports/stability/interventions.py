@@ -121,6 +121,15 @@ INTERVENTIONS = {
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
     ),
+    # Of matter a smaller step does not say what is at fault: its friction, its air and its resting
+    # threshold go with the step, too.
+    "finer_matter": Intervention(
+        "matter:*",
+        "[!d]*",
+        f"{NOT_KNOWN}; the step is too large for something in it",
+        "in steps of an eighth",
+        finer,
+    ),
     "finer": Intervention(
         "*",
         "[!d]*",

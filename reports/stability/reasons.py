@@ -60,6 +60,8 @@ EULER_OUT = (
     " map grows by 1 + (w dt)²"
 )
 QUARTER = "nothing turns by more than pi/2 a step"
+EIGHTH = "nothing turns by more than pi/4 a step"
+PLANCK, RAPIER = "planck Settings.maxRotation", "a probe of it: 300 rad/s after 4 steps"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = (
     "restitution is one sweep after the substeps, so a disk that touches two others in a step loses"
@@ -134,6 +136,15 @@ REASONS = (
         "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE",
         None,
         "box2d_v3:matched",
+        IMPULSE,
+    ),
+    Reason(
+        "near_miss",
+        "rapier2d:*",
+        "a contact counts from a gap within the prediction distance on",
+        "Rapier IntegrationParameters: normalizedPredictionDistance",
+        None,
+        "rapier2d:matched",
         IMPULSE,
     ),
     *(
@@ -238,6 +249,9 @@ REASONS = (
     ),
     Reason("spin", "box2d:shipped", QUARTER, B2_SETTINGS + "b2_maxRotation", pi / 2 / 0.98),
     Reason("spin", "box2d:matched", QUARTER + "; refused", B2_SETTINGS + "b2_maxRotation", pi / 2),
+    Reason("spin", "planck:shipped", QUARTER, PLANCK, pi / 2 / 0.98),
+    Reason("spin", "rapier2d:shipped", EIGHTH, RAPIER, pi / 4 / 0.98),
+    Reason("spin", "rapier2d:matched", EIGHTH + "; refused", RAPIER, pi / 4),
     Reason(
         "spin",
         "box2d_v3:shipped",
@@ -336,18 +350,14 @@ REASONS = (
     ),
     *(
         Reason(case, engine, text, source, limit)
-        for box, most, text, source in (
-            ("box2d", pi / 2, QUARTER, B2_SETTINGS + "b2_maxRotation"),
-            (
-                "box2d_v3",
-                pi / 4,
-                "nothing turns by more than pi/4 a step",
-                "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
-            ),
+        for engine, most, text, source in (
+            ("box2d:*", pi / 2, QUARTER, B2_SETTINGS + "b2_maxRotation"),
+            ("box2d_v3:*", pi / 4, EIGHTH, "Box2D 3.1 src/constants.h: B2_MAX_ROTATION"),
+            ("planck:shipped", pi / 2, QUARTER, PLANCK),
+            ("rapier2d:*", pi / 4, EIGHTH, RAPIER),
         )
         # the disk comes to roll at 2/3 of its speed
         for case, limit in (("spin_in_bounce", most), ("slide_to_roll", 1.5 * most))
-        for engine in (f"{box}:shipped", f"{box}:matched")
     ),
     Reason("creep_at_rest", "reference:*", IN_TURN, "reference_impl/coulomb.py"),
     # Stacks.
