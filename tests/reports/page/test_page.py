@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, TimeoutError
 
 from reports.compare.comparison import Comparison
 from reports.lessons.catalogue import LESSONS
@@ -178,13 +178,20 @@ def test_the_legend_hides_an_engine_everywhere(page: Page) -> None:
 @pytest.mark.slow
 def test_the_index_marks_the_section_that_its_link_leads_to(page: Page) -> None:
     """Short ones, too: of those the next one stands in the window as well."""
+    page.locator("#picture .main-svg").first.wait_for()
     links = page.locator("#index a[href^='#']:visible")
-    current = "hash => document.querySelector('#index [aria-current]')?.hash === hash"
+    at_top = """hash => Math.abs(document.querySelector(hash).getBoundingClientRect().top) < 50
+        && document.querySelector('#index [aria-current]')?.hash === hash"""
 
     assert links.count() > 10
     for link in links.all()[:-1]:  # the page ends before the last could come to the top
-        link.click()
-        page.wait_for_function(current, arg=link.get_attribute("href"))
+        for last in (False, False, True):  # a chart that is drawn meanwhile may push it away
+            link.click()
+            try:
+                page.wait_for_function(at_top, arg=link.get_attribute("href"), timeout=5_000)
+                break
+            except TimeoutError:
+                assert not last, link.get_attribute("href")
 
 
 @pytest.mark.slow
