@@ -3,6 +3,7 @@ numbers, and claims about the curves."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,6 +26,10 @@ from scenarios.model import Array, Scenario, Trajectory
 from scenarios.no_truth import answered
 
 POINTS = 400  # of a curve, at most: more than a chart has pixels for
+# A space between a number and its unit.
+BEFORE_A_UNIT = re.compile(
+    r"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:[mµnk]?[ms]|kg|rad|Hz|kHz|J|N|%)(?:[/²³·]\S*)?(?:\W|$))"
+)
 Settings = Mapping[str, Any]
 
 
@@ -43,8 +48,8 @@ class Slider:
     @property
     def shown(self) -> list[str]:
         """The values as they are read."""
-        return list(self.read_as) or [
-            value if isinstance(value, str) else f"{number(value)} {self.unit}".strip()
+        return list(map(unbroken, self.read_as)) or [
+            value if isinstance(value, str) else unbroken(f"{number(value)} {self.unit}".strip())
             for value in self.values
         ]
 
@@ -197,10 +202,10 @@ class Shown:
             "charts": [chart.to_json() for chart in self.charts],
             "film": film,
             "drawn": self.drawn(),
-            "facts": [*self.facts, *self.refusals()],
-            "claims": [[claim.text, bool(claim.holds(self))] for claim in self.claims],
-            "steps": list(self.steps),
-            "said": dict(self.said),
+            "facts": [(what, unbroken(text)) for what, text in (*self.facts, *self.refusals())],
+            "claims": [[unbroken(claim.text), bool(claim.holds(self))] for claim in self.claims],
+            "steps": [(title, unbroken(text)) for title, text in self.steps],
+            "said": {key: unbroken(text) for key, text in self.said.items()},
         }
 
 
@@ -313,6 +318,11 @@ class Simulation:
 def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
     """One run of one engine, by the name of its row."""
     return play_once(ENGINES[name].make, name, scenario, scenario.dt(substeps))
+
+
+def unbroken(text: str) -> str:
+    """The text with spaces at which no line is broken between its numbers and their units."""
+    return BEFORE_A_UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def rounded(values: Array) -> list[float]:

@@ -65,13 +65,13 @@ def aside(each: Trajectory) -> Array:
 
 
 SEEN = {
-    "a fast disk meets another": Seen("tunnelling_head_on", "Way of the disk", "m", way),
-    "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", "Way of the disk", "m", way),
-    "a slow collision": Seen("slow_collision", "Way of the first disk", "m", way),
+    "a fast disk meets another": Seen("tunnelling_head_on", "Displacement along x", "m", way),
+    "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", "Displacement along x", "m", way),
+    "a slow collision": Seen("slow_collision", "Displacement of the first disk", "m", way),
     "a near miss": Seen("near_miss", "Deflection of the first disk", "m", aside),
-    "a scene made smaller": Seen("scale_down", "Way of the first disk", "m", way),
+    "a scene made smaller": Seen("scale_down", "Displacement of the first disk", "m", way),
     # A replay keeps seven digits of a place: farther out they are too few for a disk.
-    "far from the origin": Seen("far_from_origin", "Way of the disk", "m", way, harshest=1e5),
+    "far from the origin": Seen("far_from_origin", "Displacement along x", "m", way, harshest=1e5),
     "a fast spin": Seen("spin", "Angle", "rad", lambda each: each.angle[:, 0]),
 }
 
@@ -241,9 +241,10 @@ LIMITS = Lesson(
         (
             "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a"
             " size, and a method may have a value from which on it <b>fails</b>: it misses a"
-            " collision, cuts a spin, rounds a place away. The search tries values from gentle to"
-            " harsh, a collision at several moments of its step, and stops at the first value that"
-            " fails. Then it halves the gap to the last value that works until the two are at"
+            " collision, limits a spin, or loses a position to rounding. The search tries values"
+            " from gentle to harsh, a collision at several moments of its step, and stops at the"
+            " first value that fails. Then it halves the gap to the last value that works until"
+            " the two are at"
             f" most {QUICK.ratio - 1:.0%} apart."
         ),
         (

@@ -155,8 +155,8 @@ def meeting_claims(settings: Settings) -> list[Claim]:
         return float(abs(shown.y(name)[-1] - shown.y(TRUTH)[-1]))
 
     exact = Claim(
-        "The event-driven engine takes the collision at its own time: its velocity is exact, to"
-        " rounding, and so is its place.",
+        "The event-driven engine takes the collision at its own time: its velocity and"
+        " position are exact, to rounding.",
         lambda shown: (
             off(shown, "event_driven:float64") <= double
             and shown.y("event_driven:float64", 1).max() <= double

@@ -19,7 +19,7 @@ from adapters.engines import ENGINES
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.friction.bounce import CONE as EDGES
-from reports.lessons.lesson import Lesson
+from reports.lessons.lesson import Lesson, unbroken
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.mechanisms.float32 import APART
 from reports.page.documents import ENGINE, deflated, fragment, render
@@ -116,7 +116,7 @@ def linked(paragraph: str, links: Links) -> Markup:
             f'<a href="{links.lesson.format(lesson.name)}">{title}</a>' if links.lesson else title
         )
 
-    return Markup(re.sub(r"\[(\w+)\]", link, paragraph))
+    return Markup(re.sub(r"\[(\w+)\]", link, unbroken(paragraph)))
 
 
 def offline(lesson: Lesson, answers: Mapping[tuple[int, ...], Any], links: Links = ALONE) -> str:

@@ -143,7 +143,7 @@ THRUST = Lesson(
     name="thrust",
     number="2",
     title="Force and thrust",
-    asks="Does a force carry every engine equally far?",
+    asks="Does a force move the ship equally far in every engine?",
     text=(
         (
             "A force changes the velocity by <code>F/m dt</code> in a step. How far it carries the"

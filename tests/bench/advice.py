@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from math import log
 
 from adapters.engines import ENGINES
@@ -68,4 +69,9 @@ def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:] or list(SCENARIOS)))
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("scene", nargs="*", default=list(SCENARIOS), metavar="SCENE")
+    scenes = parser.parse_args().scene
+    if unknown := set(scenes) - set(SCENARIOS):
+        parser.error(f"no scene of that name: {', '.join(sorted(unknown))}")
+    sys.exit(main(scenes))

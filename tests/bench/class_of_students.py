@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import tempfile
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 from time import monotonic
 
@@ -17,13 +17,11 @@ from tests.bench.check import spent
 from tests.reports.terminal.command_line import CROSSCHECK
 from tests.solvers.class_folder import write_class
 
-STUDENTS = 200
 LONGEST, LARGEST = 40.0, 8.0  # s on two processors; MB of the page
 
 
-def main(words: list[str]) -> None:
+def main(students: int) -> None:
     """Write the class, have it marked by the command, and print the seconds and the size."""
-    students = int(words[0]) if words else STUDENTS
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         write_class(home / "class", students)
@@ -40,4 +38,6 @@ def main(words: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("students", nargs="?", type=int, default=200, metavar="STUDENTS")
+    main(parser.parse_args().students)

@@ -11,6 +11,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from time import perf_counter
 
 import numpy as np
@@ -168,4 +169,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.parse_args()
     main()

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 
 import numpy as np
@@ -77,4 +77,8 @@ def main(seconds: float, engines: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0, sys.argv[2:])
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("seconds", nargs="?", type=float, default=20.0, metavar="SECONDS")
+    parser.add_argument("engine", nargs="*", metavar="ENGINE|FILE")
+    asked = parser.parse_args()
+    main(asked.seconds, asked.engine)

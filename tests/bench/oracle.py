@@ -8,6 +8,7 @@ tests/bench/test_oracle_figures.py` computes again.
 from __future__ import annotations
 
 import csv
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterator
 from dataclasses import replace
 from math import log
@@ -128,4 +129,6 @@ def questions() -> Iterator[tuple[str, int, Scenario]]:
 
 
 if __name__ == "__main__":
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.parse_args()
     main()

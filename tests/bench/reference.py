@@ -18,6 +18,7 @@ from __future__ import annotations
 import csv
 import subprocess
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -300,4 +301,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.parse_args()
     main()

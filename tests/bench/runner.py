@@ -7,6 +7,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+from argparse import SUPPRESS, ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -218,8 +219,12 @@ def used() -> str:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        {"play_many": play_many, "tables_again": tables_again}[sys.argv[1]](Path(sys.argv[2]))
+    parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument("part", nargs="?", choices=["play_many", "tables_again"], help=SUPPRESS)
+    parser.add_argument("folder", nargs="?", type=Path, help=SUPPRESS)
+    asked = parser.parse_args()
+    if asked.part:
+        {"play_many": play_many, "tables_again": tables_again}[asked.part](asked.folder)
     else:
         overhead_of_large()
         overhead_of_small()

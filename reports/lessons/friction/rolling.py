@@ -134,7 +134,7 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
         return [
             Claim(
                 f"The disk rolls from the start, v = −r ω = {number(SPEED)} m/s: the point that"
-                " touches is at rest, nothing rubs, and the exact velocity stays.",
+                " touches is at rest, there is no friction, and the exact velocity stays.",
                 lambda shown: (
                     np.abs(shown.y(TRUTH) - SPEED).max() <= DOUBLE
                     and np.abs(shown.y(TRUTH, 1)).max() <= DOUBLE

@@ -88,7 +88,7 @@ CORRECTION = page(
     "Slop and position correction",
     "What becomes of an overlap?",
     "The exercise projects two disks apart at once. Box2D undoes a share of their overlap at a"
-    " time and leaves the last bit, the <b>slop</b>, so that a contact stays a contact. Here a"
+    " time and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact. Here a"
     " disk starts deep in a fixed one, for which there is no exact answer. The continuous"
     " collision of Box2D is off (<code>+no_ccd</code>), because it removes the overlap by other"
     " means.",

@@ -53,8 +53,8 @@ def digits_claims(far: float, digits: int, steps: int, dt: float) -> list[Claim]
         Claim(
             f"{number(far)} m from the origin two neighbouring float32 numbers are"
             f" {number(1e3 * apart)} mm apart, and a step is {number(1e3 * dt)} mm. Box2D rounds"
-            f" the place in each of {steps} steps; all together may not exceed"
-            f" {number(1e3 * most)} mm, and does not.",
+            f" the position in each of {steps} steps; together these errors stay below"
+            f" {number(1e3 * most)} mm.",
             lambda shown: apart / 100 < shown.y("box2d:shipped").max() <= most,
         ),
         Claim(
