@@ -17,6 +17,7 @@ from tests.bench.check import spent
 from tests.reports.terminal.command_line import CROSSCHECK
 from tests.solvers.class_folder import write_class
 
+STUDENTS = 200
 LONGEST, LARGEST = 40.0, 8.0  # s on two processors; MB of the page
 
 
@@ -39,5 +40,5 @@ def main(students: int) -> None:
 
 if __name__ == "__main__":
     parser = ArgumentParser(description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument("students", nargs="?", type=int, default=200, metavar="STUDENTS")
+    parser.add_argument("students", nargs="?", type=int, default=STUDENTS, metavar="STUDENTS")
     main(parser.parse_args().students)

@@ -188,6 +188,7 @@ NO_CLAIM = {
         "Then it goes": "defines an iteration",
     },
     "limits": {
+        "It misses": "says what failing is",
         "Then it halves": "test_a_limit_is_bracketed_as_closely_as_the_text_says",
         "A reason counts": "defines what tested means",
         "The command": "names a command",
