@@ -32,6 +32,7 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   let world;  // the scene being played
   let accesses = "";  // what the last traced call read and wrote
   let asked = empty();  // the spheres of the last question, which a call that failed may have changed
+  let answers = empty();  // to the last questions that were put together
 
   function snapshot() {
     const found = setPrototypeOf({}, null), names = keys(BUILT_IN);
@@ -191,6 +192,13 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
       + `"kept":[${list(changed(before))}],"calls":${reported(calls, 0)},"error":${problem}}`;
   }
 
+  // Questions, one after the other. What comes before a call that never comes back can still be had of `answers`.
+  function several(questions) {
+    answers = empty();
+    for (let k = 0; k < questions.length; k++) answers[k] = answer("ask", questions[k]);
+    return reported(answers, 0);
+  }
+
   // A sphere that writes down who reads or writes which of its numbers, and from where in the file.
   function traced(r, i) {
     const from = sphere(r), fields = FIELDS, seen = {};
@@ -319,14 +327,16 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   }
 
   const commands = {
-    ask, left: () => rows(asked), trace, accesses: traceOf, load, step, play, samples, read: () => rows(world.spheres),
+    ask, several, answers: () => reported(answers, 0), left: () => rows(asked), trace, accesses: traceOf, load, step, play, samples, read: () => rows(world.spheres),
     contacts: () => reported(world.log, 0),
     begin: () => { file.begin(); return "null"; }, globals: () => witness() || "null",
   };
 
-  return (name, argument) => {
-    if (name === "bind") return bind(argument);
-    try { return `{"done":${commands[name](argument === undefined ? undefined : parse(argument))}}`; }
+  function answer(name, argument) {
+    try { return `{"done":${commands[name](argument)}}`; }
     catch (error) { return `{"error":${described(error)}}`; }
-  };
+  }
+
+  return (name, argument) => name === "bind" ? bind(argument)
+    : answer(name, argument === undefined ? undefined : parse(argument));
 })() });

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from time import process_time
@@ -99,13 +101,29 @@ class JavaScriptSolver:
             answer = json.loads(str(self.evaluated(code, limit, may_repeat=command == "ask")))
         except JSEvalException as error:
             raise self.failure(error, limit, "in one call") from None
-        if "error" in answer:
-            raise thrown(answer["error"])
-        if command == "accesses":
-            return [[*access[:3], lines_of(access[3])] for access in answer["done"]]
-        if isinstance(answer["done"], dict) and answer["done"].get("error"):
-            answer["done"]["error"] = vars(thrown(answer["done"]["error"]))
-        return answer["done"]
+        return read(command, answer)
+
+    def together(self, questions: Sequence[Any], limit: float) -> list[dict[str, Any]]:
+        """The answers to the first of these questions, in one call of V8, which takes longer than
+        a question: to all, unless they take `limit` s or the file wants too much memory."""
+        answers: list[Any] = []
+        with suppress(JSEvalException):
+            try:
+                put = json.dumps(json.dumps(questions))
+                answers = self.done(f'__crosscheck("several", {put})', limit)
+            except JSEvalException:
+                answers = self.done('__crosscheck("answers")', limit)
+        replies: list[dict[str, Any]] = []
+        for answer in answers:
+            try:
+                replies.append({"done": read("ask", answer)})
+            except SolverFailed as failure:
+                replies.append({"failed": vars(failure)})
+        return replies
+
+    def done(self, code: str, limit: float) -> Any:
+        """What the driver gives, where the file cannot have thrown."""
+        return json.loads(str(self.v8.eval(code, timeout_sec=limit)))["done"]
 
     def evaluated(self, code: str, limit: float, may_repeat: bool) -> object:
         """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again
@@ -143,6 +161,17 @@ class JavaScriptSolver:
         if stack and not isinstance(error, JSParseException):
             line, column = int(stack[1]), int(stack[2])
         return SolverFailed("error", plainly(place[2]), line, column)
+
+
+def read(command: str, answer: dict[str, Any]) -> Any:
+    """What an answer of the driver gives; raises `SolverFailed` if the file threw."""
+    if "error" in answer:
+        raise thrown(answer["error"])
+    if command == "accesses":
+        return [[*access[:3], lines_of(access[3])] for access in answer["done"]]
+    if isinstance(answer["done"], dict) and answer["done"].get("error"):
+        answer["done"]["error"] = vars(thrown(answer["done"]["error"]))
+    return answer["done"]
 
 
 def lines_of(stack: str) -> list[int]:

@@ -11,6 +11,7 @@ import os
 import pickle
 import queue
 import sys
+from itertools import takewhile
 from json import dumps, loads  # as they are before a solver may replace them
 from pathlib import Path
 from threading import Thread
@@ -104,7 +105,14 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
     """
     answers: list[dict[str, Any]] = []
     endless: dict[str, dict[str, Any]] = {}
-    for command, argument, limit in request:
+    alone = -1  # the question that stopped those after it
+    while len(answers) < len(request):
+        k = len(answers)
+        if k != alone and not endless and (questions := questions_at(request, k, solver)):
+            answers += solver.together(questions, request[k][2])
+            alone = len(answers)
+            continue
+        command, argument, limit = request[k]
         calls = [call[0] for call in argument["calls"]] if command == "ask" else []
         known = next((endless[call] for call in calls if call in endless), None)
         try:
@@ -116,6 +124,15 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
             if failure.kind in ("timeout", "memory"):
                 endless |= dict.fromkeys([*calls, "step"], vars(failure))
     return answers
+
+
+def questions_at(request: list[tuple[str, Any, float]], k: int, solver: Any) -> list[Any]:
+    """The questions from number k on that can be put together, if the solver takes several."""
+    if not hasattr(solver, "together"):
+        return []
+    alike = takewhile(lambda each: (each[0], each[2]) == ("ask", request[k][2]), request[k:])
+    questions = [argument for _, argument, _ in alike]
+    return questions if len(questions) > 1 else []
 
 
 def done_by(solver: Any, command: str, argument: Any, limit: float) -> Any:

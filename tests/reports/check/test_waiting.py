@@ -15,9 +15,9 @@ from unittest import mock
 import pytest
 from py_mini_racer import JSTimeoutException
 
-from adapters.own_solver.file import NotASolver, read_solver
+from adapters.own_solver.file import NotASolver, SolverFailed, read_solver
 from adapters.own_solver.javascript import JavaScriptSolver
-from adapters.own_solver.process import WORK
+from adapters.own_solver.process import WORK, SolverProcess
 from adapters.own_solver.worker import HERE
 from adapters.safe_path import python
 
@@ -52,6 +52,33 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
                 solver.evaluated("code", 0.2, may_repeat)
         else:
             assert solver.evaluated("code", 0.2, may_repeat) == answer
+
+
+@pytest.mark.parametrize("fails", ["", "while (true) {}"], ids=["none", "one is endless"])
+def test_questions_put_together_are_answered_as_one_by_one(tmp_path: Path, fails: str):
+    """Those before the call that fails and those after it, with a throw among them."""
+    (tmp_path / "Exercise.js").write_text(
+        JS.replace(
+            "function integrate(sphere, dt) {",
+            f"function integrate(sphere, dt) {{ if (dt === 3) {{ {fails} }}"
+            ' if (dt === 2) throw new Error("two");',
+        )
+    )
+    ball = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0, 0.7, 0.8, 0.9, 1.0, 0.5]
+    request = [
+        ("ask", {"spheres": [ball], "calls": [["integrate", 0, dt]], "world": False}, 1.0)
+        for dt in (1, 2, 1, 3, 1, 2)
+    ]
+    with SolverProcess(read_solver(tmp_path / "Exercise.js")) as process:
+        together = process.request(request)
+    with SolverProcess(read_solver(tmp_path / "Exercise.js")) as process:
+        one_by_one = [process.request([each])[0] for each in request[:4]]
+
+    assert list(map(str, together[:4])) == list(map(str, one_by_one))
+    assert together[2] == together[0]
+    assert isinstance(together[3], SolverFailed) == bool(fails)
+    # no call is made again that did not come back
+    assert str(together[4]) == str(together[3] if fails else together[0])
 
 
 @pytest.mark.slow
