@@ -94,6 +94,9 @@ def share(table: pd.DataFrame) -> Share:
     )
 
 
+EXPLAINED = "is explained", "are explained"
+
+
 def sentence(table: pd.DataFrame) -> str:
     """The share and the extent in words, as the page and README show them."""
     known, over = share(table), extent(table)
@@ -103,7 +106,7 @@ def sentence(table: pd.DataFrame) -> str:
         f" {counted(over.scenes, 'scene')}"
         + (f"; {known.exact} more below {LEAST:g} radii" if known.exact else "")
         + (f"; {known.failed} not played" if known.failed else "")
-        + f") {known.within[0]} are explained to 1 %, {known.within[1]} to 0.1 %, "
+        + f") {counted(known.within[0], *EXPLAINED)} to 1 %, {known.within[1]} to 0.1 %, "
         f"over {over.evaluated:.0f} of {over.horizon:.0f} simulated seconds"
     )
     if not over.cuts:
@@ -115,5 +118,5 @@ def sentence(table: pd.DataFrame) -> str:
     return (
         f"{said}: {are_cut} cut where end-of-step detection alone puts a disk"
         f" {LIMIT:g} radii off ({cuts}). Of the {counted(known.whole, 'error')} in scenes that are"
-        f" not cut, {known.whole_within} are explained to 1 %"
+        f" not cut, {counted(known.whole_within, *EXPLAINED)} to 1 %"
     )

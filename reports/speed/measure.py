@@ -27,6 +27,12 @@ from reports.terminal.progress import Progress
 # s a ladder and a timing may take: against what hangs, no limit of what is measured
 HANGS, ALL_ROUNDS = 600.0, 3600.0
 SIZE, TRUTH = "size", "truth"
+WORDS = ("kind", "engine", "profile", "scenario", "change")
+NUMBERS = {"dt_s": float, "n": int, "copy_of": int, "round": int, "place": int} | {
+    "cost": float,
+    "wrapping": float,
+    "runs": int,
+}
 
 
 @dataclass
@@ -47,11 +53,16 @@ class Measured:
 
     errors: pd.DataFrame = field(default_factory=pd.DataFrame)
     budget: pd.DataFrame = field(default_factory=pd.DataFrame)
-    samples: pd.DataFrame = field(default_factory=pd.DataFrame)
+    samples: pd.DataFrame = field(default_factory=lambda: samples_table([]))
     truths: pd.DataFrame = field(default_factory=pd.DataFrame)
     left_out: list[tuple[str, str]] = field(default_factory=list)
     stopped: dict[tuple[str, int], str] = field(default_factory=dict)
     busy: float = float("nan")
+
+
+def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """`Measured.samples`; a table with its columns if there are no rows."""
+    return pd.DataFrame(rows, columns=[*WORDS, *NUMBERS]).astype(NUMBERS)
 
 
 def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Measured:
@@ -188,7 +199,8 @@ def measure_times(
             measured.stopped = {(name, n): why for name, n, why in result["stopped"]}
         else:
             rows += result
-    measured.samples, measured.truths = pd.DataFrame(rows), pd.DataFrame(truths)
+    measured.samples = samples_table(rows)
+    measured.truths = pd.DataFrame(truths)
 
 
 def timings(

@@ -55,7 +55,7 @@ def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
     )
     assert "over 7 of 8 simulated seconds: 1 scene is cut" in said
     assert "(short at 0.2 of 1 s)" in said
-    assert said.endswith("Of the 1 error in scenes that are not cut, 1 are explained to 1 %")
+    assert said.endswith("Of the 1 error in scenes that are not cut, 1 is explained to 1 %")
     assert uncut.endswith("over 7 of 7 simulated seconds, up to the end of every exact answer")
 
 

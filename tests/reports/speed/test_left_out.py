@@ -12,7 +12,7 @@ from reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
 from reports.speed import charts, tables, versus
 from reports.speed.effort import QUICK
 from reports.speed.measure import SIZE, Measured
-from reports.speed.plan import PLAIN, SpeedPlan
+from reports.speed.plan import PLAIN, SCENE, SpeedPlan
 from reports.speed.results import Results
 
 DT = np.array([0.4, 0.2, 0.1])
@@ -264,3 +264,8 @@ def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
     assert (row.ratio, row.cheaper, row.cheaper_in) == (0.5, 1, "one")
     # our own solver was not asked for
     assert versus.against_own(pd.DataFrame([point("one")]), options).empty
+
+
+def test_where_no_timing_ended_there_is_a_table_without_times():
+    """An engine that fails while it is timed takes those of its scene along; the errors stay."""
+    assert tables.times(Measured(), SCENE).empty
