@@ -128,6 +128,13 @@ _Box2DV3 = partial(
     searched=_box2d_v3_searched,
     work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
 )
+_Planck = partial(EngineRow, package="planck", mark=Mark("#0086a8", "#5fd3ee", "triangle-right"))
+_Matter = partial(EngineRow, package="matter-js", mark=Mark("#e0457b", "#ff9ebc", "star-diamond"))
+_Rapier = partial(
+    EngineRow,
+    package="@dimforge/rapier2d-compat",
+    mark=Mark("#7c8f00", "#c6dd3f", "diamond-wide"),
+)
 _BULLETS = "continuous collision, what moves is a bullet"
 
 ENGINES: dict[str, EngineRow] = {
@@ -262,21 +269,19 @@ UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row
 VERLET = 2.0**-36
 # Engines of npm packages, which the extra `js` fetches once: they play where they are asked for.
 FETCHED: dict[str, EngineRow] = {
-    "planck:shipped": EngineRow(
+    "planck:shipped": _Planck(
         partial(_javascript, "planck", "shipped"),
         "planck 1.5 as it comes: Box2D 2.3 in JavaScript and float64",
         1.0,
         FLOAT64,
-        package="planck",
     ),
-    "planck:matched": EngineRow(
+    "planck:matched": _Planck(
         partial(_javascript, "planck", "matched"),
         "planck, matched: what box2d:matched chooses, without its float32",
         1.0,
         FLOAT64,
-        package="planck",
     ),
-    "matter:shipped": EngineRow(
+    "matter:shipped": _Matter(
         partial(_javascript, "matter", "shipped"),
         "matter-js 0.20 as it comes, 100 pixels a metre: circles are polygons, air brakes",
         1.0,
@@ -285,28 +290,24 @@ FETCHED: dict[str, EngineRow] = {
             ("steps_obey_dt", "force_lasts_one_step", "same_instant"),
             "friction of the air: 1 % of the speed in 1/60 s, its default",
         ),
-        package="matter-js",
     ),
-    "matter:matched": EngineRow(
+    "matter:matched": _Matter(
         partial(_javascript, "matter", "matched"),
         "matter-js, matched: pixels that lift its thresholds, 200 sides, no air",
         1.0,
         VERLET,
-        package="matter-js",
     ),
-    "rapier2d:shipped": EngineRow(
+    "rapier2d:shipped": _Rapier(
         partial(_javascript, "rapier2d", "shipped", float32=True),
         "Rapier 0.21 (WebAssembly) as it comes: friction, sleep, length unit 1 m",
         0.625,
         FLOAT32,
-        package="@dimforge/rapier2d-compat",
     ),
-    "rapier2d:matched": EngineRow(
+    "rapier2d:matched": _Rapier(
         partial(_javascript, "rapier2d", "matched", float32=True),
         "Rapier, matched: length unit r / 2, no friction, no sleep",
         0.625,
         FLOAT32,
-        package="@dimforge/rapier2d-compat",
     ),
 }
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from zlib import crc32
 
 from adapters.engine_row import Mark
-from adapters.engines import ENGINES, OWN
+from adapters.engines import ENGINES, FETCHED, OWN
 from reports.compare.against import TRUTH as TRUTH  # its curve is drawn, as an engine's is
 from reports.terminal.foreign_text import encoded
 
@@ -60,6 +60,9 @@ PATHS = {
     "cross": "M-1.5,-4.4H1.5V-1.5H4.4V1.5H1.5V4.4H-1.5V1.5H-4.4V-1.5H-1.5Z",
     "triangle-down": "M0,4.6L4.3,-3H-4.3Z",
     "triangle-left": "M-4.6,0L3,4.3V-4.3Z",
+    "triangle-right": "M4.6,0L-3,4.3V-4.3Z",
+    "star-diamond": "M0,-5.4L1.6,-1.6L5.4,0L1.6,1.6L0,5.4L-1.6,1.6L-5.4,0L-1.6,-1.6Z",
+    "diamond-wide": "M0,-3.2L5.6,0L0,3.2L-5.6,0Z",
     "hexagon": "M-2.3,-4H2.3L4.6,0L2.3,4H-2.3L-4.6,0Z",
     "pentagon": "M0,-4.6L4.4,-1.4L2.7,3.7H-2.7L-4.4,-1.4Z",
     "bowtie": "M-4.2,-3.2V3.2L0,0L4.2,3.2V-3.2L0,0Z",
@@ -137,14 +140,14 @@ _files: dict[str, Mark] = {}  # of the solvers' files that are drawn beside each
 
 
 def mark_of(engine: str) -> Mark:
-    """What its row of `ENGINES` says; of those whose rows say nothing the first has the first of
+    """What its row says; of those whose rows say nothing the first has the first of
     `PALETTE`, and so on.
 
     A solver's file has one of `PALETTE` by the name of the file, in the game and in every report
     the same, unless a file that is drawn beside it has that one already: then the next.
     """
     marks: dict[str, Mark | None] = {}
-    for name, row in ENGINES.items():
+    for name, row in {**FETCHED, **ENGINES}.items():
         if not name.endswith(OWN):
             marks.setdefault(name.partition(":")[0], row.mark)
     if engine not in marks:
