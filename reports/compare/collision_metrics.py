@@ -34,8 +34,8 @@ def restitution_error(view: View) -> Value | None:
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Collisions of the engine less collisions of the other, whenever they come; pairs at rest from
-    the start are not counted."""
+    """Number of collisions minus that of the truth, or of the other engine, at whatever time; pairs
+    at rest from the start are not counted."""
     if view.silent:
         return UNHEARD
     resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
@@ -47,15 +47,15 @@ def collision_count_error(view: View) -> Value | None:
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Collisions of the other, of those that a step can tell apart, that the engine does not have
-    at their time."""
+    """Collisions of the truth, or of the other engine, that the engine does not have at their time;
+    those too close together for a step to tell apart are not counted."""
     if not view.collisions[1].t.size:
         return not_judged("no collision to miss")
     return _unjudged(view) or Value(len(view.matched.missed), note=_carried(view))
 
 
 def collisions_spurious(view: View) -> Value | None:
-    """Collisions of the engine that the other does not have at their time."""
+    """Collisions of the engine that the truth, or the other engine, does not have at their time."""
     return _unjudged(view) or Value(len(view.matched.spurious), note=_carried(view))
 
 
@@ -68,7 +68,7 @@ def first_wrong_collision_s(view: View) -> Value | None:
 
 
 def collision_delay_dt(view: View) -> Value | None:
-    """Median over the collisions of played time less true time, in dt; a collision is dated to the
+    """Median of played time minus true time of the collisions, in dt; a collision is dated to the
     end of its step."""
     delay = view.matched.delay
     return (
@@ -93,7 +93,7 @@ def _read(value: float, read: Restitutions) -> Value:
 
 
 def _unread(read: Restitutions) -> Value | None:
-    """None where no collision could be read for other reasons than these."""
+    """Why no collision could be read: too small, or not over in time; None for another reason."""
     return (
         not_judged(f"no collision read{_unread_ones(read)}")
         if read.below or read.unfinished
@@ -108,17 +108,17 @@ def _unread_ones(read: Restitutions) -> str:
 
 
 def _carried(view: View) -> str:
-    """Of how many of the other's collisions an engine can be reported that it has missed them
-    (collisions.py: `match`)."""
+    """How many collisions would count as missed if the engine did not have them (collisions.py:
+    `match`)."""
     return f"{view.matched.judged} of {len(view.collisions[1])} collisions judged"
 
 
 def _unjudged(view: View) -> Value | None:
-    """None where enough is judged, or where the other has no collision: then every collision of an
-    engine is spurious.
+    """Why the collisions are not judged: too few can be. None where enough can, or where there is
+    none at all: then every collision of an engine is spurious.
 
-    Where most collisions are too close together for a step, or lie on contacts that rest, most of
-    what an engine reports is excused: that it misses and invents nothing says nothing.
+    Collisions too close together for a step, and those of contacts at rest, are not judged. Where
+    they are most of the collisions, none missed and none spurious would say nothing.
     """
     if view.silent:
         return UNHEARD

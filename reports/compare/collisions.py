@@ -13,13 +13,14 @@ from reports.compare.delays import WINDOW
 from reports.compare.faces import SAME
 from scenarios.model import Array, Collisions
 
-# Collisions and steps lie on one grid, and so do halves of the time between collisions. No bound is
-# one of it, where rounding would decide: all are roots of numbers that have none.
-# dt; true collisions of a pair that are closer cannot be distinguished by any step
+# Times of collisions are often whole or half multiples of dt. A bound that is such a multiple would
+# leave the decision to rounding, so the bounds are irrational.
+# dt; no step tells two true collisions of a pair apart that are closer
 CROWDED = 5**0.5
-FAR = 401**0.5  # dt; so late, or early, a match may always be
+FAR = 401**0.5  # dt; a match may always be as late or early as this
 ROUNDING = 1e-12  # of a sum of thousands of times
-HALF = 0.26**0.5  # of the time to the nearest other true collision: so late it may be too
+# of the time to the nearest other true collision; a match may be as late as this, too
+HALF = 0.26**0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Matched:
     """Collisions of an engine set against collisions of the truth.
 
     Attributes:
-        delay: (m,) s, played time less true time of each collision found.
+        delay: (m,) s, played time minus true time of each collision found.
         missed: (time s, i, j) of true collisions not found.
         spurious: (time s, i, j) of played collisions that are not true.
         judged: how many true collisions would count as missed if they were not found.

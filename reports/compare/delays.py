@@ -1,10 +1,10 @@
-"""The truth within the detection delay: what an engine is held to that finds every collision, a
-little late or early.
+"""Velocity, momentum and energy of the truth, allowing for collisions that an engine finds a little
+late or early.
 
-An engine that steps finds a collision at the end of a step: for as long its velocities are those
-before it when the truth's are those after. This delay is measured by itself (`collision_delay_dt`)
-and costs nothing here. All else does, at every sample: gravity and thrust act on what an engine is
-held to as on the truth at that instant.
+An engine that steps finds a collision at the end of a step. Until then its velocities are those
+before the collision, when the truth already has those after it. This delay has a metric of its own
+(`collision_delay_dt`) and is no error here. Every other difference is, at every sample: gravity and
+thrust are taken at that instant.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ def over_judged(measure: Measure) -> Measure:
 
 
 def momentum_error(view: View) -> Value | None:
-    """Largest |P(t) - P(0) - impulse from outside|, where that is known, over all m|v| that flight
-    can bring."""
+    """Largest |P(t) - P(0) - impulse from outside| where that impulse is known, over the largest
+    sum of m|v| that flight without collisions can reach."""
     return _largest(violations.momentum(view), view)
 
 
@@ -93,8 +93,8 @@ def momentum_deviation(view: View) -> Value | None:
 
 @over_judged
 def energy_loss_error(view: View) -> Value | None:
-    """Energy lost by the last judged sample, less what the truth loses by three steps around it;
-    over that at hand."""
+    """Energy lost by the last judged sample, minus what the truth loses within three steps of it;
+    over the energy at hand."""
     scenario = view.scenario
     if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario):
         return None

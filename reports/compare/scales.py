@@ -1,7 +1,6 @@
-"""What errors of momentum and energy are relative to: what a scenario has at hand, before anybody
-has played it.
+"""The scales of a scenario: errors of momentum and energy are divided by them.
 
-Not taken from what was played: an explosion must not make itself look small.
+They come from the scene, not from a run: a run that explodes must not make its error look small.
 """
 
 from __future__ import annotations
@@ -14,13 +13,13 @@ from scenarios.model import Array, Scenario, Trajectory
 
 @laws.once
 def momentum(scenario: Scenario) -> float:
-    """kg m/s: sum of m |v|, each disk as fast as flight under gravity and thrust can make it."""
+    """kg m/s: sum of m |v|, with the largest speed that each disk can reach without collisions."""
     return float(laws.moving_mass(scenario.scene) @ top_speed(scenario))
 
 
 def angular_momentum(scenario: Scenario) -> float:
-    """kg m2/s about the centre of mass: sum of m |x||v| + I |w|, each as far and as fast as flight
-    can bring it."""
+    """kg m2/s about the centre of mass: sum of m |x||v| + I |w|, with the largest distance and
+    speed that each disk can reach without collisions."""
     scene, t = scenario.scene, scenario.duration
     reach = laws.lengths(scene.position - laws.centre(scene)) + top_speed(scenario) * t
     spin = np.abs(scene.angular_velocity) @ laws.moving_inertia(scene)
@@ -29,11 +28,11 @@ def angular_momentum(scenario: Scenario) -> float:
 
 @laws.once
 def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
-    """J: the energy at hand: kinetic, and what each disk can gain by falling, and by one radius
-    further.
+    """J, the energy at hand: the kinetic energy, and what each disk can gain by falling, one radius
+    more than it does.
 
-    The largest in the truth where that is given; else what the start has, down to the lowest wall
-    or disk.
+    With the truth: the largest kinetic energy and the whole fall in it. Without: the energy at the
+    start, and a fall to the lowest wall or disk.
     """
     scene = scenario.scene
     g, m = float(np.linalg.norm(scene.gravity)), laws.moving_mass(scene)

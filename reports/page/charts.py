@@ -135,15 +135,15 @@ def energy(comparison: Comparison) -> Drawing:
 
 
 def energy_course(comparison: Comparison) -> Drawing:
-    """The energy itself, where nobody knows what it should be."""
+    """The energy itself, where no exact answer says what it should be."""
     scene = comparison.scenario.scene
     lines = []
     for run, view in views(comparison, None):
         scale = scales.energy(comparison.scenario) or 1.0
         lines.append(ChartLine(run, view.played.t, laws.energy(view.played, scene) / scale))
     caption = (
-        "No exact answer says how much energy the collisions should take, so this is no error: the"
-        " energy over that at hand. Without thrusts it must never rise."
+        "No exact answer says how much energy the collisions should take. So this is not an error"
+        " but the energy itself, divided by the energy at hand. Without thrusts it must never rise."
     )
     return Drawing(
         "Energy", caption, over_time(comparison, lines, "energy / energy at hand", log=False)
