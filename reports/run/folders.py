@@ -43,7 +43,7 @@ def place_of(out: Path, option: str = "--out") -> Path:
         FolderTaken: `out` is a link to nothing, unless an interrupted command has left it so.
         OSError: the current folder is gone.
     """
-    # of a link to itself `resolve` makes an error of another kind
+    # Path.resolve raises RuntimeError, not OSError, for a link to itself
     place = Path(os.path.realpath(out))
     if out.is_symlink() and not out.exists() and not part_of(place).exists():
         raise FolderTaken(f"{option} {out}: is a link to nothing; name a folder")

@@ -1,9 +1,8 @@
-"""What this program wrote: the record in a folder of its making, by which nothing that is somebody
-else's is replaced.
+"""The record of what a command wrote into a folder, so that no other file is ever replaced.
 
-A folder that a command makes holds `made.json`: the command, whether it is finished, and of every
-file but those whose name says enough the SHA-256 of what was written, or null while it is being
-written. Whatever else is in the folder, or in a folder inside it, is a stranger.
+A folder that a command makes holds `made.json`: the command, whether it has finished, and for each
+file the SHA-256 of what was written, or null while it is being written. Files whose names only this
+program uses are not recorded. Anything else in the folder, or in a folder inside it, is foreign.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ HEAD = 4096  # bytes at the beginning of a file among which its mark is
 
 
 class Kind(NamedTuple):
-    """What a command makes.
+    """A kind of result folder.
 
     Attributes:
-        command: that makes it.
-        named: pattern of the paths, from its folder, of files that nobody else would call so: those
-            are not recorded.
-        folders: that are in it.
+        command: the command that makes it.
+        named: pattern of the relative paths that only this program uses; these files are not
+            recorded.
+        folders: the folders in it.
     """
 
     command: str
@@ -41,7 +40,7 @@ class Kind(NamedTuple):
     folders: tuple[str, ...] = ()
 
     def names(self, path: str) -> bool:
-        """Whether the name of a file of it is enough to know it by."""
+        """Whether a file with this relative path is known by its name alone."""
         return re.fullmatch(self.named, path) is not None
 
 
