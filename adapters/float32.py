@@ -29,7 +29,7 @@ def must_not_be_cut(what: str, values: Array, cap: float, unit: str) -> None:
     # float32 leaves what was cut a little below the cap
     if np.abs(values).max() > cap * (1 - 1e-5):
         raise Unsupported(
-            f"a disk reaches a {what} of {cap:g} {unit}, where Box2D cuts it at this dt"
+            f"a disk reaches a {what} of {cap:g} {unit}, the most that Box2D allows at this dt"
         )
 
 

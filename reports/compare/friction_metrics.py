@@ -50,8 +50,8 @@ def tangential_velocity_error(view: View) -> Value | None:
 
 
 def slip_at_rest(view: View) -> Value | None:
-    """Largest speed with which surfaces slide on each other where in the exact answer a disk rolls
-    or stands on a wall, from three steps after it began to; there it is none but for rounding."""
+    """Largest speed at which surfaces slide on each other while, in the exact answer, a disk rolls
+    or rests on a wall and they do not; counted from three steps after it begins to."""
     scenario, truth = view.scenario, view.other
     if not scenario.scene.friction or truth is None or view.jumps is None:
         return None
@@ -133,8 +133,8 @@ def apart(truth: Trajectory, scenario: Scenario, dt: float) -> list[Apart]:
 
 
 def friction_impulse_error(view: View) -> Value | None:
-    """Largest error of friction's impulse in a collision, I dw / r of a disk: nothing else turns
-    one."""
+    """Largest error of the impulse of friction in a collision: I dw / r of a disk, as only friction
+    turns it."""
     scene, truth = view.scenario.scene, view.other
     if truth is None or not rubs(view):
         return None

@@ -272,7 +272,11 @@ METRICS: dict[str, Metric] = {
     ),
     "energy_created": Metric(energy_created, "1", (ITSELF,), title="Energy created"),
     "energy_loss_error": Metric(
-        energy_loss_error, "1", (TRUTH,), "zero", title="Energy lost, less what should be"
+        energy_loss_error,
+        "1",
+        (TRUTH,),
+        "zero",
+        title="Energy lost, minus that of the exact answer",
     ),
     "restitution": Metric(
         collisions.restitution, "1", (ITSELF,), "as stated", title="Restitution measured"
@@ -331,21 +335,21 @@ METRICS: dict[str, Metric] = {
         "1",
         (TRUTH,),
         "zero",
-        title="Energy lost to friction in collisions, less what should be",
+        title="Energy lost to friction in collisions, minus that of the exact answer",
     ),
     "restitution_loss_error": Metric(
         friction.restitution_loss_error,
         "1",
         (TRUTH,),
         "zero",
-        title="Energy lost to restitution beside friction, less what should be",
+        title="Energy lost to restitution beside friction, minus that of the exact answer",
     ),
     "time_to_roll_error_s": Metric(
         friction.time_to_roll_error_s,
         "s",
         (TRUTH,),
         "zero",
-        title="Time at which a disk begins to roll, less what it should be",
+        title="Time at which a disk begins to roll, minus the exact one",
     ),
     "slip_at_rest": Metric(
         friction.slip_at_rest, "m/s", (TRUTH,), title="Slip where a disk should roll, largest"

@@ -100,8 +100,8 @@ def momentum(comparison: Comparison) -> Drawing:
     for run, view in views(comparison, comparison.truth):
         lines.append(ChartLine(run, view.played.t, view.momentum_deviation / scale))
     caption = (
-        "Walls and static disks take up momentum, so no law is broken here: how far the momentum"
-        f" is from the truth's, over the Σ m|v| at hand{DELAY}."
+        "Walls and static disks take up momentum, so that it is not conserved. Shown is how far it"
+        f" is from the truth's, divided by the Σ m|v| at hand. {DELAY}"
     )
     return Drawing(
         "Momentum deviation from the truth",
@@ -111,8 +111,8 @@ def momentum(comparison: Comparison) -> Drawing:
 
 
 DELAY = (
-    ", where a collision up to three steps late or early costs nothing; its delay is a metric of"
-    " its own"
+    "A collision up to three steps late or early is no error here; its delay has a metric of its"
+    " own."
 )
 
 
@@ -123,13 +123,11 @@ def energy(comparison: Comparison) -> Drawing:
         return energy_course(comparison)
     lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
     against = (
-        "what it was at the start, as no collision takes any (e = 1),"
-        if conserved
-        else "the truth's,"
+        "its value at the start (at e = 1 no collision takes any)" if conserved else "the truth's"
     )
     caption = (
-        f"Distance of the energy from {against} over the energy at"
-        f" hand{'' if conserved else DELAY}. Lower is better."
+        f"Distance of the energy from {against}, divided by the energy at hand."
+        f"{'' if conserved else f' {DELAY}'} Lower is better."
     )
     return Drawing("Energy error", caption, over_time(comparison, lines, "error / energy at hand"))
 

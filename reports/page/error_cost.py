@@ -135,8 +135,8 @@ def caption(scenes: int, clock: Clock) -> str:
     least, most = int(clock.table.rounds.min()), int(clock.table.rounds.max())
     rounds = f"{least} to {most} interleaved rounds" if least < most else counted(most, "round")
     return (
-        f"{said} The light mark left of a point is the cost without the calls from Python: without"
-        " what as many steps take in a world in which nothing moves. Times are medians of"
+        f"{said} The light mark left of a point is the cost without the calls from Python: the cost"
+        " of as many steps in a world in which nothing moves is taken off. Times are medians of"
         f" {rounds}; an engine timed twice differs from itself by"
         f" {style.number(100 * clock.noise.floor, 2)}\u00a0%."
     )

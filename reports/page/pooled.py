@@ -91,9 +91,10 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
     )
     return Drawing(
         "Error by situation",
-        "A mark is an engine: the median over the scenes of its largest position error at the"
-        " middle step size; of Spin its largest error of angle in rad, which is what a point on the"
-        " rim is off in radii. Lower is better. No mark: no result in half of the scenes.",
+        "Each mark is an engine: the median over the scenes of its largest position error at the"
+        " middle step size. For Spin it is the largest error of angle in rad, which is how far a"
+        " point on the rim is off, in radii. Lower is better. No mark: no result in half of the"
+        " scenes.",
         figure,
     )
 

@@ -32,7 +32,7 @@ SITUATIONS = {
     CROWDS: "disks that meet many others",
     SPIN: "a disk turns; these scenes count above as well",
     ALL: "of all situations above",
-    FRICTION: "surfaces rub; these scenes count in no other row",
+    FRICTION: "with friction; these scenes count in no other row",
 }
 YOURS, ENGINE = "Your solver", "Engines"
 OWN, EXACT = "Solvers of this project", "Solvers of this project that order collisions by time"

@@ -56,11 +56,11 @@ KNOWN_ANSWERS = (
 )
 MEANING = (
     "49 balls of 10 kg dropped from 5 m on a floor, e = 1, for 20 s: SimBenchmark ranks engines by"
-    " how well they keep the energy. Its ODE column comes out of pymunk, digit for digit, and out"
-    " of six lines of Python in which a step either falls or reflects; its Bullet column comes out"
-    " of the same lines if a step falls and then reflects the velocity that gravity has just"
-    " changed. So the hundredfold and more between these two columns is the order of operations"
-    " inside a step, not the quality of contacts."
+    " how well they keep the energy. pymunk gives its ODE column, digit for digit. So do six lines"
+    " of Python in which a step either falls or reflects. The same lines give its Bullet column if"
+    " a step first falls, and then reflects the velocity that gravity has just changed. So the"
+    " factor of a hundred and more between the two columns comes from the order of operations in a"
+    " step, not from the quality of contacts."
 )
 
 
