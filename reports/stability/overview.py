@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from math import isnan
 from typing import NamedTuple
 
 from adapters.engines import ENGINES
+from reports.page.situations import ENGINE, grouped
 from reports.page.style import number
+from reports.stability.ablations import listed
 from reports.stability.cases_friction import FRICTION
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
 from reports.stability.maps import MAPS, MapOf
@@ -134,9 +136,9 @@ def findings(limits: Sequence[Limit]) -> list[str]:
 
 def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
     """A sentence that names the engines that fail in the fewest and in the most of these cases,
-    among those that model any of them; none for a single case, or if no engine fails."""
+    among those that model any of them, and which of the libraries fail in the fewest if all of the
+    former are this project's; none for a single case, or if no engine fails."""
     taken = [limit for limit in limits if limit.word != "refused"]
-    # in reading order, which decides between equals
     fails = dict.fromkeys((limit.engine for limit in taken), 0)
     for limit in limits:
         if limit.engine in fails:
@@ -144,13 +146,20 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
     cases = len({limit.case for limit in limits})
     if cases < 2 or not any(fails.values()):
         return []
-    *_, most = sorted(fails, key=lambda engine: fails[engine])
-    fewest = min(fails, key=lambda engine: fails[engine])
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
-    return [
-        f"Of {these} {fewest} fails in the fewest, {fails[fewest]}, and {most} in the most,"
-        f" {fails[most]}."
-    ]
+    said = f"In {these} the fewest failures are those of {those(fails, min)}, the most those of"
+    said += f" {those(fails, max)}."
+    libraries = {engine: fails[engine] for engine in grouped(fails).get(ENGINE, [])}
+    if libraries and min(libraries.values()) > min(fails.values()):
+        said += f" Of the libraries the fewest are those of {those(libraries, min)}."
+    return [said]
+
+
+def those(fails: Mapping[str, int], extreme: Callable[[Iterable[int]], int]) -> str:
+    """The engines that fail in the fewest or in the most cases, with the number of these."""
+    count = extreme(fails.values())
+    names = [engine for engine, number in fails.items() if number == count]
+    return f"{listed(names)} ({count})"
 
 
 def map_tables(maps: Sequence[MapOf]) -> dict[str, list[MapTable]]:
