@@ -22,6 +22,7 @@ from reports.speed.budget import RESIDUAL, TOTALS
 from reports.speed.ladder import held
 from reports.speed.results import Results
 from reports.speed.versus import OWN
+from reports.terminal.counts import counted
 from reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck speed"
@@ -122,26 +123,28 @@ def section(
 
 def pooled_section(results: Results) -> SpeedSection:
     """All scenarios at once."""
-    count, steps = len(results.scenes), results.pooled.step_size.nunique()
+    count_of_scenes = counted(len(results.scenes), "scene")
+    steps = results.pooled.step_size.nunique()
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one step size, {steps} that all scenes have, each of its coordinates the"
-            f" geometric mean of the middle half of {count} scenes: {', '.join(results.scenes)}."
-            f" {said_of_pool(results.pooled)} A scene that an engine failed counts as infinitely"
-            " wrong and infinitely dear. The light mark left of a point is the cost without what as"
-            " many steps and calls take where there is nothing to do. Down and left is better; no"
-            " engine is both faster and better than the broad grey line, and of those who take"
-            " steps none than the narrow one.",
+            f"Each point is an engine at one of the {counted(steps, 'step size')} that all scenes"
+            f" have: error and cost are geometric means of the middle half of {count_of_scenes}:"
+            f" {', '.join(results.scenes)}. {said_of_pool(results.pooled)} A scene that an engine"
+            " failed has an infinite error and an infinite cost. The light mark left of a point is"
+            " the cost without what as many steps and calls of an empty world take. Lower and"
+            " further left is better. The broad grey line joins the points that no engine beats in"
+            " both; the narrow one those that no engine beats that takes steps.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "What the cheapest measured dt costs whose error, and that of every finer one, is no"
-            " larger. Engines are compared in the scenes in which both get there: the cost of"
-            f" {YARDSTICK}, geometric mean over its scenes, times that of the ratios to it. never:"
-            " half of the scenes or more are unreachable at any dt, or failed. not yet: half or"
-            " more are not reached down to the finest dt measured. Hover for how many of each.",
+            "The cost of the cheapest step size at which the error, and that at every finer one, is"
+            f" at most this. Each engine is compared with {YARDSTICK} in the scenes in which both"
+            " reach it: shown is the geometric mean of the cost of the latter over all its scenes,"
+            " times the geometric mean of the ratios. never: in half of the scenes or more it is"
+            " not reached at any dt, or the engine fails. not yet: in half or more it is not"
+            " reached at the finest dt measured. Hover for how many of each.",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }
@@ -173,23 +176,23 @@ def section_of(results: Results, scene: str) -> SpeedSection:
     )
     wrapping = (points.wrapping > 0).any()
     budgets = (
-        " Setting disks onto the opposite edge, which an engine without such an edge leaves to"
-        " Python, is not in it: hover."
+        " It does not include setting disks onto the opposite edge, which Python does for engines"
+        " without such an edge: hover."
         if wrapping
         else ""
     )
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one dt; halving it goes right.{scored}{spread} Time: median of the rounds,"
-            f" bars the quartiles; the light mark: without what as many steps and calls take where"
-            f" there is nothing to do.{floor}{budgets}",
+            f"A point is one dt; half of it is the next to the right.{scored}{spread} Time: median"
+            " of the rounds, the bars are quartiles; the light mark is without what as many steps"
+            f" and calls of an empty world take.{floor}{budgets}",
             charts.speed(points),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "never: unreachable at any dt, as the answer closes in on another motion, or failed."
-            " not yet: not down to the finest dt measured.",
+            "never: not reached at any dt, because the engine approaches another motion, or fails."
+            " not yet: not reached at the finest dt measured.",
             charts.matched(reached),
         ),
     }
@@ -259,10 +262,10 @@ def sweep_sections(results: Results) -> list[SpeedSection]:
     )
     pooled = Drawing(
         "Pooled",
-        "Dotted: one dt, and more iterations or substeps to the right, the first and the last"
-        " named. Solid: the same engine as matched, from 4 times that dt to an eighth of it. Both"
-        " over what it costs and how far it is off as matched, at that dt, where all lines meet;"
-        f" geometric means of the middle half of {count} scenes."
+        "Dotted: at one dt, with more iterations or substeps to the right; the first and the last"
+        " are named. Solid: the same engine as matched, from 4 times that dt to an eighth of it."
+        " Error and cost are divided by those of the engine as matched at that dt, where all lines"
+        f" meet; geometric means of the middle half of {counted(count, 'scene')}."
         + (f" Without a ratio, as there is nothing to divide by: {without}." if without else ""),
         charts.sweeps(results.pooled_sweeps, relative=True),
     )

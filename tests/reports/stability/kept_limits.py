@@ -1,23 +1,27 @@
 """The limits of the pinned versions in the full form, which the quick one must find again.
 
 `crosscheck stability --full --out OUT && python -m tests.reports.stability.kept_limits OUT` makes
-the table anew. An stability report of some cases, or engines, replaces their rows and keeps the
-others.
+the table anew. A stability report of some cases, or engines, replaces their rows and keeps the
+others. The engines of npm packages have a file and a table of their own.
 """
 
 from __future__ import annotations
 
 import csv
 import sys
+from collections.abc import Sequence
 from math import inf, nan
 from pathlib import Path
 from typing import NamedTuple
 
+from adapters.engines import FETCHED
 from reports.page import style
 from reports.stability.cases import CASES
 from reports.stability.limits import ONLY_BEYOND, Limit, engines_of
 
-FILE = Path(__file__).parents[3] / "tests" / "data" / "stability_limits.csv"
+DATA = Path(__file__).parents[3] / "tests" / "data"
+FILE = DATA / "stability_limits.csv"
+FILE_OF_FETCHED = DATA / "stability_limits_javascript.csv"
 COLUMNS = (
     "engine",
     "profile",
@@ -52,7 +56,7 @@ class Kept(NamedTuple):
     tested: str
 
 
-def kept() -> list[Kept]:
+def kept(file: Path = FILE) -> list[Kept]:
     """The file's rows."""
     return [
         Kept(
@@ -66,7 +70,7 @@ def kept() -> list[Kept]:
             row["reason"],
             row["tested"],
         )
-        for row in rows_of(FILE)
+        for row in rows_of(file)
     ]
 
 
@@ -130,14 +134,14 @@ VARIANTS = (
 )
 
 
-def readme_table() -> str:
-    """The table of reports/stability/README.md: where engines fail; a dash: not as far as was
+def readme_table(engines: Sequence[str], rows: Sequence[Kept]) -> str:
+    """A table of reports/stability/README.md: where engines fail; a dash: not as far as was
     tried."""
-    found = {(row.case, row.engine): row for row in kept()}
-    heads = [engine.replace(":", "<br>") for engine in VARIANTS]
-    lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(VARIANTS)]
+    found = {(row.case, row.engine): row for row in rows}
+    heads = [engine.replace(":", "<br>") for engine in engines]
+    lines = [f"| fails at | {' | '.join(heads)} |", "|---|" + "---|" * len(engines)]
     for case, what in IN_README.items():
-        cells = [in_words(found[case, engine]) for engine in VARIANTS]
+        cells = [in_words(found[case, engine]) for engine in engines]
         lines.append(f"| {what} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -157,19 +161,22 @@ def keep(folder: Path) -> None:
             f"{folder}: holds no full stability report; make one: crosscheck stability --full --out"
             f" {folder}"
         )
-    rows = {(row["case"], engine_of(row)): row for row in [*rows_of(FILE), *found]}
-    with FILE.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(
-            rows[key]
-            for name, case in CASES.items()
-            for engine in engines_of(case)
-            if (key := (name, engine)) in rows
-        )
+    for path, fetched in ((FILE, False), (FILE_OF_FETCHED, True)):
+        here = [row for row in found if (engine_of(row) in FETCHED) == fetched]
+        rows = {(row["case"], engine_of(row)): row for row in [*rows_of(path), *here]}
+        with path.open("w", newline="") as file:
+            writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(
+                rows[key]
+                for name, case in CASES.items()
+                for engine in (FETCHED if fetched else engines_of(case))
+                if (key := (name, engine)) in rows
+            )
 
 
 if __name__ == "__main__":
     for folder in sys.argv[1:]:
         keep(Path(folder))
-    print(readme_table())
+    print(readme_table(VARIANTS, kept()))
+    print(readme_table([*FETCHED], kept(FILE_OF_FETCHED)))

@@ -17,6 +17,7 @@ from reports.stability.limits import QUICK, Limit
 from reports.stability.results import StabilityPlan, Task
 from reports.stability.search import Search
 from reports.stability.variants import VARIANTS, taking_part
+from tests.reports.stability.kept_limits import FILE_OF_FETCHED, Kept, agrees, kept
 from tests.reports.terminal.command_line import crosscheck
 
 LACKING = [reason for row in FETCHED.values() if (reason := missing(row.package))]
@@ -60,6 +61,24 @@ def found(
             assert isinstance(limit, Limit)
             limits[case, name] = limit
     return limits
+
+
+KEPT = kept(FILE_OF_FETCHED)
+FAST = ("tunnelling_head_on", "slow_collision", "far_from_origin")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "row",
+    [row for row in KEPT if row.case in FAST],
+    ids=lambda row: f"{row.case}-{row.engine}",
+)
+def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
+    """Of the cases that take less than a second."""
+    with taking_part({row.engine: FETCHED[row.engine]}):
+        found = Search(CASES[row.case], row.engine, QUICK).limit()
+
+    assert agrees(found, row), (found.works_at, found.fails_at)
 
 
 @pytest.mark.slow

@@ -6,20 +6,27 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from adapters.engines import FETCHED
 from reports.stability.cases import CASES
 from reports.stability.limits import FULL, QUICK
-from tests.reports.stability.kept_limits import IN_README, VARIANTS, in_words, kept
+from tests.reports.stability.kept_limits import (
+    FILE_OF_FETCHED,
+    IN_README,
+    VARIANTS,
+    in_words,
+    kept,
+)
 
 TEXT = (Path(__file__).parents[3] / "reports/stability/README.md").read_text("utf-8")
 FOUND = {(row.case, row.engine): row for row in kept()}
 
 
-def cells_of(text: str) -> dict[tuple[str, str], str]:
-    """(row, engine:profile) -> what stands there, of the table whose first heading is "fails
-    at"."""
-    lines = text[text.index("| fails at |") :].split("\n\n")[0].splitlines()
-    head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    engines = [name.replace("<br>", ":") for name in head[1:]]
+def cells_of(text: str, table: int = 0) -> dict[tuple[str, str], str]:
+    """(row, engine:profile) -> what stands there, of the first or second table whose first heading
+    is "fails at"."""
+    lines = text.split("| fails at |")[1 + table].split("\n\n")[0].splitlines()
+    head, _, *rows = [[cell.strip() for cell in line.strip(" |").split("|")] for line in lines]
+    engines = [name.replace("<br>", ":") for name in head]
     return {
         (row[0], engine): cell
         for row in rows
@@ -27,7 +34,7 @@ def cells_of(text: str) -> dict[tuple[str, str], str]:
     }
 
 
-CELLS = cells_of(TEXT)
+CELLS, CELLS_OF_FETCHED = cells_of(TEXT), cells_of(TEXT, 1)
 
 
 def test_a_number_of_the_table_is_the_first_failure_of_the_full_form():
@@ -37,6 +44,16 @@ def test_a_number_of_the_table_is_the_first_failure_of_the_full_form():
     assert {place: CELLS[IN_README[place[0]], place[1]] for place in places} == {
         place: in_words(FOUND[place]) for place in places
     }
+
+
+def test_the_javascript_engines_have_a_table_of_their_own():
+    """Each of them, as shipped and as matched."""
+    found = {(row.case, row.engine): row for row in kept(FILE_OF_FETCHED)}
+
+    assert {
+        (IN_README[case], engine): in_words(row) for (case, engine), row in found.items()
+    } == CELLS_OF_FETCHED
+    assert {engine for _, engine in CELLS_OF_FETCHED} == set(FETCHED)
 
 
 def test_the_table_has_no_other_rows_and_no_other_columns():
