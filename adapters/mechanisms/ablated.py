@@ -99,6 +99,7 @@ class AblatedReference(Reference):
     def load(self, scene: Scene, dt: float) -> None:
         """Copy the scene into the solver's arrays."""
         self.kept = no_contacts(scene.n, len(scene.walls), self.precision)
+        self.kept.facing[:] = np.stack([np.cos(scene.angle), np.sin(scene.angle)], axis=1)
         super().load(scene, dt)
         self.world = self.world._replace(
             restitution=float(MIXING[self.mixing](scene.restitution, scene.restitution)),

@@ -6,7 +6,7 @@ pairs, walls gives the bits of the exercise. The solver tests all pairs, so it i
 disks. Compiled by numba, as `exercise` is.
 """
 
-from math import atan, inf, pi, sqrt
+from math import atan, atan2, inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ from adapters.mechanisms.contacts import (
     rub,
     turn,
 )
+from adapters.mechanisms.recycling import detect_again
 from reference_impl.compiled import compiled, pasted
 from reference_impl.coulomb import collide, collide_wall
 from reference_impl.exercise import touching, touching_wall, wrap
@@ -76,6 +77,7 @@ class Parameters(NamedTuple):
     order: np.ndarray  # the stages of a step, as places in STAGES
     drift: float = 0.0  # of a h2, by which `move` goes farther than v h
     summed: bool = True  # of `move`: the moves of a step are added up, and then to the position
+    tangent: bool = False  # of `move`: (cos, sin) is kept, and turns along its tangent
     threshold: float = 0.0  # m/s: closing speeds up to which a collision is inelastic
     project: bool = True  # of `pairs`: an overlap is undone at once
     project_walls: bool = True  # of `walls`
@@ -83,6 +85,8 @@ class Parameters(NamedTuple):
     lever: float = 0.0  # of the gap, by which friction's lever arm is longer than the radius
     rub_first: bool = False  # of `bounce`: friction before the normal impulse of the same pass
     rub_restituted: bool = True  # of `restitute`: what it adds allows more friction
+    rub_biased: bool = True  # of `soften`: friction in its first pass, too
+    rebounds: bool = True  # of `aim`: a contact bounces again if it bore an impulse a step ago
     correction_share: float = 0.0  # of the overlap beyond the slop, each iteration or `nudge`
     correction_iterations: int = 3
     correction_most: float = inf  # m, that one of them moves at most
@@ -90,6 +94,9 @@ class Parameters(NamedTuple):
     cap: float = inf  # m, by which a disk moves at most; its velocity is cut
     margin: float = 0.0  # m, from which on two are a contact
     touching: bool = False  # whether they are at just this distance
+    recycled: float = 0.0  # m, up to which two may move before they are looked at again
+    fattened: float = 0.0  # m, by which boxes are larger, which are to overlap before that
+    fixed_last: bool = False  # of `by_colour`: contacts with what cannot move come last
     memory: int = 1  # steps, for which a contact that is lost keeps its impulses
     skin: float = 0.0  # m, by which walls are thicker than they are
     carried: bool = False  # of `soften`: a disk's turning carries along the point that touches
@@ -139,13 +146,16 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
     elif stage == WALLS:
         walls(disks, world, on, k, collisions)
     elif stage == DETECT:
-        detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
+        if on.recycled > 0.0:
+            detect_again(disks, world, on.margin, on.recycled, on.fattened, kept)
+        else:
+            detect(disks, world, on.margin, on.skin, on.touching, on.memory, kept)
     elif stage == BY_ISLAND:
         by_island(disks.mass, kept)
     elif stage == BY_COLOUR:
-        by_colour(disks.mass, kept)
+        by_colour(disks.mass, on.fixed_last, kept)
     elif stage == AIM:
-        aim(disks.velocity, world.restitution, on.threshold, kept)
+        aim(disks.velocity, world.restitution, on, kept)
     elif stage == WARM_START:
         warm_start(disks, on, kept)
     elif stage == BOUNCE:
@@ -197,10 +207,23 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
                     disks.position[i, axis] += by
                     moved[i, axis] = disks.position[i, axis] - kept.start[i, axis]
                 kept.nudge[i, axis] = 0.0
-            kept.turned[i] += atan(disks.angular_velocity[i] * h)  # as b2IntegrateRotation does
-            disks.angle[i] += (
-                disks.angular_velocity[i] * h + more * disks.torque[i] / disks.inertia[i]
-            )
+            turned = disks.angular_velocity[i] * h
+            kept.turned[i] += atan(turned)  # as b2IntegrateRotation does
+            if on.tangent:
+                turn_along(disks.angle, kept.facing, i, turned)
+            else:
+                disks.angle[i] += turned + more * disks.torque[i] / disks.inertia[i]
+
+
+@compiled
+def turn_along(angle, facing, i: int, by: float) -> None:  # type: ignore[no-untyped-def]
+    """Turn (cos, sin) of disk i along its tangent, and normalise it (Box2D 3.1,
+    b2IntegrateRotation): by atan(by), and by what rounding (cos, sin) adds."""
+    c, s = facing[i, 0] - facing[i, 1] * by, facing[i, 1] + facing[i, 0] * by
+    length = sqrt(c * c + s * s)
+    facing[i, 0], facing[i, 1] = c / length, s / length
+    ahead = atan2(facing[i, 1], facing[i, 0]) - angle[i]
+    angle[i] += ahead - 2.0 * pi * round(ahead / (2.0 * pi))
 
 
 @compiled
@@ -254,13 +277,18 @@ def meet(
 
 
 @compiled
-def aim(v, restitution: float, threshold: float, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Set the target velocity of every contact, before any impulse: e times the closing speed, 0
-    for slow collisions."""
+    for slow collisions.
+
+    Without `rebounds` it is 0, too, where e < 1 and the contact bore an impulse in the step before
+    (Rapier, is_bouncy).
+    """
     for c in range(kept.found[0]):
         contact = kept.rows[c]
         speed = closing(v, contact.i, contact.j, contact.nx, contact.ny)
-        contact.target = -restitution * speed if speed < -threshold else 0.0
+        fresh = on.rebounds or restitution >= 1.0 or not contact.bore
+        contact.target = -restitution * speed if speed < -on.threshold and fresh else 0.0
 
 
 @compiled
@@ -377,7 +405,9 @@ def soften(
             share = 1.0 - memory
             target = min(-omega / stiff * gap, on.push_speed)
         drive_to_target(disks, contact, target, share, memory)
-        rub(disks, contact, world.friction, on.lever)
+        if on.rub_biased or not biased:
+            rub(disks, contact, world.friction, on.lever)
+        contact.total += 0.0 if biased else contact.impulse
 
 
 @compiled

@@ -24,15 +24,34 @@ CONTACT = np.dtype(
         ("j", "i8"),
         ("nx", "f8"),
         ("ny", "f8"),  # the normal
-        ("gap", "f8"),  # m between the surfaces when it was found
+        ("gap", "f8"),  # m between the surfaces at the start of the step
+        ("seen", "f8"),  # m between them when the two were last looked at
         ("target", "f8"),  # m/s: the speed of separation it is to have
         ("impulse", "f8"),
         ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
         ("strongest", "f8"),  # N s, of the impulses that one solve added
+        ("total", "f8"),  # N s, of the impulses at the end of each substep
+        ("bore", "b1"),  # whether there was one in the step before
         ("nudged", "f8"),  # N s, of `ablated_reference.nudge`
         ("island", "i8"),
         ("colour", "i8"),  # from 1; 0: none yet
         ("late", "b1"),  # whether its impulses are those of a step before the last
+    ]
+)
+
+
+LAST_COLOUR = 128  # of Rapier's
+LOOK = np.dtype(
+    [
+        ("known", "b1"),  # whether the two have been looked at since they came near
+        ("touches", "b1"),  # whether they were a contact
+        ("x", "f8"),
+        ("y", "f8"),  # m, the centre of the second in the frame of the first
+        ("angle", "f8"),
+        ("other", "f8"),  # rad, of the first and of the second
+        ("nx", "f8"),
+        ("ny", "f8"),
+        ("gap", "f8"),  # as those of CONTACT
     ]
 )
 
@@ -45,9 +64,13 @@ class Contacts(NamedTuple):
     start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
     moved: np.ndarray  # (n, 2) m: what they have moved since
     turned: np.ndarray  # (n,) rad: what they have turned since
+    facing: np.ndarray  # (n, 2): cos and sin of their angles, where those are kept
     nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
-    # (n, n + w, 4): impulse, slide, colour, and how many steps ago that was; 0 if long ago
+    # (n, n + w, 5): impulse, slide, colour, how many steps ago that was, 0 if long ago, and total
     before: np.ndarray
+    looks: np.ndarray  # (n, n + w) of `recycling.LOOK`
+    boxes: np.ndarray  # (n + w, 4) m: of `recycling`, left, bottom, right, top
+    least: np.ndarray  # (4,) m: the smallest box of one body
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
@@ -60,8 +83,12 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
         start=place,
         moved=np.zeros_like(place),
         turned=np.zeros(n),
+        facing=np.zeros_like(place),
         nudge=np.zeros((n, 2)),
-        before=np.zeros((n, n + walls, 4)),
+        before=np.zeros((n, n + walls, 5)),
+        looks=np.zeros((n, n + walls), LOOK).view(np.recarray),
+        boxes=np.full((n + walls, 4), np.nan, precision),
+        least=np.zeros(4, precision),
     )
 
 
@@ -116,6 +143,7 @@ def remember(memory: int, kept: Contacts) -> None:
         contact = kept.rows[c]
         had = kept.before[contact.i, column(contact.j, rows)]
         had[0], had[1], had[2], had[3] = contact.impulse, contact.slide, contact.colour, 1.0
+        had[4] = contact.total
 
 
 @compiled
@@ -125,11 +153,12 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
     kept.found[0] += 1
     contact.i, contact.j = i, j
     gap, contact.nx, contact.ny = gap_of(disks, world, i, j)
-    contact.gap = gap - skin
-    contact.target = contact.strongest = 0.0
+    contact.gap = contact.seen = gap - skin
+    contact.target = contact.strongest = contact.total = 0.0
     contact.island, contact.colour = 0, int(kept.before[i, other, 2])
     contact.impulse, contact.slide = kept.before[i, other, 0], kept.before[i, other, 1]
     contact.late = kept.before[i, other, 3] > 1.0
+    contact.bore = kept.before[i, other, 4] > 0.0
 
 
 @compiled
@@ -170,20 +199,22 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def by_colour(mass, fixed_last: bool, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts by colour: no disk that moves has two contacts of one colour.
 
     A new contact takes the first free colour, from the second on if only one body can move, and
-    keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor).
+    keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor). If `fixed_last`, one with a
+    body that cannot move takes the last free colour (Rapier, assign_pair_solver_color).
     """
     rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
     for c in range(count):
         if rows[c].colour == 0:
-            colour = (
-                1 if rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf else 2
-            )
+            both = rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf
+            colour, by = 1 if both else 2, 1
+            if fixed_last and not both:
+                colour, by = LAST_COLOUR, -1
             while taken(mass, kept, c, colour):
-                colour += 1
+                colour += by
             rows[c].colour = colour
         most = max(most, rows[c].colour)
         rows[copies + c] = rows[c]
@@ -238,9 +269,9 @@ def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-de
     """How much wider the gap seems, in m, as the points that touched have turned with the disks
     (Box2D 3.1, b2SolveContact: moving anchors)."""
     i, j = contact.i, contact.j
-    gap = (radius[i] + contact.gap / 2) * (1.0 - cos(turned[i]))
+    gap = (radius[i] + contact.seen / 2) * (1.0 - cos(turned[i]))
     if j >= 0:
-        gap += (radius[j] + contact.gap / 2) * (1.0 - cos(turned[j]))
+        gap += (radius[j] + contact.seen / 2) * (1.0 - cos(turned[j]))
     return gap
 
 
@@ -288,11 +319,11 @@ def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: 
     A lever arm is the radius and `lever` times the gap: 1/2 is the middle of the gap.
     """
     i, j, spin, inertia = contact.i, contact.j, disks.angular_velocity, disks.inertia
-    arm = disks.radius[i] + contact.gap * lever
+    arm = disks.radius[i] + contact.seen * lever
     speed = closing(disks.velocity, i, j, -contact.ny, contact.nx) - arm * spin[i]
     weight = inverse_mass(disks.mass, i, j) + arm * arm / inertia[i]
     if j >= 0:
-        other = disks.radius[j] + contact.gap * lever
+        other = disks.radius[j] + contact.seen * lever
         speed -= other * spin[j]
         weight += other * other / inertia[j]
     most, before = friction * contact.impulse, contact.slide
@@ -305,6 +336,6 @@ def turn(disks: Disks, contact, by: float, lever: float) -> None:  # type: ignor
     """Apply `by` N s along the tangent, which turns both disks in the same sense."""
     i, j, inertia = contact.i, contact.j, disks.inertia
     apply_pair(disks.velocity, disks.mass, i, j, -contact.ny, contact.nx, by)
-    disks.angular_velocity[i] -= (disks.radius[i] + contact.gap * lever) * by / inertia[i]
+    disks.angular_velocity[i] -= (disks.radius[i] + contact.seen * lever) * by / inertia[i]
     if j >= 0:
-        disks.angular_velocity[j] -= (disks.radius[j] + contact.gap * lever) * by / inertia[j]
+        disks.angular_velocity[j] -= (disks.radius[j] + contact.seen * lever) * by / inertia[j]

@@ -10,7 +10,7 @@ import shutil
 import sys
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from math import atan, pi, sin
 from types import ModuleType, SimpleNamespace
 
@@ -24,6 +24,7 @@ from adapters.conformance.probe import history, loaded, plain, scene_of
 from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
 from adapters.javascript.engine import IDLE, JavaScriptEngine
+from adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
@@ -320,11 +321,19 @@ def test_the_error_of_planck_is_that_of_box2d_without_float32(scene, name):
         ("slow_collision", "rapier2d:shipped"),
         ("wall_to_wall", "rapier2d:matched"),
         ("free_fall", "rapier2d:matched"),
+        ("falling_box", "rapier2d:matched"),  # contacts with walls are solved last
+        ("slow_collision", "rapier2d:matched"),  # a contact that bore an impulse does not bounce
+        ("ping_pong", "rapier2d:shipped"),  # a pair is not looked at again for some steps
+        ("oblique_e09", "rapier2d:shipped"),  # and its normal is that of the last look
+        ("friction_bounce_e1_mu05", "rapier2d:shipped"),  # friction without bias
+        ("body_frame_thrust", "rapier2d:matched"),  # cos and sin in float32
     ],
 )
 def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name):
-    """Rounding of float32 is followed, too: each move of a substep rounds the position."""
-    assert left_over(scene, name) < 1e-4
+    """Rounding of float32 is followed, too: each move of a substep rounds the position. What is
+    left is that of the impulses, which the reference keeps in float64: 2**-24 of a velocity over
+    some thousand substeps, of an error of 1e-2 radii."""
+    assert left_over(scene, name) < 2e-4
 
 
 @fetched
@@ -337,10 +346,11 @@ def test_what_brakes_matter_in_flight_is_its_air_and_its_order_of_updates():
 
 
 @fetched
-def test_rapier_finds_a_pair_by_where_its_broad_phase_last_looked():
-    """What the reference does not know of it: the last steps of two flights are the same, one began
-    a step earlier, and only one foresees the wall."""
-    step, gap, dt = 0.02, 0.01, 1 / 240
+def test_rapier_looks_at_a_pair_again_only_when_it_has_moved():
+    """The last steps of two flights are the same, one began a step earlier, and only one foresees
+    the wall: the other was looked at a step before, and moves less than the margin since. The
+    reference does the same."""
+    step, gap, dt = 0.0199, 0.01, 1 / 240
     seen = []
     for before in (2, 3):
         scene = scene_of(
@@ -351,10 +361,39 @@ def test_rapier_finds_a_pair_by_where_its_broad_phase_last_looked():
             walls=[[[-8.0, 0.0], [8.0, 0.0]]],
         )
         with loaded(FETCHED["rapier2d:shipped"], scene, dt=dt) as engine:
-            engine.step(before + 1)
-            seen.append(float(engine.read().position[0, 1]) - 0.25)
-    # half a step inside the wall; at the wall: float32 at 0.25 m
-    assert seen == pytest.approx([gap - step, 0.0], abs=1e-6)
+            mechanisms = mechanisms_of("rapier2d:shipped", engine.settings(), scene, dt)
+            for each in (engine, reference := with_mechanisms(mechanisms)):
+                if each is reference:
+                    each.load(scene, dt)
+                each.step(before + 1)
+                seen.append(float(each.read().position[0, 1]) - 0.25)
+    # a part of the step inside the wall; at the wall: float32 at 0.25 m
+    assert seen == pytest.approx([gap - step, gap - step, 0.0, 0.0], abs=1e-6)
+
+
+@fetched
+def test_rapier_stops_a_disk_that_turns_fast_at_the_wall():
+    """Its rim moves by more than half a radius in a step: the continuous collision that a setting
+    switches off."""
+    scene = scene_of(
+        position=[[0.0, 0.25 + 0.0133]],
+        velocity=[[6.0, -4.0]],
+        radius=[0.25],
+        mass=[1.0],
+        angular_velocity=[-96.0],
+        walls=[[[-8.0, 0.0], [8.0, 0.0]]],
+    )
+    reached = {}
+    for steps in (None, 0):
+        row = FETCHED["rapier2d:matched"]
+        still = replace(row, make=partial(row.make, continuous_steps=steps))
+        with loaded(still, scene, dt=1 / 240) as engine:
+            engine.step(1)
+            reached[steps] = float(engine.read().position[0, 1])
+            slop = engine.settings()["allowed linear error in m"][1]
+    # as deep as its slop, where it was stopped, or to the end of the step: float32 at 0.25 m
+    assert reached[None] == pytest.approx(0.25 - slop, abs=1e-6)
+    assert reached[0] == pytest.approx(0.25 + 0.0133 - 4 / 240, abs=1e-6)
 
 
 # What is fetched.
