@@ -128,12 +128,12 @@ _Box2DV3 = partial(
     searched=_box2d_v3_searched,
     work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
 )
-_Planck = partial(EngineRow, package="planck", mark=Mark("#0086a8", "#5fd3ee", "triangle-right"))
-_Matter = partial(EngineRow, package="matter-js", mark=Mark("#e0457b", "#ff9ebc", "star-diamond"))
+_Planck = partial(EngineRow, package="planck", mark=Mark("#6940da", "#8472fe", "triangle-right"))
+_Matter = partial(EngineRow, package="matter-js", mark=Mark("#ec4f90", "#e39bcd", "star-diamond"))
 _Rapier = partial(
     EngineRow,
     package="@dimforge/rapier2d-compat",
-    mark=Mark("#7c8f00", "#c6dd3f", "diamond-wide"),
+    mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
 )
 _BULLETS = "continuous collision, what moves is a bullet"
 
@@ -254,7 +254,7 @@ ENGINES: dict[str, EngineRow] = {
         "event by event without steps: parabolas and contact times, in float64",
         0.5,
         FLOAT64,
-        mark=Mark("#6b5f00", "#d9c84a", "star"),
+        mark=Mark("#6a5a10", "#e6c918", "star"),
         orders_collisions=True,
     ),
 }

@@ -74,7 +74,7 @@ PATHS = {
 PALETTE = (
     Mark("#5b6b7a", "#9fb0c0", "cross"),
     Mark("#a3123a", "#ff7a93", "triangle-down"),
-    Mark("#5a3d9e", "#b7a1ff", "hexagon"),
+    Mark("#0b5f73", "#7fd0e0", "hexagon"),
     Mark("#3d6b1f", "#a4d67a", "pentagon"),
     Mark("#7a4a21", "#e0a878", "bowtie"),
 )
