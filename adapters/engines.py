@@ -93,6 +93,12 @@ def _event_driven() -> Engine:
     return EventDriven()
 
 
+def _javascript_searched(name: str) -> Searched:
+    from adapters.javascript.searched import SEARCHED
+
+    return SEARCHED[name]
+
+
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
     from adapters.javascript.engine import JavaScriptEngine
 
@@ -275,6 +281,7 @@ FETCHED: dict[str, EngineRow] = {
         1.0,
         FLOAT64,
         package="planck",
+        searched=partial(_javascript_searched, "planck"),
     ),
     "matter:shipped": EngineRow(
         partial(_javascript, "matter", "shipped"),
@@ -293,6 +300,7 @@ FETCHED: dict[str, EngineRow] = {
         1.0,
         VERLET,
         package="matter-js",
+        searched=partial(_javascript_searched, "matter"),
     ),
     "rapier2d:shipped": EngineRow(
         partial(_javascript, "rapier2d", "shipped", float32=True),
@@ -307,6 +315,7 @@ FETCHED: dict[str, EngineRow] = {
         0.625,
         FLOAT32,
         package="@dimforge/rapier2d-compat",
+        searched=partial(_javascript_searched, "rapier2d"),
     ),
 }
 
