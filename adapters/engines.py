@@ -93,6 +93,12 @@ def _event_driven() -> Engine:
     return EventDriven()
 
 
+def _javascript_searched(name: str) -> Searched:
+    from adapters.javascript.searched import SEARCHED
+
+    return SEARCHED[name]
+
+
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
     from adapters.javascript.engine import JavaScriptEngine
 
@@ -128,12 +134,23 @@ _Box2DV3 = partial(
     searched=_box2d_v3_searched,
     work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
 )
-_Planck = partial(EngineRow, package="planck", mark=Mark("#6940da", "#8472fe", "triangle-right"))
-_Matter = partial(EngineRow, package="matter-js", mark=Mark("#ec4f90", "#e39bcd", "star-diamond"))
+_Planck = partial(
+    EngineRow,
+    package="planck",
+    mark=Mark("#6940da", "#8472fe", "triangle-right"),
+    searched=partial(_javascript_searched, "planck"),
+)
+_Matter = partial(
+    EngineRow,
+    package="matter-js",
+    mark=Mark("#ec4f90", "#e39bcd", "star-diamond"),
+    searched=partial(_javascript_searched, "matter"),
+)
 _Rapier = partial(
     EngineRow,
     package="@dimforge/rapier2d-compat",
     mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
+    searched=partial(_javascript_searched, "rapier2d"),
 )
 _BULLETS = "continuous collision, what moves is a bullet"
 

@@ -528,7 +528,8 @@ def tune(
     engine: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="ENGINE", help="Engines to search. Default: all that have settings to search."
+            metavar="ENGINE",
+            help="Engines to search. Default: all with settings to search that need no --extra.",
         ),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for matched.csv.")] = Path(

@@ -4,7 +4,7 @@
 // length and time, so that the two differ by the rounding alone: `unit` is its unit of length in m.
 {
   const planck = module.exports;
-  const common = { velocity_iterations: 8, position_iterations: 3, warm_starting: true, turning: true };
+  const common = { velocity_iterations: 8, position_iterations: 3, warm_starting: true, turning: true, baumgarte: 0.2 };
   const shipped = {
     ...common, elastic_position_iterations: 3, continuous: true, bullet: false, elastic_continuous: true,
     elastic_bullet: false, sleeping: true, friction: null, skin: true, matched: false,
@@ -28,7 +28,7 @@
 
   // The settings are of the library, not of a world: every world sets all of them.
   function set(scene, chosen) {
-    const settings = { ...DEFAULTS };
+    const settings = { ...DEFAULTS, baumgarte: chosen.baumgarte };
     if (chosen.matched) {
       const least = chosen.length_unit * Math.min(...scene.radius);
       const unit = Math.max(least, chosen.step_unit * fastest(scene) * scene.dt);
@@ -97,6 +97,7 @@
       },
       settings: () => [
         ...Object.keys(DEFAULTS).map((name) => [name, chosen.matched ? planck.Settings[name] : null, planck.Settings[name]]),
+        ["baumgarte", chosen.matched ? chosen.baumgarte : null, planck.Settings.baumgarte],
         ["wall skin in m", chosen.skin ? null : 0, walls.length ? walls[0].getFixtureList().getShape().getRadius() : "no wall"],
         ["friction", friction, bodies[0].getFixtureList().getFriction()],
         ["restitution", restitution, bodies[0].getFixtureList().getRestitution()],

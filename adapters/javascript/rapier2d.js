@@ -5,12 +5,12 @@
   // Walls stop fast disks unless continuous_steps is 0; `continuous` is for pairs of disks.
   const shipped = {
     matched: false, friction: null, turning: true, sleeping: true, iterations: null, continuous: false,
-    continuous_steps: null,
+    continuous_steps: null, pgs_iterations: null, hertz: null, prediction: null,
   };
   // The length unit is that of Box2D 3.1, matched, whose slop and margin are the same shares of theirs.
   const matched = {
     matched: true, friction: null, turning: true, sleeping: false, iterations: 4, continuous: false, length_unit: 0.5,
-    continuous_steps: null,
+    continuous_steps: 1, pgs_iterations: 1, hertz: 30, prediction: 0.02,
   };
 
   function world(scene, chosen, hear) {
@@ -19,7 +19,11 @@
     space.timestep = dt;
     if (chosen.matched) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
     if (chosen.iterations !== null) space.numSolverIterations = chosen.iterations;
-    if (chosen.continuous_steps !== null) space.integrationParameters.maxCcdSubsteps = chosen.continuous_steps;
+    const parameters = space.integrationParameters;
+    if (chosen.continuous_steps !== null) parameters.maxCcdSubsteps = chosen.continuous_steps;
+    if (chosen.pgs_iterations !== null) parameters.numInternalPgsIterations = chosen.pgs_iterations;
+    if (chosen.hertz !== null) parameters.contact_natural_frequency = chosen.hertz;
+    if (chosen.prediction !== null) parameters.normalizedPredictionDistance = chosen.prediction;
     const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
     const friction = chosen.friction === null ? stated : chosen.friction;
     const index = new Map();
@@ -105,6 +109,8 @@
           ["speed cap in m/s", null, caps.speed],
           ["spin cap in rad/s", null, caps.spin],
           ["solver iterations", chosen.iterations, p.numSolverIterations],
+          ["passes of a solver iteration", chosen.pgs_iterations, p.numInternalPgsIterations],
+          ["natural frequency of a contact in Hz", chosen.hertz, "not readable"],
           ["friction", friction, colliders[0].friction()],
           ["restitution", restitution, colliders[0].restitution()],
           ["sleeping", chosen.matched ? chosen.sleeping : null, "not readable"],

@@ -18,14 +18,14 @@ from reports.terminal.exits import DONE, broken_off, refuse
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table
-from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, Search
+from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, UNASKED, Search
 
 NAME = "matched.csv"
 TUNE = Kind("crosscheck tune")
 
 
 def tune(engines: Sequence[str], out: Path) -> NoReturn:
-    """Search the settings of `engines`, all that have any if none is named; write matched.csv into
+    """Search the settings of `engines`, `UNASKED` if none is named; write matched.csv into
     `out`; exits 0.
 
     The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no
@@ -50,7 +50,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
         ),
         Progress() as bar,
     ):
-        for engine in dict.fromkeys(engines or TUNED):
+        for engine in dict.fromkeys(engines or UNASKED):
             bar.say(f"{engine}: the exact answers, and the present settings")
             search = Search(engine, say=bar.note)
             bar.say(f"{engine}: setting by setting")

@@ -13,7 +13,7 @@ import pandas as pd
 
 from adapters.conformance.conform import conform
 from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, FETCHED
 from adapters.matched import Searched
 from reports.tune.score import Against, Make, TrialScores, against, cost_of, measured, posed
 from scenarios.families.tuning import FAMILIES
@@ -42,10 +42,12 @@ CHOSEN, BETTER, NO_BETTER, BREAKS = "chosen", "better", "no better", "breaks"
 NO_SEARCH = "not searched"
 TUNED: dict[str, EngineRow] = {
     name.removesuffix(MATCHED): row
-    for name, row in ENGINES.items()
+    for name, row in (ENGINES | FETCHED).items()
     if name.endswith(MATCHED) and row.searched is not None
 }
 """Engine -> the row of its matched profile, of all that have settings to search."""
+UNASKED = tuple(name for name in TUNED if f"{name}{MATCHED}" in ENGINES)
+"""Those that are searched where none is named: without what is fetched."""
 
 
 def searched_of(engine: str) -> Searched:
