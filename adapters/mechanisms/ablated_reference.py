@@ -96,7 +96,6 @@ class Parameters(NamedTuple):
     touching: bool = False  # whether they are at just this distance
     recycled: float = 0.0  # m, up to which two may move before they are looked at again
     fattened: float = 0.0  # m, by which boxes are larger, which are to overlap before that
-    fixed_last: bool = False  # of `by_colour`: contacts with what cannot move come last
     memory: int = 1  # steps, for which a contact that is lost keeps its impulses
     skin: float = 0.0  # m, by which walls are thicker than they are
     carried: bool = False  # of `soften`: a disk's turning carries along the point that touches
@@ -153,7 +152,7 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
     elif stage == BY_ISLAND:
         by_island(disks.mass, kept)
     elif stage == BY_COLOUR:
-        by_colour(disks.mass, on.fixed_last, kept)
+        by_colour(disks.mass, kept)
     elif stage == AIM:
         aim(disks.velocity, world.restitution, on, kept)
     elif stage == WARM_START:

@@ -40,7 +40,6 @@ CONTACT = np.dtype(
 )
 
 
-LAST_COLOUR = 128  # of Rapier's
 LOOK = np.dtype(
     [
         ("known", "b1"),  # whether the two have been looked at since they came near
@@ -199,22 +198,20 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 
 @compiled
-def by_colour(mass, fixed_last: bool, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
+def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts by colour: no disk that moves has two contacts of one colour.
 
     A new contact takes the first free colour, from the second on if only one body can move, and
-    keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor). If `fixed_last`, one with a
-    body that cannot move takes the last free colour (Rapier, assign_pair_solver_color).
+    keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor).
     """
     rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
     for c in range(count):
         if rows[c].colour == 0:
-            both = rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf
-            colour, by = 1 if both else 2, 1
-            if fixed_last and not both:
-                colour, by = LAST_COLOUR, -1
+            colour = (
+                1 if rows[c].j >= 0 and mass[rows[c].i] != inf and mass[rows[c].j] != inf else 2
+            )
             while taken(mass, kept, c, colour):
-                colour += by
+                colour += 1
             rows[c].colour = colour
         most = max(most, rows[c].colour)
         rows[copies + c] = rows[c]

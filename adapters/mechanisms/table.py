@@ -323,7 +323,6 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
         "carried": True,
         "tangent": True,
         "rub_biased": False,
-        "fixed_last": True,
         "hertz": 30.0,
         "damping": 10.0,
     }

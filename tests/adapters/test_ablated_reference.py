@@ -217,7 +217,7 @@ scene = lay_out(
 )
 on = {"friction": 0.3, "correction_share": 0.1, "slop": 0.01, "push_speed": 3.0, "margin": 0.01}
 rapier = {
-    "recycled": 0.02, "fattened": 0.02, "tangent": True, "fixed_last": True, "rebounds": False,
+    "recycled": 0.02, "fattened": 0.02, "tangent": True, "rebounds": False,
     "rub_biased": False,
 }
 for order, more in (*((o, {}) for o in (EXERCISE, BOX2D, PYMUNK, BOX2D_V3)), (BOX2D_V3, rapier)):
