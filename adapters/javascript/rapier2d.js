@@ -55,7 +55,7 @@
     function mustNotBeCut(what, value, unit) {
       // float32 leaves what was cut a little below the cap
       if (chosen.matched && Math.abs(value) > caps[what] * (1 - 1e-5)) {
-        throw new Refused(`a disk reaches a ${what} of ${caps[what].toPrecision(6)} ${unit}, where Rapier cuts it at this dt`);
+        throw new Refused(`a disk reaches a ${what} of ${caps[what].toPrecision(6)} ${unit}, the most that Rapier allows at this dt`);
       }
     }
     const pushed = new Set();

@@ -231,7 +231,7 @@ def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
         assert same(first, other)
 
 
-@pytest.mark.slow
+@pytest.mark.long  # both kernels are compiled once more, for 20 s
 @pytest.mark.parametrize("n", [3, 21, FEW, FEW + 1, 300, 1000])
 def test_a_gas_kept_in_float32_plays_as_by_all_pairs(n):
     """Where every number rounds a billion times as much."""

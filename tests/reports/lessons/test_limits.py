@@ -109,7 +109,7 @@ def test_refusals_are_shown_beside_the_exact_answer():
     shown = LESSON.at(at("spin", "box2d:matched", 8))
 
     assert [curve.name for curve in shown.charts[0].curves] == [TRUTH]
-    assert "cuts it" in dict(shown.steps)["Here"]
+    assert "the most that Box2D allows" in dict(shown.steps)["Here"]
     assert "b2_maxRotation" in dict(shown.steps)["Why"]
 
 
