@@ -27,7 +27,7 @@ from adapters.mechanisms.contacts import (
     turn,
 )
 from adapters.mechanisms.recycling import detect_again
-from reference_impl.compiled import compiled, pasted
+from reference_impl.compiled import compiled, internal, pasted
 from reference_impl.coulomb import collide, collide_wall
 from reference_impl.exercise import touching, touching_wall, wrap
 from reference_impl.state import Disks, World
@@ -173,7 +173,7 @@ def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of func
         restitute(disks, world, on, kept)
 
 
-@compiled
+@internal
 def accelerate(disks: Disks, world: World, h: float) -> None:
     """v += a h for disks that can move; the angular velocity alike."""
     for i in range(len(disks.mass)):
@@ -185,7 +185,7 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
             disks.angular_velocity[i] += disks.torque[i] / disks.inertia[i] * h
 
 
-@compiled
+@internal
 def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -> None:
     """x += v h + drift a h2, and what `nudge` adds; the angle alike.
 
@@ -214,7 +214,7 @@ def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -
                 disks.angle[i] += turned + more * disks.torque[i] / disks.inertia[i]
 
 
-@compiled
+@internal
 def turn_along(angle, facing, i: int, by: float) -> None:  # type: ignore[no-untyped-def]
     """Turn (cos, sin) of disk i along its tangent, and normalise it (Box2D 3.1,
     b2IntegrateRotation): by atan(by), and by what rounding (cos, sin) adds."""
@@ -290,7 +290,7 @@ def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:  # type:
         contact.target = -restitution * speed if speed < -on.threshold and fresh else 0.0
 
 
-@compiled
+@internal
 def warm_start(disks: Disks, on: Parameters, kept: Contacts) -> None:
     """Apply the impulses that the contacts had in the last step.
 
@@ -306,7 +306,7 @@ def warm_start(disks: Disks, on: Parameters, kept: Contacts) -> None:
         turn(disks, contact, contact.slide, on.lever)
 
 
-@compiled
+@internal
 def bounce(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """Sequential impulses: solve all contacts in turn, `iterations` times; a later pass may take
     an impulse back."""
@@ -320,7 +320,7 @@ def bounce(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
                 rub(disks, contact, world.friction, on.lever)
 
 
-@compiled
+@internal
 def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
     """Cut velocities that would move a disk by more than `most` m."""
     for i in range(len(v)):
@@ -330,7 +330,7 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
             v[i, 1] *= most / far
 
 
-@compiled
+@internal
 def position_correction(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """Undo a share of every overlap beyond the slop, `correction_iterations` times in an island."""
     first = 0
@@ -345,7 +345,7 @@ def position_correction(disks: Disks, world: World, on: Parameters, kept: Contac
         first = end
 
 
-@compiled
+@internal
 def correct_island(
     disks: Disks, world: World, on: Parameters, kept: Contacts, first: int, end: int
 ) -> float:
@@ -362,7 +362,7 @@ def correct_island(
     return worst
 
 
-@compiled
+@internal
 def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
     """Give overlapping disks a velocity for the next move only, which undoes a share of the overlap
     beyond the slop."""
@@ -378,7 +378,7 @@ def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: igno
             apply_pair(kept.nudge, mass, i, j, nx, ny, contact.nudged - before)
 
 
-@compiled
+@internal
 def soften(
     disks: Disks, world: World, on: Parameters, kept: Contacts, h: float, biased: bool
 ) -> None:
@@ -409,7 +409,7 @@ def soften(
         contact.total += 0.0 if biased else contact.impulse
 
 
-@compiled
+@internal
 def restitute(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
     """Give every contact that had an impulse its target velocity, in one pass."""
     for c in range(kept.found[0]):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference_impl import compiled as compiling
-from reference_impl.compiled import compiled, forget_stale
+from reference_impl.compiled import compiled, forget_stale, internal
 from reference_impl.exercise import direction, move, nearest_point
 from reference_impl.state import Disks, World
 
@@ -91,7 +91,7 @@ def no_contacts(n: int, walls: int, precision: type) -> Contacts:
     )
 
 
-@compiled
+@internal
 def detect(
     disks: Disks,
     world: World,
@@ -128,7 +128,7 @@ def detect(
                 note(disks, world, skin, kept, i, -1 - w)
 
 
-@compiled
+@internal
 def remember(memory: int, kept: Contacts) -> None:
     """Keep the impulses of the last step's contacts, and drop those older than `memory` steps."""
     rows, columns = kept.before.shape[:2]
@@ -145,7 +145,7 @@ def remember(memory: int, kept: Contacts) -> None:
         had[4] = contact.total
 
 
-@compiled
+@internal
 def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
     """Add a contact, with the impulses that it had last."""
     contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
@@ -160,7 +160,7 @@ def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int
     contact.bore = kept.before[i, other, 4] > 0.0
 
 
-@compiled
+@internal
 def column(j: int, n: int) -> int:
     """The column of `before` for disk j, or for wall -1 - j."""
     return j if j >= 0 else n - 1 - j
@@ -197,7 +197,7 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
                         high += 1
 
 
-@compiled
+@internal
 def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
     """Sort the contacts by colour: no disk that moves has two contacts of one colour.
 
@@ -223,7 +223,7 @@ def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
                 done += 1
 
 
-@compiled
+@internal
 def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
     """Whether a disk of contact c that moves has another contact of this colour."""
     i, j = kept.rows[c].i, kept.rows[c].j
@@ -237,7 +237,7 @@ def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no
     return False
 
 
-@compiled
+@internal
 def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, float]:
     """The gap between the surfaces in m, and the normal, at the present positions."""
     x, reach = disks.position, disks.radius[i]
@@ -250,7 +250,7 @@ def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, fl
     return distance - reach, nx, ny
 
 
-@compiled
+@internal
 def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
     """The gap in m along the normal of the contact: when it was found, plus what both bodies have
     moved since."""
@@ -261,7 +261,7 @@ def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
     return gap
 
 
-@compiled
+@internal
 def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-def]
     """How much wider the gap seems, in m, as the points that touched have turned with the disks
     (Box2D 3.1, b2SolveContact: moving anchors)."""
@@ -272,7 +272,7 @@ def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-de
     return gap
 
 
-@compiled
+@internal
 def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[no-untyped-def]
     """The relative velocity along n in m/s, negative while the bodies approach."""
     speed = v[i, 0] * nx + v[i, 1] * ny
@@ -281,13 +281,13 @@ def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[n
     return speed
 
 
-@compiled
+@internal
 def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
     """The sum of the inverse masses in 1/kg; that of a wall is 0."""
     return 1.0 / mass[i] + (1.0 / mass[j] if j >= 0 else 0.0)
 
 
-@compiled
+@internal
 def drive_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
     """Apply the impulse that gives a contact its target velocity; the sum stays at least 0.
 
@@ -300,7 +300,7 @@ def drive_to_target(disks: Disks, contact, target: float, share: float, memory: 
     apply_pair(disks.velocity, disks.mass, i, j, nx, ny, contact.impulse - before)
 
 
-@compiled
+@internal
 def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> None:  # type: ignore[no-untyped-def]
     """Add `by` along n to row i and against n to row j, each by its inverse mass."""
     move(rows, i, nx, ny, by / mass[i])
@@ -308,7 +308,7 @@ def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
         move(rows, j, nx, ny, -by / mass[j])
 
 
-@compiled
+@internal
 def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: ignore[no-untyped-def]
     """Stop the slip of the surfaces by a tangential impulse of at most `friction` times the normal
     one.
@@ -328,7 +328,7 @@ def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: 
     turn(disks, contact, contact.slide - before, lever)
 
 
-@compiled
+@internal
 def turn(disks: Disks, contact, by: float, lever: float) -> None:  # type: ignore[no-untyped-def]
     """Apply `by` N s along the tangent, which turns both disks in the same sense."""
     i, j, inertia = contact.i, contact.j, disks.inertia

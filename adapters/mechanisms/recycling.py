@@ -8,13 +8,13 @@ that touched, and what was no contact stays none. Compiled by numba, as `exercis
 from math import cos, hypot, inf, sin
 
 from adapters.mechanisms.contacts import Contacts, column, gap_of, note, remember
-from reference_impl.compiled import compiled
+from reference_impl.compiled import internal
 from reference_impl.state import Disks, World
 
 TURNED = 0.98  # cos of the angle by which a body turns at most before it is looked at again
 
 
-@compiled
+@internal
 def detect_again(
     disks: Disks, world: World, margin: float, recycled: float, fattened: float, kept: Contacts
 ) -> None:
@@ -35,7 +35,7 @@ def detect_again(
                 consider(disks, world, margin, recycled, kept, i, -1 - w)
 
 
-@compiled
+@internal
 def enclose(disks: Disks, world: World, margin: float, fattened: float, kept: Contacts) -> None:
     """Renew every box that does not hold its body and `margin` around it.
 
@@ -64,7 +64,7 @@ def enclose(disks: Disks, world: World, margin: float, fattened: float, kept: Co
                 box[axis], box[2 + axis] = least[axis] - more, least[2 + axis] + more
 
 
-@compiled
+@internal
 def consider(
     disks: Disks, world: World, margin: float, recycled: float, kept: Contacts, i: int, j: int
 ) -> None:
@@ -84,7 +84,7 @@ def consider(
         contact.gap = gap_since(disks, look, i, j)
 
 
-@compiled
+@internal
 def look_at(disks: Disks, world: World, margin: float, look, i: int, j: int) -> None:  # type: ignore[no-untyped-def]
     """Whether the two are a contact now, and how they lie."""
     look.known = True
@@ -93,7 +93,7 @@ def look_at(disks: Disks, world: World, margin: float, look, i: int, j: int) -> 
     look.x, look.y, look.angle, look.other = lie(disks, i, j)
 
 
-@compiled
+@internal
 def lie(disks: Disks, i: int, j: int) -> tuple[float, float, float, float]:
     """The centre of disk j, or the origin, which is that of a wall, in the frame of disk i; the
     angles of both."""
@@ -105,7 +105,7 @@ def lie(disks: Disks, i: int, j: int) -> tuple[float, float, float, float]:
     return c * dx + s * dy, c * dy - s * dx, angle, other
 
 
-@compiled
+@internal
 def drift(disks: Disks, world: World, look, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
     """m, by which any point of either has moved against the other at most since they were looked
     at; inf if one has turned too far (Rapier, relative_pose_drift)."""
@@ -122,7 +122,7 @@ def drift(disks: Disks, world: World, look, i: int, j: int) -> float:  # type: i
     return hypot(x - look.x, y - look.y) + 2.0 * abs(sin(turned / 2.0)) * extent
 
 
-@compiled
+@internal
 def gap_since(disks: Disks, look, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
     """The gap in m along the normal of the look between the points that were nearest then, which
     have turned with the disks."""
