@@ -60,6 +60,8 @@ END_OF_STEP: dict[str, Any] = {
 
 # Of those in float32: each move of a substep rounds the position.
 ROUNDED_MOVES = ("rapier2d:shipped", "rapier2d:matched")
+# Of those in float32: the angle is kept as (cos, sin).
+COS_AND_SIN = (*ROUNDED_MOVES, "box2d_v3:shipped", "box2d_v3:matched")
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,8 @@ def mechanisms_of(
     flight = Mechanism(FLIGHT, {"alpha": row_of(name).alpha})
     single = []
     if row_of(name).rounding == FLOAT32:
-        single = [Mechanism(DIGITS, {"precision": np.float32, "summed": name not in ROUNDED_MOVES})]
+        digits = {"summed": name not in ROUNDED_MOVES, "tangent": name in COS_AND_SIN}
+        single = [Mechanism(DIGITS, {"precision": np.float32, **digits})]
     return [flight, *KNOWN[name](resolved, scene, dt), *single]
 
 
@@ -321,7 +324,6 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
         "order": BOX2D_V3,
         "margin": reported["prediction distance in m"],
         "carried": True,
-        "tangent": True,
         "rub_biased": False,
         "hertz": 30.0,
         "damping": 10.0,
