@@ -101,13 +101,17 @@ class SolverText:
         return hashlib.sha256(repr((self.digest, self.beside)).encode()).hexdigest()[:16]
 
 
+PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
+
+
 def read_solver(path: Path) -> SolverText:
     """The text of `path`, and of what it imports from beside it; raises `NotASolver` with one
     sentence."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
+        unpack = "; unpack it" if path.suffix.lower() in PACKED else ""
         raise NotASolver(
-            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file"
+            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{unpack}"
         )
     data = read_bytes(path, "name an Exercise.js or a solver.py")
     text = decoded(path, data)

@@ -88,6 +88,8 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     checks = [one_of_several(path)] if single and files[0].is_dir() else checked(files)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
+    if single and files[0].is_dir() and len(solvers_below(path)) > 1:
+        say(f"{path}: holds several solvers; for a class: --format csv, or --scaffold")
     not_read = others_in(path, files) if several else []
     wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
     scenes = scenes_of(checks[0]) if any(wanted) else []
@@ -137,7 +139,10 @@ def grading_of(points: Path | None, id_pattern: str, hints: str) -> Grading:
         refuse([f"--hints {hints}: is none of {', '.join(HINTS)}"])
     try:
         pattern = re.compile(id_pattern) if id_pattern else None
-        return Grading(read_points(points or DEFAULT), pattern, hints == "low")
+        given = read_points(points or DEFAULT)
+        if without := [task for task in read_points() if task not in given]:
+            say(f"--points {points}: gives no points for task {', '.join(without)}")
+        return Grading(given, pattern, hints == "low")
     except BadPoints as fault:
         refuse([f"--points {fault}"])
     except re.error as fault:

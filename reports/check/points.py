@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,6 +29,7 @@ QUESTIONS = {
     "loop": ("all spheres", "pairs", "integration first", "edges in a step", "edges", "ufo"),
     "scenes": ("forced", "head_on", "oblique", "row", "crowd", "first wrong collision"),
 }
+DECIMAL_COMMA = re.compile(r"=\s*\d+,\d")
 Points = Mapping[str, Mapping[str, float]]
 """Task -> question -> points. A task that is not in it gives none."""
 
@@ -39,19 +41,29 @@ class BadPoints(ValueError):
 def read_points(path: Path = DEFAULT) -> Points:
     """The points of a file, tasks in the order of the exercise; raises `BadPoints`."""
     try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = points_text(path)
+        given = tomllib.loads(text)
     except OSError as fault:
         raise BadPoints(
             f"{path}: {fault.strerror or fault}; name a file that can be read"
         ) from None
-    except ValueError as fault:  # no TOML, or no UTF-8
-        raise BadPoints(f"{path}: is not TOML: {' '.join(str(fault).split())}") from None
+    except UnicodeDecodeError as fault:
+        line = 1 + bytes(fault.object[: fault.start]).count(b"\n")
+        raise BadPoints(f"{path}: line {line} is not UTF-8; save the file as UTF-8") from None
+    except ValueError as fault:
+        hint = "; write 4.5, not 4,5" if DECIMAL_COMMA.search(text) else ""
+        raise BadPoints(f"{path}: is not TOML: {' '.join(str(fault).split())}{hint}") from None
     if unknown := [task for task in given if task not in QUESTIONS]:
         raise BadPoints(f"{path}: there is no task {unknown[0]!r}; tasks: {', '.join(QUESTIONS)}")
     points = {task: of_task(path, task, given[task]) for task in TASKS if task in given}
     if not sum(sum(questions.values()) for questions in points.values()):
         raise BadPoints(f"{path}: gives no points at all")
     return points
+
+
+def points_text(path: Path) -> str:
+    """The text of a file of points; editors of Windows put a mark before UTF-8."""
+    return path.read_text(encoding="utf-8-sig")
 
 
 def of_task(path: Path, task: str, given: Any) -> dict[str, float]:

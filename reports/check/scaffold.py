@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from reports.check.points import DEFAULT, BadPoints, read_points
+from reports.check.points import DEFAULT, BadPoints, points_text, read_points
 from reports.terminal.exits import refuse, say
 
 KINDS = Path(__file__).parent / "autograder"
@@ -44,7 +44,7 @@ def write_scaffold(kind: str, folder: Path, points: Path | None, hints: str) -> 
         for template in sorted(one for one in (KINDS / kind).rglob("*") if one.is_file()):
             text = template.read_text(encoding="utf-8").replace("HINTS", hints)
             put(folder / template.relative_to(KINDS / kind), text)
-        put(folder / SCAFFOLDS[kind].points, (points or DEFAULT).read_text(encoding="utf-8"))
+        put(folder / SCAFFOLDS[kind].points, points_text(points or DEFAULT))
     except BadPoints as fault:
         refuse([f"--points {fault}"])
     except OSError as fault:

@@ -126,13 +126,16 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
 
 
 def print_choices(console: Console, advice: Advice) -> None:
-    """The cheapest and the next two."""
+    """The cheapest and the next two, and the names and costs of the others."""
     rows = [
         [one.name, number(one.dt * 1e3), number(one.error), number(one.cost * 1e6)]
         for one in advice.keeping[:SHOWN]
     ]
     headings = ["engine", "dt, ms", "error", "µs per\nsimulated s"]
     print_table(console, headings, rows, "Cheapest first")
+    if dearer := advice.keeping[SHOWN:]:
+        names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for one in dearer)
+        console.print(f"Also within it: {names}.", highlight=False)
 
 
 def print_short(console: Console, advice: Advice) -> None:

@@ -104,11 +104,13 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     mine = [limit for limit in limits if limit.engine in ENGINES]
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
+    refused = sum(limit.word == "refused" for limit in mine)
     found = [
         f"{counted(len(mine), 'search', 'searches')} in {counted(len(cases), 'case')}:"
         f" {len(mine) - len(failing)} found no failure as far as was tried,"
-        f" {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} found a limit, and"
-        f" {sum(limit.verdict == NEVER_WORKS for limit in mine)} failed at every value."
+        f" {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} found a limit,"
+        f" {sum(limit.verdict == NEVER_WORKS for limit in mine) - refused} failed at every value,"
+        f" and in {refused} the engine refused to play."
     ]
     rough = [limit for limit in mine if limit.case in WITH_FRICTION]
     smooth = [limit for limit in mine if limit.case not in WITH_FRICTION]
@@ -148,7 +150,7 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
         return []
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
     said = f"In {these} the fewest failures are those of {those(fails, min)}, the most those of"
-    said += f" {those(fails, max)}."
+    said += f" {those(fails, max)}; a refusal counts as one."
     libraries = {engine: fails[engine] for engine in grouped(fails).get(ENGINE, [])}
     if libraries and min(libraries.values()) > min(fails.values()):
         said += f" Of the libraries the fewest are those of {those(libraries, min)}."

@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import jsonschema
 import pytest
 
+from reports.check.command import grading_of
 from reports.check.formats.formats import FORMATS
 from reports.check.formats.prairielearn import LARGEST
 from reports.check.formats.questions_json import SCHEMA
@@ -114,7 +115,8 @@ def test_points_are_given_a_task_or_a_question(tmp_path: Path):
     ("text", "message"),
     [
         ("1 = ", "is not TOML"),
-        ("\udcff", "is not TOML"),
+        ("[1]\n# \udcdcbung\nspin = 1", "line 2 is not UTF-8; save the file as UTF-8"),
+        ("1 = 4,5", "write 4.5, not 4,5"),
         ("3 = 1", "there is no task '3'; tasks: 1, 2a,"),
         ("[1]\nvelosity = 1", "task 1 has no question 'velosity'; questions: velocity, position,"),
         ("1 = -1", "task 1: -1 is no number of points, 0 or more"),
@@ -135,6 +137,27 @@ def test_bad_points_are_one_sentence(tmp_path: Path, text: str, message: str):
 
     assert str(raised.value).startswith(f"{path}: ")
     assert "\n" not in str(raised.value)
+
+
+def test_points_of_an_editor_of_windows_are_read(tmp_path: Path):
+    """With a mark before UTF-8, and its ends of lines."""
+    path = tmp_path / "tasks.toml"
+    path.write_bytes(b"\xef\xbb\xbf# \xc3\x9cbung\r\n[1]\r\nspin = 4.5\r\n")
+
+    assert read_points(path) == {"1": {"spin": 4.5}}
+
+
+def test_tasks_that_a_file_of_points_leaves_out_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """Else a file with faults in them would have all of its points."""
+    path = tmp_path / "tasks.toml"
+    path.write_text("1 = 20")
+    grading_of(path, "", "full")
+
+    assert "gives no points for task 2a, 2b, 2c, 2d" in capsys.readouterr().err
+    grading_of(None, "", "full")
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.slow

@@ -332,7 +332,7 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     assert scene.startswith(SINGLE)
     assert rows[0][0] == best
     assert named.split() == [*f"{SINGLE}:".split(), best]
-    assert says.startswith("Nearest to the exact answer, at a step of ")
+    assert says.startswith("Nearest to the exact answer of the libraries, at a step of ")
     assert "\u00a0ms:" in says
     assert "crosscheck advise my_scene.toml --error 1%" in says
     assert heard == []
