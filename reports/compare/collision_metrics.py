@@ -1,5 +1,4 @@
-"""The metrics of collisions: restitution, and which collisions an engine found, missed, spurious,
-and how late.
+"""The metrics of collisions: restitution; collisions missed and spurious; detection delay.
 
 Each is a row of `METRICS` (metrics.py).
 """
@@ -34,8 +33,8 @@ def restitution_error(view: View) -> Value | None:
 
 
 def collision_count_error(view: View) -> Value | None:
-    """Number of collisions minus that of the truth, or of the other engine, at whatever time; pairs
-    at rest from the start are not counted."""
+    """Number of collisions minus that of the truth, or of the other engine, at any time; pairs at
+    rest from the start are not counted."""
     if view.silent:
         return UNHEARD
     resting = pair_keys(view.collisions[1])[view.collisions[1].impulse == 0]
@@ -47,8 +46,8 @@ def collision_count_error(view: View) -> Value | None:
 
 
 def collisions_missed(view: View) -> Value | None:
-    """Collisions of the truth, or of the other engine, that the engine does not have at their time;
-    those too close together for a step to tell apart are not counted."""
+    """Collisions of the truth, or of the other engine, that the engine does not have at that time.
+    Collisions closer together than a step can resolve are not counted."""
     if not view.collisions[1].t.size:
         return not_judged("no collision to miss")
     return _unjudged(view) or Value(len(view.matched.missed), note=_carried(view))
@@ -60,7 +59,7 @@ def collisions_spurious(view: View) -> Value | None:
 
 
 def first_wrong_collision_s(view: View) -> Value | None:
-    """When the first collision is missed or spurious, and whose; `inf` if none is."""
+    """Time of the first missed or spurious collision, and its pair; `inf` if there is none."""
     if (unjudged := _unjudged(view)) is not None:
         return unjudged
     at, what = view.matched.first_wrong or (np.nan, "none")
@@ -68,8 +67,8 @@ def first_wrong_collision_s(view: View) -> Value | None:
 
 
 def collision_delay_dt(view: View) -> Value | None:
-    """Median of played time minus true time of the collisions, in dt; a collision is dated to the
-    end of its step."""
+    """Median of engine time minus true time of the collisions, in dt; the engine time is the end of
+    the step."""
     delay = view.matched.delay
     return (
         Value(float(np.median(delay)) / view.dt, note=f"{len(delay)} collisions")
@@ -93,7 +92,7 @@ def _read(value: float, read: Restitutions) -> Value:
 
 
 def _unread(read: Restitutions) -> Value | None:
-    """Why no collision could be read: too small, or not over in time; None for another reason."""
+    """Why no collision could be read: too small, or not over in time; None for any other reason."""
     return (
         not_judged(f"no collision read{_unread_ones(read)}")
         if read.below or read.unfinished
@@ -114,11 +113,11 @@ def _carried(view: View) -> str:
 
 
 def _unjudged(view: View) -> Value | None:
-    """Why the collisions are not judged: too few can be. None where enough can, or where there is
-    none at all: then every collision of an engine is spurious.
+    """Why the collisions are not judged: too few can be. None if enough can, or if the truth has
+    none at all: then every collision of the engine is spurious.
 
-    Collisions too close together for a step, and those of contacts at rest, are not judged. Where
-    they are most of the collisions, none missed and none spurious would say nothing.
+    Collisions closer together than a step can resolve, and those of contacts at rest, are not
+    judged. Where most are such, "none missed, none spurious" would say nothing.
     """
     if view.silent:
         return UNHEARD

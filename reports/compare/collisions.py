@@ -1,5 +1,5 @@
-"""Which collisions of the truth an engine found, which it missed, which are spurious, and how late
-it was."""
+"""Which collisions of the truth an engine found or missed, which of its own are spurious, and the
+delays."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from scenarios.model import Array, Collisions
 # leave the decision to rounding, so the bounds are irrational.
 # dt; no step tells two true collisions of a pair apart that are closer
 CROWDED = 5**0.5
-FAR = 401**0.5  # dt; a match may always be as late or early as this
-ROUNDING = 1e-12  # of a sum of thousands of times
-# of the time to the nearest other true collision; a match may be as late as this, too
+FAR = 401**0.5  # dt; a match may always be this late or early
+ROUNDING = 1e-12  # relative rounding of a sum of thousands of times
+# of the time to the nearest other true collision; a match may be this late or early, too
 HALF = 0.26**0.5
 
 
@@ -28,9 +28,9 @@ class Matched:
     """Collisions of an engine set against collisions of the truth.
 
     Attributes:
-        delay: (m,) s, played time minus true time of each collision found.
+        delay: (m,) s, engine time minus true time of each collision found.
         missed: (time s, i, j) of true collisions not found.
-        spurious: (time s, i, j) of played collisions that are not true.
+        spurious: (time s, i, j) of engine collisions that the truth lacks.
         judged: how many true collisions would count as missed if they were not found.
     """
 
@@ -59,15 +59,15 @@ def who(i: int, j: int) -> str:
 def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matched:
     """Match collisions pair by pair, in order, up to `end` s, for an engine with steps of `dt` s.
 
-    Where a pair has struck more often on one side, those collisions are left over whose absence
-    brings the others closest in time; the earlier if two are as close. A match is no match if it is
-    further off than `HALF` the time to the nearest other true collision of the pair (or to the
-    start), and than `FAR` dt: then one collision is missed and one spurious.
+    Where a pair has more collisions on one side, the ones left unmatched are chosen so that the
+    others are closest in time; on a tie, the earlier. A match is rejected if its delay exceeds both
+    `FAR` dt and `HALF` the time to the nearest other true collision of the pair (or to the start):
+    then one collision is missed and one is spurious.
 
-    Three kinds of collisions are not judged: of a pair at rest against each other from the start (a
-    true collision without impulse), as what an engine reports there is weight; true collisions of a
-    pair closer together than `CROWDED` dt, as no step can tell them apart, with all that an engine
-    makes of them; and collisions within `WINDOW` dt of `end`, which may be cut off.
+    Three kinds of collisions are not judged: those of a pair in contact at rest from the start (a
+    true collision without impulse), where an engine reports the weight; true collisions of a pair
+    closer together than `CROWDED` dt, which a step cannot resolve, and the engine's collisions near
+    them; and collisions within `WINDOW` dt of `end`, which may be cut off.
     """
     resting = pair_keys(true)[true.impulse == 0]
     mine, its = (by_pair(collisions, resting, end - SAME * dt) for collisions in (played, true))
@@ -159,8 +159,8 @@ def gap_to_nearest(t):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def among_crowded(t, times, gap, dt):  # type: ignore[no-untyped-def]
-    """Whether `t` is within `WINDOW` dt of one of `times` that no step of dt can tell from its
-    neighbour."""
+    """Whether `t` is within `WINDOW` dt of one of `times` that is too close to its neighbour to
+    resolve."""
     for k in range(len(times)):
         if gap[k] < CROWDED * dt and abs(times[k] - t) <= WINDOW * dt:
             return True
@@ -172,9 +172,9 @@ def closest_in_order(few, many, same):  # type: ignore[no-untyped-def]
     """(len(few),) indices into `many`, increasing, with the least sum of |few - many[index]|; both
     sorted, in s.
 
-    Of sums that differ by less than `same` s the one that skips later, as a collision between two
-    true ones on one grid may be as far from both. Dynamic programming over how many of `many` have
-    been skipped so far, one row per element of `few`.
+    If two sums differ by less than `same` s, the one that skips later counts: a collision midway
+    between two true ones on the grid is equally far from both. Dynamic programming over how many of
+    `many` have been skipped so far, one row per element of `few`.
     """
     spare = len(many) - len(few)
     cost = np.zeros(spare + 1)

@@ -24,7 +24,7 @@ class Comparison:
 
     scenario: Scenario
     truth: Trajectory | None  # the exact answer up to its horizon
-    runs: Sequence[Run]  # failed and refused ones too, in the order of `ENGINES`, coarse dt first
+    runs: Sequence[Run]  # also failed and refused ones, in the order of `ENGINES`, coarse dt first
     table: pd.DataFrame  # one number a row
 
     @property
@@ -59,7 +59,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
 def _opponents(
     run: Run, runs: Sequence[Run], truth: Trajectory | None
 ) -> Iterator[tuple[str, Trajectory | None, bool]]:
-    """The laws, the truth, each later engine of `runs`; and whether it reports no collisions."""
+    """What a run is compared with: name, trajectory, and whether it reports no collisions."""
     yield ITSELF, None, False
     if truth is not None:
         yield TRUTH, truth, False
@@ -72,7 +72,7 @@ def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
     """A row for each metric that applies."""
     kind = versus if versus in (ITSELF, TRUTH) else ENGINE
     rows = []
-    with np.errstate(over="ignore", invalid="ignore"):  # a disk far out gives inf or nan
+    with np.errstate(over="ignore", invalid="ignore"):  # a disk thrown far out gives inf or nan
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
                 judged = value if len(view.played) > 1 else not_judged("the start alone")

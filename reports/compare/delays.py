@@ -1,10 +1,10 @@
-"""Velocity, momentum and energy of the truth, allowing for collisions that an engine finds a little
-late or early.
+"""Velocity, momentum and energy of the truth, with an allowance for collisions found a little late
+or early.
 
 An engine that steps finds a collision at the end of a step. Until then its velocities are those
-before the collision, when the truth already has those after it. This delay has a metric of its own
-(`collision_delay_dt`) and is no error here. Every other difference is, at every sample: gravity and
-thrust are taken at that instant.
+before the collision, while the truth already has those after it. This delay has its own metric
+(`collision_delay_dt`) and is no error here. Every other difference is an error, at every sample:
+gravity and thrust are taken at the instant of the sample.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from reports.compare.faces import SAME
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 WINDOW = 10**0.5
-"""dt by which a collision may be late or early: three steps. Irrational, as collisions and samples
-often lie on one grid with the steps: no multiple of dt, nor of a fraction of it, lies on the edge,
-where rounding would decide."""
-# of `distance_to_range`; where all impulses lie along two axes, as in a box, one is exact
+"""dt by which a collision may be late or early: three steps. It is irrational because collisions
+and samples often lie on the grid of the steps: no multiple of dt, or of a fraction of it, falls on
+the edge, where rounding would decide."""
+# passes of `distance_to_range`; one is exact if all impulses lie along two axes, as in a box
 SWEEPS = 100
 
 
 class Jumps(NamedTuple):
-    """What the h collisions of a truth change, in order of time; those that change nothing are left
-    out.
+    """What each of the h collisions of a truth changes, in order of time; those that change nothing
+    are left out.
 
     Attributes:
         t: (h,) s.
-        impulse: (h, 2) N s on all disks together: of walls and static disks; between two others
-            nothing.
-        energy: (h,) J that is lost.
-        limits: (n + 1,) where the rows of each disk stand in the next two.
-        when: (d,) s, disk by disk, in order of time.
-        change: (d, 2) m/s of that disk.
+        impulse: (h, 2) N s on all disks together: from walls and static disks; 0 between two moving
+            disks.
+        energy: (h,) J lost.
+        limits: (n + 1,) where the rows of each disk begin in `when` and `change`.
+        when: (d,) s, times of the collisions, disk by disk.
+        change: (d, 2) m/s, change of velocity of that disk.
     """
 
     t: Array
@@ -48,15 +48,16 @@ class Jumps(NamedTuple):
     change: Array
 
 
-@laws.once
+@laws.cached
 def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
-    """The jumps of the truth of a scenario, which is asked where the disks are when they collide.
+    """The jumps of a truth; the trajectory of `scenario.truth` gives the positions at each
+    collision.
 
     The impulse acts along the normal; at restitution e an impulse J between two disks of the
     reduced mass m takes J2 (1 - e) / (1 + e) / 2 m from the energy (J = (1 + e) m v, and m v2 (1 -
-    e2) / 2; any textbook of mechanics). Friction adds an impulse along the tangent: what changes
-    the disk's velocity from just before the collision to just after it; and takes what the spins
-    and that motion lose.
+    e2) / 2; any textbook of mechanics). Friction adds an impulse along the tangent, read from the
+    disk's velocity just before and just after the collision; the energy that it takes is what the
+    spins and the tangential motion lose.
     """
     assert scenario.truth is not None
     scene, collisions = scenario.scene, truth.collisions
@@ -92,7 +93,8 @@ def friction_of(scenario: Scenario, t: float, i: int, j: int, normal: Array) -> 
     """(2,) N s on disk i along the tangent of its collision at `t` s in the truth, and J that
     friction takes.
 
-    From the last float64 before that time to it, between which nothing else happens to the disk.
+    Both are read from the last float64 before that time to it; nothing else happens to the disk
+    between them.
     """
     assert scenario.truth is not None
     scene, tangent = scenario.scene, np.array([-normal[1], normal[0]])
@@ -110,14 +112,14 @@ def friction_of(scenario: Scenario, t: float, i: int, j: int, normal: Array) -> 
 
 def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float) -> Array:
     """(k, n, 2) m/s: of the velocities that each disk has in the truth within `WINDOW` dt of a
-    sample, the nearest.
+    sample, the one nearest to the engine's.
 
-    They are the truth's at that instant, less the disk's own collisions just before, one after the
-    other, or with those just after. Of two at one instant either may come first. A disk that lay on
-    a floor when it was struck counts before that as falling, not as carried: it may read g `WINDOW`
-    dt too much. Of a collision at the instant of a sample the truth has the velocity before it or
-    that after it, as its numbers
-    round: both are tried.
+    The candidates are the truth's velocity at that instant; the same with the disk's latest
+    collisions undone, one after the other; and with its next collisions added. Of two collisions at
+    one instant either may come first. A disk that rested on a floor when it was struck is taken to
+    have been falling before: its velocity may be off by g `WINDOW` dt. For a collision at the
+    instant of a sample the truth has the velocity before or after it, depending on rounding: both
+    are tried.
     """
     window = WINDOW * dt
     found: Array = nearest(
@@ -128,7 +130,7 @@ def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: fl
 
 @njit(cache=True)
 def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-untyped-def]
-    """(k, n, 2) as of `nearest_velocity`; `window` in s."""
+    """(k, n, 2) as in `nearest_velocity`; `window` in s."""
     found = true.copy()
     for i in range(len(limits) - 1):
         first, past, now, last = limits[i], limits[i], limits[i], limits[i]  # as of `windows`
@@ -144,13 +146,13 @@ def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-u
                 last += 1
             least = np.hypot(true[k, i, 0] - played[k, i, 0], true[k, i, 1] - played[k, i, 1])
             for start in range(past, now + 1):
-                # undo those up to now, the latest first; do those to come, the next first
+                # undo past collisions, the latest first; add future ones, the next first
                 for way in (-1, 1):
                     v = true[k, i].copy()
                     stop = first - 1 if way < 0 else last
                     for h in range(start - 1 if way < 0 else start, stop, way):
                         beside = h + way != stop and abs(when[h + way] - when[h]) < SAME * window
-                        # of two at one instant the second only, then the first
+                        # of two at one instant: the second only, then also the first
                         for turn in range(1 - beside, 2):
                             u = v + way * change[h + way if turn == 0 else h]
                             off = np.hypot(u[0] - played[k, i, 0], u[1] - played[k, i, 1])
@@ -164,11 +166,11 @@ def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-u
 def momentum_outside(
     played: Trajectory, truth: Trajectory, jumps: Jumps, dt: float, scene: Scene
 ) -> Array:
-    """(k,) kg m/s of the played momentum from the range of the truth's within `WINDOW` dt of a
-    sample.
+    """(k,) kg m/s, distance of the engine's momentum from the range that the detection delay
+    allows.
 
-    The range: the truth's at that instant, less any part of each impulse from outside just before,
-    and with any part of each just after.
+    The range: the truth's momentum, less any part of each outer impulse up to `WINDOW` dt before
+    the sample, plus any part of each up to `WINDOW` dt after it.
     """
     difference = laws.momentum(played, scene) - laws.momentum(truth, scene)
     first, past, now, last = windows(played, jumps, dt)
@@ -183,8 +185,8 @@ def momentum_outside(
 
 @njit(cache=True)
 def distance_to_range(point, parts):  # type: ignore[no-untyped-def]
-    """From a point (2,) to the nearest sum of shares, 0 to 1, of `parts` (m, 2), found one share
-    after the other."""
+    """Distance of a point (2,) from the nearest sum of `parts` (m, 2), each times a factor from 0
+    to 1; one factor is fitted after the other."""
     rest, shares = point.copy(), np.zeros(len(parts))
     for _ in range(SWEEPS):
         moved = False
@@ -207,8 +209,8 @@ def energy_range(
     """(k,) J, the least and the largest energy that collisions within `WINDOW` dt of a sample, late
     or early, explain.
 
-    The truth's at that instant, less what those just after take; and with what those just before
-    have taken.
+    The least: the truth's, less what the collisions just after the sample take. The largest: the
+    truth's, plus what those just before it took.
     """
     true, (first, past, now, last) = laws.energy(truth, scene), windows(played, jumps, dt)
     lost = np.concatenate([[0.0], np.cumsum(jumps.energy)])
@@ -228,7 +230,7 @@ def windows(played: Trajectory, jumps: Jumps, dt: float) -> tuple[np.ndarray, ..
     )
 
 
-@laws.once
+@laws.cached
 def collision_free(trajectory: Trajectory, dt: float) -> np.ndarray:
     """(k, n) whether a disk has no collision within `WINDOW` dt of a sample."""
     collisions, near = trajectory.collisions, WINDOW * dt

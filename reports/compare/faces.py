@@ -1,5 +1,5 @@
-"""Collisions by what a disk can tell apart: walls along one line are one, however many segments
-they are made of."""
+"""Collisions by what a disk can distinguish: walls along one line count as one, however many
+segments they have."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from reports.compare import laws
 from scenarios.model import Array, Collisions, Scene, Trajectory, frozen
 
 ALONG = 1e-12
-"""Of the largest coordinate: an end of a wall that is no further from the line of another lies on
-it. A few thousand roundings: a wall that is cut in two at any point of it stays on its line."""
+"""Fraction of the largest coordinate: an end of a wall this close to the line of another wall lies
+on it. A few thousand roundings: a wall cut in two at any of its points stays on its line."""
 SAME = 1e-9
-"""Of a sample interval, or a step: what is closer in time is at one instant, but for rounding of
-the grid of samples and steps."""
+"""Fraction of a sample interval, or a step: events closer in time are simultaneous up to the
+rounding of the grid."""
 
 
 def first_on_line(walls: Array, one: int) -> int:
@@ -25,12 +25,12 @@ def first_on_line(walls: Array, one: int) -> int:
     return int(np.argmax((off <= ALONG * np.abs(walls).max()).all(axis=1)))
 
 
-@laws.once
+@laws.cached
 def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
-    """The collisions of a trajectory, each wall named by the first on its line; of those of a pair
-    at one instant one.
+    """The collisions of a trajectory, with each wall replaced by the first on its line, and one for
+    each pair and instant.
 
-    So a floor of one segment, of two end to end, or of two on top of each other gives the same
+    A floor of one segment, of two end to end, or of two on top of each other gives the same
     pairs.
     """
     collisions, walls = trajectory.collisions, np.unique(trajectory.collisions.j)

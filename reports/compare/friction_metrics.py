@@ -1,7 +1,6 @@
-"""What friction does: to velocities along the surfaces, to spins, to the energy, and until a disk
-rolls.
+"""The metrics of friction: tangential velocity, spin, energy, and the time until a disk rolls.
 
-None of it applies to a scene without friction.
+None applies to a scene without friction.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from reports.compare.view import Value, View, not_judged
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 ROLLS = 1e-9  # radii, and m/s over the largest speed: the bound of the exact answers
-# of the slip at first: less is rolling, also of an engine whose lever arm is off by 2 %
+# of the initial slip: less is rolling, even if the engine's lever arm is off by 2 %
 GONE = 0.05
 BETWEEN = "no two samples enclose a single collision of a disk, each more than three steps away"
 
@@ -27,7 +26,7 @@ def tangential_velocity_error(view: View) -> Value | None:
     """Largest error of a disk's velocity along the surfaces, in the first sample after a collision
     that is more than three steps from all collisions."""
     scenario, truth = view.scenario, view.other
-    if truth is None or not rubs(view):
+    if truth is None or not has_friction(view):
         return None
     free = collision_free(truth, view.dt)
     worst, carried = Value(0.0), 0
@@ -50,8 +49,8 @@ def tangential_velocity_error(view: View) -> Value | None:
 
 
 def slip_at_rest(view: View) -> Value | None:
-    """Largest speed at which surfaces slide on each other while, in the exact answer, a disk rolls
-    or rests on a wall and they do not; counted from three steps after it begins to."""
+    """Largest speed at which a disk slides on a wall while, in the exact answer, it rolls or rests
+    there; counted from three steps after that begins."""
     scenario, truth = view.scenario, view.other
     if not scenario.scene.friction or truth is None or view.jumps is None:
         return None
@@ -72,18 +71,19 @@ def slip_at_rest(view: View) -> Value | None:
     return worst if found else None
 
 
-def rubs(view: View) -> bool:
+def has_friction(view: View) -> bool:
     """Whether disks collide with friction in the exact answer that the run is compared with."""
     if not view.scenario.scene.friction or view.other is None or view.jumps is None:
         return False
     return bool(view.other.collisions.impulse.any())
 
 
-class Apart(NamedTuple):
-    """A collision of the truth that two samples enclose, with no other of its disks between them.
+class Isolated(NamedTuple):
+    """A collision of the truth between two samples, with no other collision of its disks between
+    them.
 
     Attributes:
-        disks: (d,) those of the two that move.
+        disks: (d,) the moving disks of the pair.
         tangent: (2,) of length 1, along the surfaces.
         before, after: the samples, each more than three steps from all collisions of these disks.
     """
@@ -94,7 +94,7 @@ class Apart(NamedTuple):
     after: int
 
 
-@laws.once
+@laws.cached
 def tangents(truth: Trajectory, scenario: Scenario) -> Array:
     """(m, 2) of length 1: the direction along the surfaces in each collision of the truth."""
     assert scenario.truth is not None
@@ -106,12 +106,12 @@ def tangents(truth: Trajectory, scenario: Scenario) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
-@laws.once
-def apart(truth: Trajectory, scenario: Scenario, dt: float) -> list[Apart]:
-    """The collisions whose effect two samples show, in order of time; none of a disk that lies on
-    something, on which friction acts between collisions as well."""
+@laws.cached
+def isolated_collisions(truth: Trajectory, scenario: Scenario, dt: float) -> list[Isolated]:
+    """The collisions that can be read off two samples, in order of time. A disk that rests on
+    something has none, because friction also acts on it between collisions."""
     met, free, along = truth.collisions, collision_free(truth, dt), tangents(truth, scenario)
-    found: list[Apart] = []
+    found: list[Isolated] = []
     for row, (t, i, j) in enumerate(zip(met.t, met.i, met.j)):
         disks = [int(disk) for disk in (i, j) if disk >= 0 and not scenario.scene.static[disk]]
         alone = free[:, disks].all(axis=1)
@@ -125,22 +125,22 @@ def apart(truth: Trajectory, scenario: Scenario, dt: float) -> list[Apart]:
         lies = theirs & (met.impulse == 0) & (met.t < truth.t[after])
         if lies.any() or np.flatnonzero(between)[0] < row:
             continue
-        # a wall that is there twice, or in two pieces, is one
+        # a wall that is listed twice, or in two pieces, is one
         together = (np.abs(met.t[between] - t) <= SAME * interval(truth)).all()
         if together and (abs(laws.cross(along[row], along[between])) < ROLLS).all():
-            found.append(Apart(disks, along[row], before, after))
+            found.append(Isolated(disks, along[row], before, after))
     return found
 
 
 def friction_impulse_error(view: View) -> Value | None:
-    """Largest error of the impulse of friction in a collision: I dw / r of a disk, as only friction
-    turns it."""
+    """Largest error of the impulse of friction in a collision: I dw / r of a disk, because only
+    friction changes its spin."""
     scene, truth = view.scenario.scene, view.other
-    if truth is None or not rubs(view):
+    if truth is None or not has_friction(view):
         return None
     worst, judged = Value(0.0), 0
     weight = laws.moving_inertia(scene) / scene.radius
-    for disks, _, before, after in apart(truth, view.scenario, view.dt):
+    for disks, _, before, after in isolated_collisions(truth, view.scenario, view.dt):
         for disk in disks:
             turned, ought = (
                 one.angular_velocity[after, disk] - one.angular_velocity[before, disk]
@@ -156,31 +156,31 @@ def friction_impulse_error(view: View) -> Value | None:
 
 
 def friction_loss_error(view: View) -> Value | None:
-    """Energy that friction takes in collisions, less what it takes in the exact answer, over the
-    energy at hand.
+    """Energy that friction takes in collisions, minus that of the exact answer, over the energy at
+    hand.
 
-    It is what the motion along the surfaces and the spins lose; restitution takes only from the
-    motion along the normal (`restitution_loss_error`).
+    Friction takes it from the tangential motion and the spins; restitution takes only from the
+    normal motion (`restitution_loss_error`).
     """
     return loss_error(view, of_friction=True)
 
 
 def restitution_loss_error(view: View) -> Value | None:
-    """Energy that restitution takes in collisions with friction, less what it takes in the exact
-    answer, over the energy at hand."""
+    """Energy that restitution takes in collisions with friction, minus that of the exact answer,
+    over the energy at hand."""
     return loss_error(view, of_friction=False)
 
 
 def loss_error(view: View, of_friction: bool) -> Value | None:
-    """One of the two losses in all collisions that two samples show, of the engine less of the
-    truth."""
+    """One of the two losses, engine minus truth, over all collisions that can be read off two
+    samples."""
     scenario, truth = view.scenario, view.other
-    if truth is None or not rubs(view) or scenario.thrusts or violations.lifts(scenario):
+    if truth is None or not has_friction(view) or scenario.thrusts or violations.lifts(scenario):
         return None
     losses = np.array(
         [
-            [lost(one, scenario.scene, each, of_friction) for one in (view.played, truth)]
-            for each in apart(truth, scenario, view.dt)
+            [energy_lost(one, scenario.scene, each, of_friction) for one in (view.played, truth)]
+            for each in isolated_collisions(truth, scenario, view.dt)
         ]
     ).reshape(-1, 2)
     if not len(losses):
@@ -191,11 +191,10 @@ def loss_error(view: View, of_friction: bool) -> Value | None:
     return Value(float(off), note=note)
 
 
-def lost(one: Trajectory, scene: Scene, each: Apart, along: bool) -> float:
-    """J that a collision takes from the motion along the surfaces and the spins, or from that
-    along the normal.
+def energy_lost(one: Trajectory, scene: Scene, each: Isolated, along: bool) -> float:
+    """J that a collision takes from the tangential motion and the spins, or from the normal motion.
 
-    Both are constant in flight if they count the height along their own axis.
+    Each includes the potential energy along its own axis, and so is constant in flight.
     """
     axis = each.tangent if along else np.array([-each.tangent[1], each.tangent[0]])
     ends = np.array([each.before, each.after])[:, None]
@@ -209,7 +208,7 @@ def lost(one: Trajectory, scene: Scene, each: Apart, along: bool) -> float:
 
 
 def time_to_roll_error_s(view: View) -> Value | None:
-    """Time at which a sliding disk begins to roll, less that of the exact answer; the largest of
+    """Time at which a sliding disk begins to roll, minus that of the exact answer; the largest of
     all disks."""
     scenario, truth = view.scenario, view.other
     if not scenario.scene.friction or truth is None or view.jumps is None:
@@ -221,7 +220,7 @@ def time_to_roll_error_s(view: View) -> Value | None:
             slips = touching(truth, scenario.scene, int(disk), wall) & ~rolls
             for begins in np.flatnonzero(rolls[1:] & slips[:-1]) + 1:
                 first = begins - int(np.argmin(np.append(slips[:begins][::-1], False)))
-                if begins - first < 2:  # samples, from which the slip's end is extrapolated
+                if begins - first < 2:  # samples from which the end of the slip is extrapolated
                     continue
                 ours, ought = (
                     end_of_slip(
@@ -236,11 +235,11 @@ def time_to_roll_error_s(view: View) -> Value | None:
 
 
 def end_of_slip(t: Array, slip: Array) -> float:
-    """s, when a slip (k,) m/s that changes evenly is gone: on the line from the first sample to the
-    last before it is below `GONE` of the first; `inf` if it never is.
+    """s, when a slip (k,) m/s reaches 0, extrapolated on the line from the first sample to the last
+    above `GONE` of the first; `inf` if it never falls below that.
 
-    On a straight line it is gone soon after it is below that, and a slip that falls otherwise is
-    taken for gone there.
+    The end is at most where a straight line from the first sample through the first one below
+    `GONE` would put it.
     """
     left = slip / slip[0]
     k = int(np.argmax(left < GONE))

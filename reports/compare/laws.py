@@ -19,13 +19,12 @@ Law = TypeVar("Law", bound=Callable[..., Any])
 ON_THE_WALL = 1e-9  # radii: more than rounding, in the coordinates of any scene that is measured
 
 
-def once(law: Law) -> Law:
-    """The law, evaluated once for the same arguments and forgotten together with the first of
-    them.
+def cached(law: Law) -> Law:
+    """The law with a cache, which is dropped together with the first argument.
 
-    Trajectories, scenes and scenarios are frozen, and equal only to themselves. A run is
-    compared with each other engine at its dt: without this its energy would be computed about
-    forty times.
+    Trajectories, scenes and scenarios are frozen, and equal only to themselves. A run is compared
+    with every other engine at its dt: without the cache its energy would be computed about forty
+    times.
     """
     known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
 
@@ -40,38 +39,38 @@ def once(law: Law) -> Law:
 
 
 def read_only(value: Any) -> Any:
-    """The same array, which can no longer be written to."""
+    """The same value; an array is made read-only."""
     if isinstance(value, np.ndarray):
         value.setflags(write=False)
     return value
 
 
-@once
+@cached
 def moving_mass(scene: Scene) -> Array:
     """(n,) kg, 0 for static disks."""
     return np.where(scene.static, 0.0, scene.mass)
 
 
-@once
+@cached
 def moving_inertia(scene: Scene) -> Array:
     """(n,) kg m2, 0 for disks that do not turn: static ones, and those of infinite inertia."""
     return np.where(scene.static | np.isinf(scene.inertia), 0.0, scene.inertia)
 
 
-@once
+@cached
 def momentum(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, 2) kg m/s: sum of m v."""
     total: Array = np.einsum("i,kia->ka", moving_mass(scene), trajectory.velocity)
     return total
 
 
-@once
+@cached
 def momenta(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, n, 2) kg m/s: m v of each disk."""
     return moving_mass(scene)[:, None] * trajectory.velocity
 
 
-@once
+@cached
 def energies(trajectory: Trajectory, scene: Scene) -> Array:
     """(k, n) J: what each disk adds to `energy`."""
     linear = (trajectory.velocity**2).sum(axis=2) / 2 - trajectory.position @ scene.gravity
@@ -81,21 +80,20 @@ def energies(trajectory: Trajectory, scene: Scene) -> Array:
     return both
 
 
-@once
+@cached
 def centre(scene: Scene) -> Array:
-    """(2,) m, the centre of mass at the start of what can move; of nothing the origin."""
+    """(2,) m, the centre of mass of the moving disks at the start; the origin if nothing moves."""
     mass = moving_mass(scene)
     return mass @ scene.position / (mass.sum() or 1.0)
 
 
 def angular_momentum(trajectory: Trajectory, scene: Scene) -> Array:
-    """(k,) kg m2/s about the centre of mass of the scene, where it is at the start: sum of m x
-    cross v + I w."""
+    """(k,) kg m2/s about the scene's centre of mass at the start: sum of m x cross v + I w."""
     orbital = cross(trajectory.position - centre(scene), trajectory.velocity) @ moving_mass(scene)
     return orbital + trajectory.angular_velocity @ moving_inertia(scene)
 
 
-@once
+@cached
 def kinetic_energy(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) J: sum of m v2 / 2 + I w2 / 2."""
     linear = (trajectory.velocity**2).sum(axis=2) @ moving_mass(scene) / 2
@@ -103,7 +101,7 @@ def kinetic_energy(trajectory: Trajectory, scene: Scene) -> Array:
     return both
 
 
-@once
+@cached
 def energy(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) J: kinetic energy less sum of m g.x (zero at the origin)."""
     return kinetic_energy(trajectory, scene) - (trajectory.position @ scene.gravity) @ moving_mass(
@@ -137,8 +135,8 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
 
 
 def through_walls(trajectory: Trajectory, scene: Scene) -> np.ndarray:
-    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line;
-    a sample on the wall itself tells no side, and the one before it counts."""
+    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line.
+    If a sample lies on the wall itself, the side of the sample before it counts."""
     through = np.zeros(scene.n, dtype=bool)
     x, number = trajectory.position, np.arange(len(trajectory))[:, None]
     for a, b in scene.walls:
@@ -158,8 +156,8 @@ def cross(u: Array, v: Array) -> Array:
 
 
 def deviation(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
-    """(k, n) m between the positions in the samples both have; across the nearer edge where the
-    scene wraps."""
+    """(k, n) m between the positions in the common samples; across an edge if the scene wraps and
+    that is shorter."""
     return lengths(difference(a, b, scene))
 
 
@@ -170,7 +168,8 @@ def difference(a: Trajectory, b: Trajectory, scene: Scene) -> Array:
 
 
 def nearer_way(way: Array, scene: Scene) -> Array:
-    """(..., 2) m: the same, or across an edge where the scene wraps and that is shorter."""
+    """(..., 2) m: the vector `way`, or the one across an edge if the scene wraps and that is
+    shorter."""
     if scene.wrap is None:
         return way
     size = scene.wrap[1] - scene.wrap[0]
@@ -179,6 +178,6 @@ def nearer_way(way: Array, scene: Scene) -> Array:
 
 
 def lengths(vectors: Array) -> Array:
-    """(...) of (..., 2) vectors: the bits of `np.linalg.norm` over the last axis, in a quarter of
-    its time."""
+    """(...) of (..., 2) vectors: the same bits as `np.linalg.norm` over the last axis, in a quarter
+    of the time."""
     return np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)

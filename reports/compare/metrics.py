@@ -1,4 +1,4 @@
-"""The metrics: for each its function, unit, and what it is measured against.
+"""The metrics: the function, the unit, and what each is measured against.
 
 To add one, write `def name(view) -> Value | None` and its row in `METRICS`. A metric that does not
 apply to a scene returns None.
@@ -40,27 +40,27 @@ def over_judged(measure: Measure) -> Measure:
 
 
 def momentum_error(view: View) -> Value | None:
-    """Largest |P(t) - P(0) - impulse from outside| where that impulse is known, over the largest
-    sum of m|v| that flight without collisions can reach."""
+    """Largest |P(t) - P(0) - outer impulse| where that impulse is known, over the largest sum of
+    m|v| that flight without collisions can reach."""
     return _largest(violations.momentum(view), view)
 
 
 def angular_momentum_error(view: View) -> Value | None:
-    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over all
-    m|x||v| + I|w|."""
+    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over the sum
+    of m|x||v| + I|w|."""
     return _largest(violations.angular_momentum(view), view)
 
 
 @over_judged
 def energy_error(view: View) -> Value | None:
     """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over
-    that at hand."""
+    the energy at hand."""
     return _largest(violations.energy(view), view)
 
 
 def energy_created(view: View) -> Value | None:
-    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision can
-    give any."""
+    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision
+    creates energy."""
     return _largest(violations.energy_rise(view), view)
 
 
@@ -123,7 +123,7 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_through_walls(view: View) -> Value | None:
-    """Disks whose centre has crossed a wall, which no collision can bring back."""
+    """Number of disks whose centre has crossed a wall (tunnelling)."""
     if not len(view.scenario.scene.walls):
         return None
     through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
@@ -146,8 +146,8 @@ def position_max(view: View) -> Value | None:
 
 
 def position_max_radii(view: View) -> Value | None:
-    """Largest distance of any disk in any sample, in radii of that disk; over an edge of the wrap
-    if that is nearer."""
+    """Largest distance of any disk in any sample, in radii of that disk; across an edge of the wrap
+    if that is shorter."""
     return _largest_of_disks(view.deviation / view.scenario.scene.radius, view)
 
 
@@ -171,8 +171,8 @@ def velocity_max(view: View) -> Value | None:
 
 @over_judged
 def angular_velocity_max(view: View) -> Value | None:
-    """Largest difference of angular velocity of any disk in any sample that `velocity_max` is
-    judged in."""
+    """Largest difference of angular velocity of any disk, in the samples in which `velocity_max` is
+    judged."""
     return _largest_of_disks(np.where(view.judged, view.angular_velocity_deviation, 0.0), view)
 
 
@@ -187,8 +187,8 @@ def angle_max(view: View) -> Value | None:
 
 
 def time_to_1pct_s(view: View) -> Value | None:
-    """First sample at which some disk is off by more than 1 % of its radius; `inf` if none ever
-    is."""
+    """Time of the first sample at which a disk is off by more than 1 % of its radius; `inf` if
+    there is none."""
     off = view.deviation / view.scenario.scene.radius > 0.01
     if not off.any():
         return Value(np.inf, note=f"never within {view.played.t[-1]:g} s")
@@ -220,10 +220,10 @@ class Metric:
 
     Attributes:
         of: the function.
-        unit: of the value, "1" for a ratio.
+        unit: of the value; "1" for a ratio.
         against: what it is measured against: `ITSELF`, `TRUTH`, `ENGINE` (against.py).
         better: "lower", "higher", "zero" or "as stated" (the best value).
-        title: the name in words, as a table shows it; "" for the name itself.
+        title: the heading in tables; "": the name itself.
     """
 
     of: Callable[[View], Value | None]

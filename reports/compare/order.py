@@ -1,4 +1,4 @@
-"""The order of convergence with an interval, or what prevents one."""
+"""The order of convergence with an interval, or why there is none."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from scenarios.model import Array
 
-# radii: the finest accuracy asked for; a rise or a rest below it is rounding, and nobody minds
+# radii: the finest accuracy asked for; below it a rising or constant error is rounding
 FINEST = 1e-6
-# of the error at the coarsest step: who has more than that left at the finest has come no nearer
+# of the error at the coarsest step: more than that left at the finest step is no improvement
 NEARER = 0.9
 RISE = 1.1  # an error that grows by more than this from a step to a finer one is not monotone
-# of the error that is left: of order p the last halving of dt moves 2^p - 1 times that
+# of the remaining error: at order p the last halving of dt moves the answer by 2^p - 1 times that
 STANDSTILL = 0.25
 RESAMPLES = 1000
 
@@ -32,8 +32,8 @@ STUDENT = (12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23)
 
 
 class Order(NamedTuple):
-    """The slope of log error over log dt with its 95 % interval, and what is to be said of it: a
-    word from above."""
+    """The slope of log error over log dt, its 95 % interval, and the verdict: one of the words
+    above."""
 
     slope: float
     low: float
@@ -45,9 +45,9 @@ def order_of(dt: Array, errors: Array, changes: Array, seed: int = 0) -> Order:
     """The order from dt (k,) s, coarse to fine, errors (seeds, k) in radii, and changes (seeds, k),
     see `ladder`.
 
-    Points at `FINEST` or below say nothing on the order: they are left out. With many seeds the
-    slope is that of the median error and the interval is bootstrapped over the seeds; with one it
-    is the straight line's own (Student).
+    Points at `FINEST` or below say nothing about the order and are left out. With many seeds the
+    slope is that of the median error, and the interval is bootstrapped over the seeds; with one
+    seed the interval is that of the straight line (Student).
     """
     middle = np.median(errors, axis=0)
     verdict = verdict_of(middle, np.median(changes, axis=0))
@@ -57,20 +57,20 @@ def order_of(dt: Array, errors: Array, changes: Array, seed: int = 0) -> Order:
     x = np.log(dt[used])
     if len(errors) == 1:
         fitted, low, high = line_interval(x, np.log(middle[used]))
-        return Order(fitted, low, high, seen(verdict, low))
+        return Order(fitted, low, high, confirmed(verdict, low))
     logs = np.log(np.maximum(errors[:, used], FINEST))
     low, high = bootstrap(logs, lambda sample: slope(x, np.median(sample, axis=0)), seed)
-    return Order(slope(x, np.log(middle[used])), low, high, seen(verdict, low))
+    return Order(slope(x, np.log(middle[used])), low, high, confirmed(verdict, low))
 
 
-def seen(verdict: str, low: float) -> str:
-    """The verdict, unless it says that the error falls and the slope may as well be 0."""
+def confirmed(verdict: str, low: float) -> str:
+    """The verdict; `UNCLEAR` if the error falls but the interval of the slope includes 0."""
     return UNCLEAR if verdict == ORDER and not low > 0 else verdict
 
 
 def verdict_of(errors: Array, changes: Array) -> str:
-    """What errors (k,) do on the way to finer steps; changes (k,) is how far the answer itself
-    moved at each."""
+    """How errors (k,) change towards finer steps; changes (k,) is how far the answer itself moved
+    at each step."""
     known = np.isfinite(errors)
     errors, changes = errors[known], changes[known]
     if len(errors) < 3:

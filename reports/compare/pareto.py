@@ -21,7 +21,7 @@ FAILED = "failed"
 
 
 class Reached(NamedTuple):
-    """The cost of an accuracy: µs per simulated second at dt in s; or nan and why it is not
+    """The cost of an accuracy: µs per simulated second, at dt in s; or nan, and why it is not
     reached."""
 
     cost: float
@@ -30,8 +30,8 @@ class Reached(NamedTuple):
 
 
 def front(cost: Array, error: Array) -> list[int]:
-    """Indices, cheapest first, of the points that no other beats in one of the two without being
-    worse in the other."""
+    """Indices, cheapest first, of the points of the Pareto front: no other point is better in one
+    of the two and at least as good in the other."""
     best, kept = np.inf, []
     for k in np.lexsort((error, cost)):
         if np.isfinite(cost[k]) and error[k] < best:
@@ -41,7 +41,7 @@ def front(cost: Array, error: Array) -> list[int]:
 
 
 def kept_from(error: Array, accuracy: float) -> NDArray[np.bool_]:
-    """(k,) of errors from coarse to fine: whether that and every finer one is at most
+    """(k,) bool, from coarse to fine: whether this error and every finer one is at most
     `accuracy`."""
     kept: NDArray[np.bool_] = np.logical_and.accumulate((error <= accuracy)[::-1])[::-1]
     return kept
@@ -51,9 +51,9 @@ def cost_to_reach(accuracy: float, dt: Array, cost: Array, error: Array, verdict
     """The cheapest measured dt whose error, and that of every finer one, is at most `accuracy`
     radii.
 
-    dt, cost and error (k,) go from coarse to fine; error is inf where a run failed. Nothing is read
-    between or beyond what was measured; a lucky dt, with a larger error at a finer one, does not
-    count.
+    dt, cost and error (k,) go from coarse to fine; error is inf where a run failed. Nothing is
+    interpolated or extrapolated. A dt with a larger error at a finer one does not count: it was
+    luck.
     """
     if not np.isfinite(error).any():
         return Reached(np.nan, np.nan, FAILED)
@@ -71,8 +71,8 @@ YARDSTICK = "reference:exercise"
 
 
 def yardstick_of(reached: pd.DataFrame) -> pd.DataFrame:
-    """The rows of `YARDSTICK` in a table of scenario, engine, profile, accuracy and cost; of the
-    first engine, where that is not in it."""
+    """The rows of the engine `YARDSTICK` in a table of scenario, engine, profile, accuracy and
+    cost; if it is not there, those of the first engine."""
     names = reached.engine + ":" + reached.profile
     return reached[names == (YARDSTICK if (names == YARDSTICK).any() else names.iloc[0])]
 

@@ -1,5 +1,5 @@
-"""All scenarios in one number: the geometric mean of their middle half, and how much any single
-scenario changes it."""
+"""All scenarios in one number: the geometric mean of the middle half, and how much any one scenario
+changes it."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def middle_half(values: Array) -> float:
     """The geometric mean of the middle half of values (m,), each an equal share of the whole; nan
     of none.
 
-    The interquartile mean, here of logarithms: as robust as a median against a quarter of the
-    values at either end, infinite ones among them, but carried by half of the values where a median
-    is carried by one or two. A value that a quartile cuts counts in part. See Agarwal et al., "Deep
-    reinforcement learning at the edge of the statistical precipice", 2021, section 4.3.
+    The interquartile mean, here of logarithms. Like a median it ignores a quarter of the values at
+    either end, infinite ones among them; but half of the values decide it, not one or two. A value
+    that a quartile cuts counts in part. See Agarwal et al., "Deep reinforcement learning at the
+    edge of the statistical precipice", 2021, section 4.3.
     """
     if not len(values):
         return float("nan")
@@ -37,9 +37,9 @@ def middle_half(values: Array) -> float:
 
 
 def moved(values: Array, floor: float = 0.0) -> Array:
-    """By which factor (m,), 1 or more, `middle_half` changes if each of values (m,) is left out;
-    what is below `floor` counts as equal to it. inf where only one of the two is infinite, 1 where
-    both are.
+    """(m,) the factor, 1 or more, by which `middle_half` changes if one of values (m,) is left out;
+    values below `floor` count as `floor`. inf if only one of the two means is infinite, 1 if both
+    are.
     """
     whole = max(middle_half(values), floor)
     others = np.maximum([middle_half(np.delete(values, k)) for k in range(len(values))], floor)
@@ -49,14 +49,14 @@ def moved(values: Array, floor: float = 0.0) -> Array:
 
 
 def pooled(found: pd.DataFrame) -> pd.DataFrame:
-    """A row an engine and step size that all scenarios have: error and cost, each `middle_half`
-    over the scenarios.
+    """A row for each engine and step size that all scenarios have: error and cost, each
+    `middle_half` over the scenarios.
 
     Columns besides: error_low, error_high, low, high (quartiles); bare, of the cost less that of as
     many idle steps; of (how many scenarios), failed (in how many it did), timed (how many carry the
     cost); moved and cost_moved (by which factor leaving out one scenario changes error and cost at
     most), moved_by and cost_moved_by (which one). A scenario that an engine failed counts as
-    infinitely wrong and infinitely dear; one that it played but was not timed in is left out of the
+    infinite error and infinite cost. One that it played without being timed is left out of the
     cost, and `timed` says so.
     """
     step_sizes = found.groupby("scenario").step_size.max().min()
@@ -67,7 +67,7 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
         scenes, error = group.scenario.to_numpy(str), group.error.to_numpy(float)
         priced = group[group.cost.notna() | (group.failed > 0)]
         cost = priced.cost.fillna(np.inf).to_numpy(float)
-        bare = without(cost, priced.idle.to_numpy(float))
+        bare = without_idle(cost, priced.idle.to_numpy(float))
         quartiles = np.percentile(error, [25, 75], method="nearest")
         prices = np.percentile(cost, [25, 75], method="nearest") if len(cost) else [np.nan] * 2
         rows.append(
@@ -80,16 +80,16 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
                 "error": middle_half(error),
                 "error_low": quartiles[0],
                 "error_high": quartiles[1],
-                "cost": finite(middle_half(cost)),
-                "low": finite(prices[0]),
-                "high": finite(prices[1]),
-                "bare": finite(middle_half(bare)) if not np.isnan(bare).any() else np.nan,
+                "cost": finite_or_nan(middle_half(cost)),
+                "low": finite_or_nan(prices[0]),
+                "high": finite_or_nan(prices[1]),
+                "bare": finite_or_nan(middle_half(bare)) if not np.isnan(bare).any() else np.nan,
                 "of": len(group),
                 "seeds": len(group),
                 "failed": int((group.failed > 0).sum()),
                 "timed": len(priced),
-                **most("moved", scenes, moved(error, FINEST)),
-                **most("cost_moved", priced.scenario.to_numpy(str), moved(cost)),
+                **largest_factor("moved", scenes, moved(error, FINEST)),
+                **largest_factor("cost_moved", priced.scenario.to_numpy(str), moved(cost)),
                 "status": "ok",
                 "reason": "",
                 "best": np.nan,
@@ -100,19 +100,19 @@ def pooled(found: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def without(cost: Array, idle: Array) -> Array:
-    """Costs less those of as many idle steps, at least `UNSURE` of them; nan where the latter are
-    not known."""
+def without_idle(cost: Array, idle: Array) -> Array:
+    """Costs minus those of the same number of idle steps, at least `UNSURE` of the cost; nan where
+    the idle cost is not known."""
     return np.maximum(cost - idle, UNSURE * cost)
 
 
-def finite(value: float) -> float:
-    """The value, nan where it is infinite: what nobody can pay has no cost."""
+def finite_or_nan(value: float) -> float:
+    """The value; nan where it is infinite."""
     return float(value) if np.isfinite(value) else float("nan")
 
 
-def most(name: str, scenes: Array, factors: Array) -> dict[str, float | str]:
-    """The largest factor under `name`, and under `name`_by its scenario; nan and "" of none."""
+def largest_factor(name: str, scenes: Array, factors: Array) -> dict[str, float | str]:
+    """`name`: the largest factor, `name`_by: its scenario; nan and "" if there are no factors."""
     if not len(factors):
         return {name: float("nan"), f"{name}_by": ""}
     k = int(np.argmax(factors))
@@ -120,7 +120,7 @@ def most(name: str, scenes: Array, factors: Array) -> dict[str, float | str]:
 
 
 def said_of_pool(found: pd.DataFrame) -> str:
-    """How much one scene can move a pooled point of `pooled`, and what failed; in words."""
+    """A sentence on how much one scene can move a point of `pooled`, and one on what failed."""
     failed = found[found.failed > 0].groupby(WHO, sort=False).failed.max().reset_index()
     lost = ", ".join(f"{row.engine}:{row.profile} {row.failed}" for row in failed.itertuples())
     failures = f"Scenes failed: {lost}." if lost else "No engine failed a scene."

@@ -1,4 +1,4 @@
-"""The restitution of each collision of a trajectory, read off the samples around it."""
+"""The restitution of each collision of a trajectory, read off the samples before and after it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scenarios.model import Array, Scene, Trajectory
 
 
 class Restitutions(NamedTuple):
-    """What was read off samples.
+    """What was read off the samples.
 
     Attributes:
         values: (m,) e of each collision that was read; `times`: (m,) s, when.
         below: how many were below the floor.
-        unfinished: how many were not over before something else happened to a disk, or the run
-            ended.
+        unfinished: how many did not end before the next collision of a disk, or before the end of
+            the run.
     """
 
     values: Array
@@ -27,10 +27,10 @@ class Restitutions(NamedTuple):
     unfinished: int
 
 
-# of the change of velocity; float32 leaves about 1e-7 of the velocity, an unreported collision
-# far more
+# relative to the change of velocity; float32 leaves about 1e-7 of the velocity, an unreported
+# collision far more
 CLEAN = 1e-4
-# times the rounding of the velocities that a change must have: e is then read to a hundredth or so
+# a change of velocity must be this many times its rounding: e is then accurate to about 0.01
 FLOOR = 100
 
 
@@ -39,24 +39,22 @@ def effective_restitution(
 ) -> Restitutions:
     """Restitution of each collision that can be read off the samples.
 
-    One can be read if neither disk has another in the same sample interval or the next, and none of
-    them changes its spin (friction): then the change of velocity points along the normal n, and e =
-    -(dv'.n) / (dv.n). Two disks must also change their momenta by as much, and a disk at a wall
-    along the wall's normal: else there was a collision that the engine did not report. Those
-    closing slower than `slowest` m/s are left out.
+    A collision can be read if neither disk has another in the same sample interval or the next, and
+    neither changes its spin (friction): then the change of velocity points along the normal n, and
+    e = -(dv'.n) / (dv.n). Two disks must also change their momenta by opposite amounts, and a disk
+    at a wall must change its momentum along the wall's normal: else the engine did not report
+    another collision. Collisions closing slower than `slowest` m/s are left out.
 
     An engine with soft contacts takes several steps for a collision: it is read at the first sample
-    at which the two no longer approach. Two that a law leaves approaching pass through each other,
-    and then move apart, so that such a law is read too: with e < 0, as they still have some of the
-    velocity they came with. A collision is counted as unfinished if it is never over, not before
-    another of either disk, or so late that gravity matters: those that take m sample intervals must
-    close m times as fast.
+    at which the two no longer approach. If the bodies still approach after the impulse, they pass
+    through each other and then separate; this gives e < 0. A collision is unfinished if it does not
+    end, if it does not end before the next collision of either disk, or if it ends so late that
+    gravity matters: one that takes m sample intervals must close m times as fast.
 
-    Those that change the velocities by no more than `FLOOR` times their rounding, which is
-    relative, are below the floor: their normal, and with it e, would be noise. What gravity adds
-    before and after is taken out with the velocities, and rounded as they are. Engines report such
-    collisions during a contact that lasts: Box2D 3.1 does where a disk slides along a wall,
-    whenever it comes nearer at any speed at all.
+    A collision is below the floor if it changes the velocities by at most `FLOOR` times their
+    rounding: the normal, and so e, would be noise. The velocity that gravity adds is subtracted,
+    with the same relative rounding. Engines report such collisions during a lasting contact: Box2D
+    3.1 does so when a disk slides along a wall and approaches it at any speed.
     """
     t, spin, collisions = trajectory.t, trajectory.angular_velocity, on_faces(trajectory, scene)
     slowest = max(slowest, 0.0)
@@ -111,13 +109,13 @@ class Pairs(NamedTuple):
 
     @property
     def other(self) -> np.ndarray:
-        """(m,) the second disk; the first again where there is a wall instead."""
+        """(m,) the second disk; the first disk again if the other side is a wall."""
         return np.where(self.j >= 0, self.j, self.i)
 
 
 def in_intervals(every: Pairs, samples: int, n: int) -> np.ndarray:
-    """(samples + 2, n) collisions of each disk: row k + 1 of the interval after sample k, row 0 of
-    the time before the first."""
+    """(samples + 2, n) number of collisions of each disk: in row k + 1 after sample k, in row 0
+    before the first sample."""
     count = np.zeros((samples + 2, n), np.int64)
     np.add.at(count, (every.k + 1, every.i), 1)
     disks = every.of(every.j >= 0)
@@ -141,7 +139,7 @@ def first_apart(
     """(m,) the first sample after each collision at which the two do not approach; the number of
     samples if there is none before another collision of either."""
     samples, after = len(trajectory), read.k + 1
-    left = np.arange(len(after))  # those that approach at every sample so far
+    left = np.arange(len(after))  # the pairs that approach at every sample so far
     while len(left):
         left = left[approach(trajectory, scene, read.of(left), after[left], rounding)]
         pairs, following = read.of(left), after[left] + 1
@@ -154,8 +152,8 @@ def first_apart(
 def approach(
     trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray, rounding: float
 ) -> np.ndarray:
-    """(m,) whether the two of each pair approach in sample k, (m,), by more than `FLOOR` roundings,
-    after their collision."""
+    """(m,) whether the two of each pair still approach in sample k, (m,), by more than `FLOOR`
+    roundings."""
     x, other = (trajectory.position[k, disk] for disk in (pairs.i, pairs.other))
     for wall in np.unique(pairs.j[pairs.j < 0]):
         at = pairs.j == wall
@@ -168,8 +166,8 @@ def approach(
 
 
 def velocities(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
-    """(m, 2, 2) m/s of both of each pair at the time of their collision, from sample k, (m,), and
-    gravity; 0 of a wall."""
+    """(m, 2, 2) m/s of both sides of each pair, carried by gravity from sample k, (m,), to the time
+    of their collision; 0 for a wall."""
     disks = np.stack([pairs.i, pairs.other], axis=1)
     falling = np.where(scene.static[disks, None], 0.0, scene.gravity)
     v: Array = trajectory.velocity[k[:, None], disks]
@@ -179,8 +177,8 @@ def velocities(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray
 
 
 def is_rounding(trajectory: Trajectory, scene: Scene, read: Pairs, rounding: float) -> np.ndarray:
-    """(m,) whether the change of a disk that moves, or that of both to each other, is below the
-    floor."""
+    """(m,) whether the change of velocity of a moving disk, or of the relative velocity, is below
+    the floor."""
     earlier, later = (velocities(trajectory, scene, read, k) for k in (read.k, read.k + 1))
     moving = np.stack([np.ones(len(read.k), bool), second_moves(scene, read)], axis=1)
     change = np.where(moving[..., None], later - earlier, 0.0)
@@ -200,11 +198,11 @@ def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
 def speeds_along_normal(
     earlier: Array, later: Array, scene: Scene, pairs: Pairs, turned: Array
 ) -> tuple[Array, Array]:
-    """(m,) m/s at which the two of each pair close before and part after a collision; `turned`
-    (m, n) m/s by friction.
+    """(m,) m/s, closing speed before and separating speed after each collision; `turned` (m, n) m/s
+    by friction.
 
-    The normal is that of the change of their velocity to each other, whichever of the two is named
-    first. nan and nan if the change is not that of one frictionless collision.
+    The normal is the direction of the change of their relative velocity, whichever of the two is
+    named first. Both are nan if the change is not that of one frictionless collision.
     """
     number, both, wall = np.arange(len(pairs.k)), second_moves(scene, pairs), pairs.j < 0
     change = later - earlier

@@ -1,6 +1,7 @@
-"""The scales of a scenario: errors of momentum and energy are divided by them.
+"""The scales of a scenario, by which errors of momentum and energy are divided.
 
-They come from the scene, not from a run: a run that explodes must not make its error look small.
+They come from the scene, not from a run: otherwise a run that explodes would make its error look
+small.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from reports.compare import laws
 from scenarios.model import Array, Scenario, Trajectory
 
 
-@laws.once
+@laws.cached
 def momentum(scenario: Scenario) -> float:
     """kg m/s: sum of m |v|, with the largest speed that each disk can reach without collisions."""
     return float(laws.moving_mass(scenario.scene) @ top_speed(scenario))
@@ -26,13 +27,13 @@ def angular_momentum(scenario: Scenario) -> float:
     return float((laws.moving_mass(scene) * reach) @ top_speed(scenario) + spin)
 
 
-@laws.once
+@laws.cached
 def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
-    """J, the energy at hand: the kinetic energy, and what each disk can gain by falling, one radius
-    more than it does.
+    """J, the energy at hand: the kinetic energy, and what each disk gains by falling, with one
+    radius added to each fall.
 
-    With the truth: the largest kinetic energy and the whole fall in it. Without: the energy at the
-    start, and a fall to the lowest wall or disk.
+    With the truth: its largest kinetic energy and the height range of each disk. Without: the
+    kinetic energy at the start, and a fall to the lowest wall or disk.
     """
     scene = scenario.scene
     g, m = float(np.linalg.norm(scene.gravity)), laws.moving_mass(scene)
@@ -50,9 +51,10 @@ def energy(scenario: Scenario, truth: Trajectory | None = None) -> float:
     return float(kinetic + (fall + scene.radius * g) @ m)
 
 
-@laws.once
+@laws.cached
 def top_speed(scenario: Scenario) -> Array:
-    """(n,) m/s, of each disk in free flight under gravity and its thrusts, all along one line."""
+    """(n,) m/s, upper bound for each disk in free flight: start velocity, gravity and thrusts added
+    up as if parallel."""
     scene = scenario.scene
     speed = (
         np.linalg.norm(scene.velocity, axis=1) + np.linalg.norm(scene.gravity) * scenario.duration

@@ -1,4 +1,4 @@
-"""`View`: a run and the trajectory it is measured against; the one argument of every metric."""
+"""`View`: a run and the trajectory it is measured against. It is the argument of every metric."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from reports.compare.faces import SAME, interval, on_faces
 from reports.compare.restitution import Restitutions, effective_restitution
 from scenarios.model import Array, Collisions, Scenario, Trajectory
 
-# sample intervals of falling; irrational, as of a threshold that speeds may be equal to
+# sample intervals of falling; irrational, so that no closing speed equals the threshold
 SLOWEST = 401**0.5
 LEAST_SHARE = 0.1
-"""Of the samples after the start, or of the true collisions, that must carry a number for it to be
-judged by. An engine errs in collisions: what is left of a run in less than a tenth of its samples
-is mostly the flight before the first of them, where nobody errs; and those of the collisions that a
-step can tell apart are the easiest."""
-# begins the note of a number that is NaN because too few samples are judged
+"""Fraction of the samples after the start, or of the true collisions, that must be usable for a
+number to be judged. Engines err in collisions. Less than a tenth of the samples is mostly the
+flight before the first collision, where no engine errs; less than a tenth of the collisions are the
+easiest ones, those that a step can resolve."""
+# starts the note of a number that is NaN because too few samples are judged
 NOT_JUDGED = "not judged"
 
 
@@ -46,20 +46,21 @@ class Value(NamedTuple):
 
 
 def not_judged(why: str) -> Value:
-    """The value of a metric that applies, where too few samples or collisions are judged."""
+    """The value of a metric that applies, but for which too few samples or collisions are
+    judged."""
     return Value(np.nan, note=f"{NOT_JUDGED}: {why}")
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The trajectory of a run and the one it is measured against, over the samples both have.
+    """The trajectory of a run and the one it is measured against, over their common samples.
 
     Attributes:
-        scenario: what was played.
+        scenario: the scenario played.
         dt: s, of the engine.
-        played: the engine's trajectory, cut to the samples the other has.
+        played: the engine's trajectory, cut to the common samples.
         other: the truth, another engine's trajectory, or None: only the laws of physics.
-        jumps: of `other` (delays.py) if it is the truth; None for an engine.
+        jumps: the jumps of `other` (delays.py) if it is the truth; None for an engine.
         rounding: the relative rounding of the numbers that the engine keeps.
         silent: whether one of the two reports no collisions, so that they cannot be compared.
     """
@@ -80,11 +81,12 @@ class View:
 
     @cached_property
     def judged(self) -> np.ndarray:
-        """(k, n) where the velocity of a disk is compared; never at the start, which is given.
+        """(k, n) bool, where the velocity of a disk is compared; never at the start, which is
+        given.
 
         With the truth: up to `WINDOW` dt before its end, because an engine may already have a
-        collision that the truth has only after its end. With another engine, of which either may
-        be late: where neither has a collision of that disk within `WINDOW` dt.
+        collision that the truth has only after its end. With another engine, where either may be
+        late: if that disk has no collision within `WINDOW` dt in either trajectory.
         """
         assert self.other is not None
         played, moving = self.played, ~self.scenario.scene.static
@@ -115,8 +117,8 @@ class View:
 
     @cached_property
     def velocity_deviation(self) -> Array:
-        """(k, n) m/s between the two, of the truth within the detection delay; nan where it is not
-        judged."""
+        """(k, n) m/s between the two, with the detection delay allowed for if the other is the
+        truth; nan where not judged."""
         assert self.other is not None
         expected = self.other.velocity
         if self.jumps is not None:
@@ -125,10 +127,10 @@ class View:
 
     @cached_property
     def angular_velocity_deviation(self) -> Array:
-        """(k, n) rad/s between the two; 0 where it is not compared.
+        """(k, n) rad/s between the two; 0 where they are not compared.
 
-        Without friction no collision changes a spin, so that none is late or early; with it, those
-        within `WINDOW` dt of a collision of the disk are not compared.
+        Without friction no collision changes a spin. With friction, samples within `WINDOW` dt of a
+        collision of the disk are not compared.
         """
         assert self.other is not None
         deviation: Array = np.abs(self.played.angular_velocity - self.other.angular_velocity)
@@ -141,10 +143,10 @@ class View:
 
     @cached_property
     def momentum_deviation(self) -> Array:
-        """(k,) kg m/s between the momenta of the two, of the truth within the detection delay; nan
-        if not judged.
+        """(k,) kg m/s between the momenta of the two, with the detection delay allowed for if the
+        other is the truth; nan if not judged.
 
-        Beside an engine only those of the disks that are judged are added up.
+        Beside an engine the sum is over the judged disks only.
         """
         assert self.other is not None
         if self.jumps is not None:
@@ -157,14 +159,15 @@ class View:
 
     @cached_property
     def energy_range(self) -> tuple[Array, Array]:
-        """((k,), (k,)) J, between which the truth's energy is within the detection delay."""
+        """((k,), (k,)) J, the least and the largest energy that the truth allows within the
+        detection delay."""
         assert self.other is not None
         assert self.jumps is not None
         return energy_range(self.played, self.other, self.jumps, self.dt, self.scenario.scene)
 
     @cached_property
     def energy_deviation(self) -> Array:
-        """(k,) J that the engine has more than the other, as `momentum_deviation`."""
+        """(k,) J, energy of the engine minus that of the other, as in `momentum_deviation`."""
         assert self.other is not None
         if self.jumps is not None:
             energy, (low, high) = laws.energy(self.played, self.scenario.scene), self.energy_range
@@ -173,7 +176,7 @@ class View:
         return self._summed(next(energies) - next(energies))
 
     def _summed(self, difference: Array) -> Array:
-        """Over the judged disks of (k, n, ...); nan where none is."""
+        """The sum over the judged disks of (k, n, ...); nan where none is judged."""
         judged = self.judged.reshape(*self.judged.shape, *[1] * (difference.ndim - 2))
         return np.where(judged.any(axis=1), np.where(judged, difference, 0.0).sum(axis=1), np.nan)
 
@@ -188,8 +191,8 @@ class View:
         """(k,) False at samples within `WINDOW` dt of a collision of the other; sample 0 always
         counts.
 
-        For the error budget, which takes runs from each other: no metric, as in a crowd nothing but
-        the start is left.
+        Used by the error budget, which subtracts runs. Not for a metric: in a crowd only the start
+        would be left.
         """
         free = np.ones(len(self.played), bool)
         if self.other is not None and len(collisions := self.other.collisions.t):
@@ -202,9 +205,9 @@ class View:
 
     @cached_property
     def restitutions(self) -> Restitutions:
-        """What can be read off the samples; nothing under thrust.
+        """The restitution read off the samples; empty under thrust.
 
-        Slow collisions are left out under gravity, which is taken out of the samples to first order
+        Under gravity slow collisions are left out, because gravity is subtracted to first order
         only.
         """
         if self.scenario.thrusts:
@@ -215,19 +218,20 @@ class View:
 
     @cached_property
     def collisions(self) -> tuple[Collisions, Collisions]:
-        """Of the engine and of the other, by what a disk can tell apart (faces.py)."""
+        """The collisions of the engine and of the other, by what a disk can distinguish
+        (faces.py)."""
         assert self.other is not None
         return on_faces(self.played, self.scenario.scene), on_faces(self.other, self.scenario.scene)
 
     @property
     def end(self) -> float:
-        """s, of the samples both have."""
+        """s, the last common sample."""
         assert self.other is not None
         return float(min(self.played.t[-1], self.other.t[-1]))
 
     @cached_property
     def matched(self) -> Matched:
-        """The collisions of the two."""
+        """The collisions of the two, matched."""
         return match(*self.collisions, self.end, self.dt)
 
 
@@ -238,11 +242,11 @@ def beside(
     jumps: Jumps | None,
     silent: bool = False,
 ) -> View:
-    """What a run played beside `other`, over the samples both have; `silent`: that engine reports
-    no collisions."""
+    """The view of a run and `other` over their common samples; `silent`: that engine reports no
+    collisions."""
     assert run.trajectory is not None
     known = ENGINES | FETCHED
-    # a solver's file keeps float64
+    # the numbers of a solver's file are float64
     rounding = known[run.name].rounding if run.name in known else FLOAT64
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
     other = None if other is None else cut(other, k)

@@ -1,9 +1,8 @@
-"""How far a trajectory breaks the laws it should keep, sample by sample, relative to what is at
-hand.
+"""How far a trajectory breaks the laws of physics, sample by sample, relative to the scales of the
+scene.
 
-Each function returns (k,) numbers, or None where the law says nothing. Where the truth is what is
-compared with, it is the truth within the detection delay (delays.py), and samples that are not
-judged are nan.
+Each function returns (k,) numbers, or None where the law says nothing. A comparison with the truth
+allows for the detection delay (delays.py), and samples that are not judged are nan.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from scenarios.model import Array, Scenario, Thrust
 def momentum(view: View) -> Array | None:
     """|P(t) - P(0) - impulse from outside| over the sum of m|v| at hand (scales.py).
 
-    From outside come weight and world-frame thrust. Where walls, static disks or a turning thrust
-    act, nobody knows the impulse without asking the engine.
+    The outer impulse comes from weight and world-frame thrust. If walls, static disks or a turning
+    thrust act, only the engine knows the impulse: None.
     """
     if view.other is not None or not knows_impulses(view.scenario):
         return None
@@ -35,9 +34,9 @@ def angular_momentum(view: View) -> Array | None:
     """|L(t) - L(0) - angular impulse from outside| over the sum of m|x||v| + I|w| at hand, about
     the centre of mass.
 
-    About that of the start, so that it does not matter where the origin is. The weight of the
-    whole, at the centre of mass x0 + v0 t + g t2 / 2, turns it at a known rate. A thrust acts where
-    its disk is, which only the engine knows, and a wrap moves disks: there the law says nothing.
+    The centre of mass is that of the start, so that the origin does not matter. The total weight
+    acts at x0 + v0 t + g t2 / 2, so its torque is known. A thrust acts where its disk is, which
+    only the engine knows, and a wrap moves disks: there the law says nothing.
     """
     scene, played = view.scenario.scene, view.played
     silent = scene.wrap is not None or view.scenario.thrusts or not knows_impulses(view.scenario)
@@ -54,7 +53,7 @@ def angular_momentum(view: View) -> Array | None:
 def energy(view: View) -> Array | None:
     """|E(t) - E_expected(t)| over the energy at hand (scales.py).
 
-    At e = 1 without thrust E_expected is E(0); else it is the truth's. Where a scene wraps under
+    At e = 1 without thrust E_expected is E(0); else it is the truth's. If a scene wraps under
     gravity the law says nothing: a disk that is set onto the opposite edge has another height.
     """
     scenario, conserved = view.scenario, keeps_energy(view.scenario)
@@ -68,8 +67,7 @@ def energy(view: View) -> Array | None:
 
 
 def energy_rise(view: View) -> Array | None:
-    """E(t) less the smallest E before t, over the energy at hand: no collision can give any, only
-    thrust can."""
+    """E(t) minus the smallest E before t, over the energy at hand: only thrust can add energy."""
     if view.scenario.thrusts or lifts(view.scenario):
         return None
     actual = laws.energy(view.played, view.scenario.scene)
@@ -82,13 +80,13 @@ def lifts(scenario: Scenario) -> bool:
 
 
 def knows_impulses(scenario: Scenario) -> bool:
-    """Whether all that acts from outside is weight and world-frame thrust."""
+    """Whether weight and world-frame thrust are all that acts from outside."""
     fixed = len(scenario.scene.walls) or scenario.scene.static.any()
     return not fixed and all(thrust.frame == "world" for thrust in scenario.thrusts)
 
 
 def keeps_energy(scenario: Scenario) -> bool:
-    """Whether no collision and no friction takes energy and no thrust brings any."""
+    """Whether neither collisions nor friction nor thrust change the energy."""
     scene = scenario.scene
     return scene.restitution == 1 and not scene.friction and not scenario.thrusts
 

@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 
 from reports.compare.order import FINEST, NEARER
 from reports.compare.pareto import NEAR, front, kept_from
-from reports.compare.pooling import POOLED, UNSURE, WHO, middle_half, pooled, without
+from reports.compare.pooling import POOLED, UNSURE, WHO, middle_half, pooled, without_idle
 from reports.page import style
 from reports.page.charts import Drawing, broken_axis, decades, marked_break, shortened
 from reports.run.timing import Noise, noise_of
@@ -323,7 +323,9 @@ def light_marks(
 def bare(found: pd.DataFrame) -> Array:
     """µs per simulated second without the binding's part, of a scene or pooled."""
     cost = found.cost.to_numpy(float)
-    left = found.bare.to_numpy(float) if "bare" in found else without(cost, found.idle.to_numpy())
+    left = (
+        found.bare.to_numpy(float) if "bare" in found else without_idle(cost, found.idle.to_numpy())
+    )
     return np.where(np.isfinite(left), left, cost)
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from reports.compare.pareto import ACCURACIES, FAILED, front
-from reports.compare.pooling import without
+from reports.compare.pooling import without_idle
 from reports.page import style
 from reports.page.charts import ZERO, broken_axis, decades, marked_break, shortened, sized
 from reports.page.error_cost import light_marks
@@ -31,7 +31,11 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
     """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and
     then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
-    bare = drawn.bare if tall else pd.Series(without(drawn.cost.to_numpy(), drawn.idle.to_numpy()))
+    bare = (
+        drawn.bare
+        if tall
+        else pd.Series(without_idle(drawn.cost.to_numpy(), drawn.idle.to_numpy()))
+    )
     x_axis = log_axis(COST, np.append(drawn.cost.to_numpy(float), bare.dropna().to_numpy(float)))
     y_axis, floor = error_axis(drawn.error.to_numpy(float))
     traces = fronts(drawn, x_axis, y_axis, floor)
@@ -51,7 +55,7 @@ def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
         values = {"customdata": shortened(fine.error, 3)}  # what is saved as CSV
         height = lifted(fine.error, floor)
         cost = fine.cost.to_numpy(float)
-        left = fine.bare.to_numpy(float) if tall else without(cost, fine.idle.to_numpy(float))
+        left = fine.bare.to_numpy(float) if tall else without_idle(cost, fine.idle.to_numpy(float))
         if np.isfinite(left).all():
             traces.append(light_marks(engine, profile, cost, left, height.to_numpy(float)))
         traces.append(line(engine, profile, fine.cost, height, text, spreads | values))

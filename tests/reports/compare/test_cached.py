@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from reports.compare.laws import once
+from reports.compare.laws import cached
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 
@@ -20,7 +20,7 @@ def asked() -> list[tuple[Scene, Scene]]:
 
 def test_the_same_objects_are_asked_once_and_others_that_look_alike_again(asked: list):
     """Scenes are equal only to themselves: a copy is another scene."""
-    law = once(lambda one, other: asked.append((one, other)) or one.position + other.position)
+    law = cached(lambda one, other: asked.append((one, other)) or one.position + other.position)
     one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
     again = replace(other)
 
@@ -32,7 +32,7 @@ def test_the_same_objects_are_asked_once_and_others_that_look_alike_again(asked:
 
 def test_what_was_found_cannot_be_edited():
     """It is handed to everybody who asks."""
-    found = once(lambda scene: scene.position * 2)(scenario("near_miss").scene)
+    found = cached(lambda scene: scene.position * 2)(scenario("near_miss").scene)
 
     with pytest.raises(ValueError, match="read-only"):
         found[0] = 0.0
@@ -40,7 +40,7 @@ def test_what_was_found_cannot_be_edited():
 
 def test_what_was_found_is_forgotten_with_the_first_object():
     """And lets go of the others it was found for."""
-    law = once(lambda one, other: one.position + other.position)
+    law = cached(lambda one, other: one.position + other.position)
     one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
     law(one, other)
     kept = weakref.ref(other)
