@@ -67,7 +67,7 @@ def test_an_engine_against_itself_reads_one():
     """The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest
     is on time."""
     engines = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
-    best = summed_up(table(ladder.times_of("near_miss", 0, engines, 5, 1.0)), ["key"]).best
+    best = summed_up(table(ladder.times_of("near_miss", 0, engines, 15, 3.0)), ["key"]).best
 
     assert best[1] / best[0] == pytest.approx(1.0, abs=0.05)
 
