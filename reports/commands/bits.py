@@ -16,7 +16,7 @@ from adapters.engines import ENGINES, UNASKED, told_apart
 from reports.run.bits import (
     COLUMNS,
     KEPT,
-    Difference,
+    ChangedBits,
     about_of,
     bits_here,
     differences,
@@ -101,7 +101,7 @@ def play_all() -> list[dict[str, Any]]:
     return [rows[key] for key in tasks]
 
 
-def show(console: Console, found: list[Difference], counts: Counter[str]) -> None:
+def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> None:
     """A row an engine, and the first differences."""
     other = Counter(each.name for each in found)
     rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
@@ -113,7 +113,7 @@ def show(console: Console, found: list[Difference], counts: Counter[str]) -> Non
         console.print(f"and {counted(len(found) - SHOWN, 'more difference')}")
 
 
-def in_words(one: Difference) -> str:
+def in_words(one: ChangedBits) -> str:
     """Where the bits are others."""
     if one.other < 0:
         return f"{one.name} in {one.scenario}: it did not play to the same sample"

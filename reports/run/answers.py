@@ -1,5 +1,5 @@
-"""The exact answer to a scene, computed in a worker within a time limit, and kept in a file beside
-the scene tables that are compared with it."""
+"""The exact answer to a scene: computed in a worker within a time limit, and stored in a file
+beside the scene tables."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from scenarios.truth.record import TruthRecord
 OK, NONE = "ok", "none"
 # share of the time limit; computing the horizon takes up to three quarters as long as the events
 FOR_EVENTS = 0.5
-SAID = "answer.json"  # the member of an answer's file beside the arrays of its record
+SAID = "answer.json"  # the member of an .npz file that holds the rest of the `Answer`
 
 
 class Answer(NamedTuple):
-    """What is known of the right answer to a scene.
+    """What is known about the exact answer to a scene.
 
     Attributes:
-        record: of the oracle; None where a closed form answers, or nothing.
-        status: "ok"; "none", where the scene has no exact answer; "timeout", "crashed" or "error"
-            as of a `Failure`.
+        record: the oracle's record; None if there is a closed form, or no answer.
+        status: "ok"; "none" if the scene has no exact answer; "timeout", "crashed" or "error" as in
+            `Failure`.
         reason: why there is none, or "".
-        timeout_s: the limit under which it was computed.
+        timeout_s: the time limit of the computation.
     """
 
     record: TruthRecord | None
@@ -52,12 +52,12 @@ class Answer(NamedTuple):
         return "" if self.status in (OK, NONE) else self.reason
 
     def worth_another_try(self, timeout: float) -> bool:
-        """Whether it failed for another reason than time, or within a shorter limit than `timeout`
+        """Whether it failed for a reason other than time, or under a limit shorter than `timeout`
         s."""
         return bool(self.lost) and (self.status != "timeout" or self.timeout_s < timeout)
 
-    def given_to(self, scenario: Scenario) -> Scenario:
-        """The scenario with this as its truth, so that nobody computes it again."""
+    def put_into(self, scenario: Scenario) -> Scenario:
+        """The scenario with this as its truth, so that it is not computed again."""
         if self.status != OK:
             return replace(scenario, truth=None, without_truth=self.reason)
         return (
@@ -91,7 +91,7 @@ def no_answer(failure: Failure, timeout: float) -> Answer:
 
 
 def put_answer(path: Path, answer: Answer) -> None:
-    """Write an answer whole or not at all."""
+    """Write an answer atomically."""
     whole = io.BytesIO(b"" if answer.record is None else packed(vars(answer.record)))
     with ZipFile(whole, "a") as file:
         said = list(answer[1:])
@@ -100,14 +100,14 @@ def put_answer(path: Path, answer: Answer) -> None:
 
 
 def digest_of(file: ZipFile, name: str, said: list[Any]) -> str:
-    """16 hex digits over the members of an answer's file and over its name, which says of which
-    scene it is."""
+    """16 hex digits of a hash over the members of an answer's file and its name, which identifies
+    the scene."""
     inside = sorted(set(file.namelist()) - {SAID})
     return digest(b"\0".join([json.dumps([name, said, inside]).encode(), *map(file.read, inside)]))
 
 
 def read_answer(path: Path) -> Answer | None:
-    """What `put_answer` wrote; None if the file is not there or its digest is another."""
+    """What `put_answer` wrote; None if the file is missing or its digest differs."""
     try:
         with opened(path) as there, ZipFile(there) as file:
             *said, written = json.loads(file.read(SAID))
@@ -125,9 +125,10 @@ def read_answer(path: Path) -> Answer | None:
 
 
 def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
-    """The record of a scene by catalogue name or file, or why there is none; called in a worker.
+    """The record of a scene, given by catalogue name or file, or why there is none; called in a
+    worker.
 
-    The worker is stopped after `timeout` s. The record ends before, at the last event found.
+    The worker is stopped after `timeout` s; the record ends before that, at the last event found.
     """
     reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
@@ -137,7 +138,7 @@ def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
 
 
 def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
-    """The oracle's record, up to where the `clock` ends it, or the collisions of a closed form as a
+    """The oracle's record until the `clock` stops it, or the collisions of a closed form as a
     record. Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):
         record = scenario.truth.record(clock)

@@ -32,7 +32,7 @@ from reports.run.run_lines import KINDS
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 from scenarios.regular import all_of, opened
 
-# what a line is of -> its number, and the line
+# subject of a line -> its number, and the line
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]
 STATE = ("position", "velocity", "angle", "angular_velocity")
 COLLISIONS = {
@@ -45,21 +45,20 @@ COLLISIONS = {
 
 @dataclass(frozen=True)
 class Archive:
-    """The folder of one run, as read from its journal; of two lines about one thing the later
-    counts.
+    """The folder of one run, as read from its journal. If two lines are about the same thing, the
+    later one counts.
 
     Attributes:
         folder: where it is.
-        header: command, seed, machine, versions, and what was asked for.
+        header: command, seed, machine, versions, and the request.
         records: the lines of the cells that ended, `as_found`.
         conformance: `engine:profile` -> its line.
-        known_answers: the lines of the known answers that were made again.
-        checked: solver's file, `PATH:own` -> its line, what `crosscheck check` says of it.
-        timings: key of a cell -> 0, and 1 if it was timed twice -> the line of that timing.
-        beside: (what, `engine:profile`, scenario or "") -> s that it took, round by round, see
-            stepping.py.
-        seconds: that the run took, up to now; NaN if it is not complete.
-        complete: whether everything that was asked for has ended.
+        known_answers: the lines of the reproduced known answers.
+        checked: solver's file, `PATH:own` -> its line with the verdict of `crosscheck check`.
+        timings: key of a cell -> number of the timing (0; also 1 if timed twice) -> its line.
+        beside: (what, `engine:profile`, scenario or "") -> s in each round, see stepping.py.
+        seconds: duration of the run; NaN if it is not complete.
+        complete: whether everything requested has ended.
     """
 
     folder: Path
@@ -99,7 +98,7 @@ class Archive:
         if not header:
             raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
         for number, record in last["cell"].values():
-            if fault := stranger(record, header):
+            if fault := foreign_cell(record, header):
                 raise ValueError(no_use(folder, number, fault, KINDS.missed))
         records, conformance, known, checked = (
             [line for _, line in last[kind].values()] for kind in last
@@ -121,12 +120,12 @@ class Archive:
 
 
 def what_of(record: dict[str, Any]) -> tuple[Any, ...]:
-    """What the line of a cell is of."""
+    """What identifies the cell of a line."""
     return tuple(record[name] for name in ("scene", "seed", "engine", "profile", "substeps"))
 
 
-def stranger(record: dict[str, Any], header: dict[str, Any]) -> str:
-    """Why the line of a cell is none of its run; "" if it is."""
+def foreign_cell(record: dict[str, Any], header: dict[str, Any]) -> str:
+    """Why the line of a cell does not belong to its run; "" if it does."""
     name = f"{record['engine']}:{record['profile']}"
     if record["scene"] not in header["scenes"]:
         return f"scene = {record['scene']!r}: must be one of the scenes of the header"
@@ -143,7 +142,7 @@ def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
     """The line of a cell with the key `damage`: why its trajectory cannot be used, or "". A damaged
     cell that was played has the status "error".
 
-    The digest of a file is computed once, until the file changes.
+    The digest of a file is computed again only if the file changes.
     """
     path = trajectory_file(folder, record["cell"])
     why = f"{path.name} was never written" if record["status"] == "ok" else ""
@@ -169,12 +168,12 @@ def digest(data: bytes) -> str:
 
 @cache
 def digest_of_file(path: Path, *_: int) -> str:
-    """The same of a file that is there, once for every inode, size and time of change."""
+    """The digest of an existing file, cached by inode, size and time of change."""
     return digest(all_of(path))
 
 
 def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
-    """The run behind a line, its trajectory read back if it has one and it is wanted."""
+    """The run of a line, with its trajectory if it has one and `with_trajectory` is set."""
     record = as_found(folder, record)
     trajectory = stored_trajectory(folder, record) if with_trajectory else None
     return Run(
@@ -192,25 +191,25 @@ def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -
 
 
 def stored_trajectory(folder: Path, record: dict[str, Any]) -> Trajectory | None:
-    """The stored samples of a cell, from its line `as_found`; None if there is no file, or if it is
+    """The stored samples of a cell, given its line from `as_found`; None if the file is missing or
     damaged."""
     whole = record["file"] and not record["damage"]
     return load_trajectory(trajectory_file(folder, record["cell"])) if whole else None
 
 
 def trajectory_file(folder: Path, key: str) -> Path:
-    """Where the trajectory of the cell of that key is."""
+    """The path of the trajectory of the cell with this key."""
     return folder / "trajectories" / f"{key}.npz"
 
 
 def stored_scene(folder: Path, name: str) -> Path:
-    """Where the copy of the scene file of that name is."""
+    """The path of the copy of the scene file with this name."""
     return folder / "scenes" / f"{name}.toml"
 
 
 def packed(trajectory: Trajectory, small: bool = False) -> bytes:
-    """An .npz with the arrays of `Trajectory`; its collisions as collision_t, _i, _j, _impulse. A
-    small one takes longer."""
+    """An .npz with the arrays of `Trajectory`; its collisions as collision_t, _i, _j, _impulse.
+    `small` compresses it, which is slower."""
     arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
     collisions = {key: getattr(trajectory.collisions, name) for name, key in COLLISIONS.items()}
     file = io.BytesIO()
@@ -219,7 +218,7 @@ def packed(trajectory: Trajectory, small: bool = False) -> bytes:
 
 
 def load_trajectory(file: Path | BinaryIO) -> Trajectory:
-    """What `packed` put into a file."""
+    """The trajectory that `packed` wrote."""
     with (
         nullcontext(file) if not isinstance(file, Path) else opened(file) as there,
         np.load(there) as saved,
@@ -235,13 +234,13 @@ def load_trajectory(file: Path | BinaryIO) -> Trajectory:
 
 
 def parts_of(state: State) -> list[np.ndarray]:
-    """The arrays of a state, as a trail holds them."""
+    """The arrays of a state as bytes of a trail."""
     return [np.ascontiguousarray(getattr(state, name), np.float64) for name in STATE]
 
 
 def from_trail(trail: bytes, scenario: Scenario) -> Trajectory | None:
-    """The samples whose `parts_of` a trail holds, without collisions; None if it holds not even the
-    start."""
+    """The samples whose `parts_of` a trail holds, without collisions; None if the trail lacks even
+    the start."""
     n = scenario.scene.n
     k = len(trail) // (6 * n * 8)
     if not k:

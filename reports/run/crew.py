@@ -1,4 +1,4 @@
-"""The workers of this process: started when a task comes, replaced when they have died."""
+"""The workers of this process: each is started for its first task and replaced if it dies."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ from reports.run.portable_worker import PortableWorker
 from reports.run.worker import Worker
 from reports.run.worker_process import Failure
 
-ATTEMPTS = 3  # at a task whose worker was killed from outside
+ATTEMPTS = 3  # of a task whose worker is killed from outside
 
 
 def new_worker(memory: int, show: bool = False) -> Worker:
-    """A worker as this system can have it; see `Worker`."""
+    """A worker of the kind that this operating system supports; see `Worker`."""
     if system.KERNEL:
         return Worker(memory, show)
     return PortableWorker(memory, show)
 
 
 class Crew:
-    """The workers of this process, one for each thread: started when a task comes, replaced when it
-    has died."""
+    """The workers of this process, one for each thread."""
 
     def __init__(self) -> None:
         self.mine = threading.local()
@@ -35,7 +34,7 @@ class Crew:
         """The living worker of this thread."""
         worker: Worker | None = getattr(self.mine, "worker", None)
         if worker is None or worker.memory != memory or worker.process.poll() is not None:
-            self.let_go()
+            self.kill_current()
             with self.lock:
                 if self.dismissed:
                     raise InterruptedError("the run is over")
@@ -43,7 +42,7 @@ class Crew:
                 self.all.add(worker)
         return worker
 
-    def let_go(self) -> None:
+    def kill_current(self) -> None:
         """Kill the worker of this thread, if there is one."""
         worker = self.mine.__dict__.pop("worker", None)
         if worker is not None:
@@ -64,22 +63,22 @@ CREW = Crew()
 
 
 def in_worker(task: Callable[[], Any], timeout: float, memory: int, alone: bool) -> bytes | Failure:
-    """Carry out a task in the worker of this thread: its result, pickled, or how it failed.
+    """Carry out a task in the worker of this thread; returns the pickled result, or how it failed.
 
-    `alone`: in a process of its own, which carries out no other task. If a worker is killed from
-    outside (out of memory, `kill -9`), which is no fault of the task, the task is tried again.
+    `alone`: use a new process for this task only. If a worker is killed from
+    outside (out of memory, `kill -9`), the task is tried again, because the task did not fail.
     """
     for _ in range(ATTEMPTS):
         if alone:
-            CREW.let_go()
+            CREW.kill_current()
         worker = CREW.worker(memory)
         try:
             outcome = worker.do(task, timeout)
-        except BaseException:  # an unread answer would be taken for that of the next task
-            CREW.let_go()
+        except BaseException:  # an unread answer would be mistaken for that of the next task
+            CREW.kill_current()
             raise
         if alone or isinstance(outcome, Failure):
-            CREW.let_go()
+            CREW.kill_current()
         if outcome is not None:
             return outcome
         if worker.stopped:

@@ -1,4 +1,4 @@
-"""The differences between two runs: how cells ended, their numbers, how long they took."""
+"""The differences between two runs: statuses of cells, numbers, times."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Timing(NamedTuple):
     Attributes:
         engine: `engine:profile`.
         factor: median over the cells of the least time after : before.
-        low, high: where the median of the `n` ratios lies, round by round.
+        low, high: the interval of the median of the `n` ratios, taken round by round.
     """
 
     engine: str
@@ -77,10 +77,10 @@ class Difference:
     """All differences between two runs.
 
     Attributes:
-        warnings: why the two may differ for other reasons than their engines.
+        warnings: reasons other than the engines why the two may differ.
         statuses, numbers: what changed.
-        same: `engine:profile` -> how many numbers are the same, bit for bit.
-        timings: of the engines that were timed in both, if the machine is the same.
+        same: `engine:profile` -> number of values that are equal bit for bit.
+        timings: of the engines timed in both runs, if the machine is the same.
     """
 
     warnings: list[str]
@@ -102,7 +102,7 @@ def difference(before: Path, after: Path) -> Difference:
     """Compare the runs in two folders.
 
     Raises:
-        ValueError: naming the folder that cannot be used, and what to do.
+        ValueError: a folder cannot be used; says which and what to do.
     """
     one, other = Archive.read(before), Archive.read(after)
     warnings, like = warnings_of(one, other)
@@ -123,7 +123,7 @@ def difference(before: Path, after: Path) -> Difference:
 
 
 def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
-    """What differs of machines, versions and completeness; and whether the machine is the same."""
+    """Warnings about machines, versions and completeness; and whether the machine is the same."""
     before, after = one.header, other.header
     said = [
         f"machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
@@ -167,7 +167,7 @@ def equal_keys(before: Cells, after: Cells) -> set[Name]:
 
 
 def changed_statuses(before: Cells, after: Cells) -> list[Change]:
-    """The cells that ended differently; a cell that was not played again is worse, too."""
+    """The cells that ended differently. A cell that was not played again also counts as worse."""
     changes = []
     for name, record in before.items():
         scenario, engine, dt = name
@@ -187,8 +187,7 @@ def changed_statuses(before: Cells, after: Cells) -> list[Change]:
 def changed_judgement(
     before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name]
 ) -> list[Change]:
-    """The cells that `both` runs played and only one of them judged, so that only one has
-    numbers."""
+    """The cells that `both` runs played but only one judged, so that only that one has numbers."""
     was, now = reasons(before), reasons(after)
     changes = []
     for cell, versus in sorted(was.keys() ^ now.keys()):
@@ -203,7 +202,7 @@ def changed_judgement(
 
 
 def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
-    """((scenario, `engine:profile`, dt in s), against what) -> why it is not judged."""
+    """((scenario, `engine:profile`, dt in s), `versus`) -> why it is not judged."""
     rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict(
         "records"
     )
@@ -216,8 +215,8 @@ def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
 
 
 def table_of(folder: Path) -> pd.DataFrame:
-    """deviations.csv as text, in which equal text means equal bits; raises `ValueError` if the file
-    was changed."""
+    """deviations.csv with all values as text: equal text means equal bits. Raises `ValueError` if
+    the file was changed."""
     path = folder / "deviations.csv"
     try:
         same, table = is_sealed(folder), pd.read_csv(path, dtype=str, keep_default_na=False)
@@ -234,11 +233,11 @@ def table_of(folder: Path) -> pd.DataFrame:
 def changed_numbers(
     before: pd.DataFrame, after: pd.DataFrame, equal: set[Name]
 ) -> tuple[list[Change], Counter[str]]:
-    """Every number that both tables have and that is not the same, and how many are, by engine.
+    """Every number that differs between the tables, and how many are equal, by engine.
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
-    says what is better; the deviation of two engines is neither, and so is a number that is judged
-    in one of the two only.
+    says which value is better. A deviation between two engines, or a number that only one run
+    judges, is "other".
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile
@@ -266,7 +265,7 @@ def changed_numbers(
 
 
 def said_of(value: str, note: str) -> str:
-    """A number as the table has it, or that it is not judged."""
+    """A number as in the table, or "not judged"."""
     return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
 
 
@@ -276,7 +275,7 @@ def engines_of(row: Mapping[Hashable, Any]) -> list[str]:
 
 
 def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
-    """Whether a number of an engine got better, by the row of the metric."""
+    """Whether a number got better or worse, by the row of its metric."""
     better = METRICS[metric].better if metric in METRICS else ""
     if ":" in versus or better in ("", "as stated"):
         return "other"
@@ -287,7 +286,7 @@ def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
 
 
 def ratio(was: float, now: float) -> float:
-    """The factor by which a number grew or shrank, 1 or more; `inf` where it is undefined."""
+    """The factor, 1 or more, by which a number grew or shrank; `inf` where it is undefined."""
     small, large = sorted((abs(was), abs(now)))
     return large / small if small > 0 and math.isfinite(large) else math.inf
 

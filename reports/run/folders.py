@@ -1,4 +1,4 @@
-"""The folder of a run: OUT.part while the run lasts, which replaces OUT when it is complete."""
+"""The folder of a run: OUT.part during the run; it replaces OUT when the run is complete."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from reports.run.made import (
     MADE,
     Kind,
     Made,
+    foreign_file_in,
     may_replace,
     may_write,
     put_made,
     read_made,
-    stranger_in,
 )
 from reports.terminal.counts import counted
 from reports.terminal.exits import FolderTaken, unbroken
@@ -32,15 +32,15 @@ RUN = Kind(
 
 
 def part_of(out: Path) -> Path:
-    """The folder in which a run into `out` is written while it lasts."""
+    """The folder into which a run with `--out OUT` writes until it is complete."""
     return out.parent / f"{out.name}.part"
 
 
 def place_of(out: Path, option: str = "--out") -> Path:
-    """The folder that `out` names, links followed.
+    """The folder that `out` names, with links resolved.
 
     Raises:
-        FolderTaken: `out` is a link to nothing, unless an interrupted command has left it so.
+        FolderTaken: `out` is a dangling link that no interrupted command left.
         OSError: the current folder is gone.
     """
     # Path.resolve raises RuntimeError, not OSError, for a link to itself
@@ -63,8 +63,7 @@ def open_part(out: Path, kind: Kind) -> Journal:
 
 
 def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise as `may_write`, and also if `part` holds a finished result that merely has such a
-    name."""
+    """Raise as `may_write`, and also if `part` holds a finished result."""
     may_write(part, kind, option)
     if not is_interrupted(part, out):
         raise FolderTaken(
@@ -74,18 +73,18 @@ def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> Non
 
 
 def is_interrupted(part: Path, out: Path) -> bool:
-    """Whether `part` holds an unfinished `out`, not a finished result of `--out OUT.part`.
+    """Whether `part` holds an unfinished `out`, and not a finished result of `--out OUT.part`.
 
-    A command that was killed after its last result, before `part` replaced `out`, counts as
-    unfinished: its record still names `out`.
+    A command killed after its last result, but before `part` replaced `out`, is unfinished: its
+    record still names `out`.
     """
     made = read_made(part)
     return made is None or not made.finished or made.out == out.name
 
 
 def begun(part: Path, kind: Kind, out: Path) -> None:
-    """Record in `part` that this program makes it, that it will be `out`, and that it is not
-    finished; other records stay."""
+    """Record in `part` which command makes it, that it will replace `out`, and that it is not
+    finished. Other records stay."""
     made = read_made(part) or Made(kind.command, False, {})
     if (anew := made._replace(finished=False, out=out.name)) != made or not (part / MADE).exists():
         put_made(part, anew)
@@ -93,7 +92,7 @@ def begun(part: Path, kind: Kind, out: Path) -> None:
 
 @contextmanager
 def given_back(journal: Journal) -> Iterator[None]:
-    """Close the journal unchanged if the block fails."""
+    """Context that closes the journal unchanged if the block fails."""
     try:
         yield
     except BaseException:
@@ -124,7 +123,7 @@ def ended_in(journal: Journal) -> int:
     try:
         return len(Archive.read(part).records)
     except ValueError as fault:
-        if len(journal.path.read_bytes().splitlines()) <= 1:  # nothing, or a header
+        if len(journal.path.read_bytes().splitlines()) <= 1:  # no line, or only a header
             return 0
         raise FolderTaken(
             f"{part} holds something that cannot be continued as a run ({fault}); name another"
@@ -133,8 +132,8 @@ def ended_in(journal: Journal) -> int:
 
 
 def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
-    """Raise `FolderTaken` where `had` results of an interrupted command would be lost: not asked
-    for, or none fits."""
+    """Raise `FolderTaken` if `had` results of an interrupted command would be lost: without
+    --resume, or if none fits."""
     holds = f"{part} holds {had} results of an interrupted run"
     if had and not resume:
         raise FolderTaken(
@@ -149,11 +148,10 @@ def may_go_on(part: Path, had: int, fits: bool, resume: bool) -> None:
 
 
 def open_again(out: Path) -> Journal:
-    """Open the journal of a run into `out` that is to be completed, and lock it; nothing is moved
-    yet.
+    """Open and lock the journal of a run into `out`, to complete the run; nothing is moved yet.
 
     Raises:
-        FolderTaken: no run is there, another process writes it, or other files are there.
+        FolderTaken: there is no run, another process writes to it, or the folder holds other files.
         OSError: the journal cannot be opened.
     """
     part = part_of(out)
@@ -169,8 +167,8 @@ def open_again(out: Path) -> Journal:
 
 
 def reopened(journal: Journal, out: Path) -> None:
-    """Rename a finished run to OUT.part, so that it can be completed; raises `FolderTaken` if
-    another process locks the journal, which is closed for that moment."""
+    """Rename a finished run to OUT.part, so that it can be completed. The journal is closed
+    meanwhile; raises `FolderTaken` if another process locks it then."""
     part = part_of(out)
     if journal.path.parent == out:
         with unbroken():
@@ -184,7 +182,8 @@ def reopened(journal: Journal, out: Path) -> None:
 
 
 def held(folder: Path, out: Path) -> Journal:
-    """Open the journal of a folder and lock it; raises `FolderTaken` if another process has it."""
+    """Open and lock the journal of a folder; raises `FolderTaken` if another process holds the
+    lock."""
     try:
         return Journal(folder)
     except Busy:
@@ -194,8 +193,8 @@ def held(folder: Path, out: Path) -> Journal:
 
 
 def found(out: Path) -> Path:
-    """The folder of a run into `out`: OUT, or OUT.part while the run lasts; raises `FolderTaken` if
-    there is none."""
+    """The folder of a run into `out`: OUT, or OUT.part if the run is not complete. Raises
+    `FolderTaken` if there is none."""
     part = part_of(out)
     if (out / JOURNAL).is_file():
         return out
@@ -205,10 +204,10 @@ def found(out: Path) -> Path:
 
 
 def replace_folder(made: Path, target: Path, kind: Kind) -> None:
-    """Replace `target` by the finished folder `made`; `target` is kept aside until that is done.
+    """Replace `target` by the finished folder `made`; the old `target` is kept until that is done.
 
     Raises:
-        FolderTaken: `target` holds something that the command did not make; both folders stay.
+        FolderTaken: `target` holds files that the command did not make; both folders stay.
         OSError: the folder cannot be moved; `target` stays.
     """
     may_replace(target, kind)
@@ -237,8 +236,8 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
 
 @contextmanager
 def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
-    """Make a folder beside `target` to write into, which replaces `target` at the end of the block,
-    and is deleted if the block fails.
+    """Context that makes a folder beside `target`. The folder replaces `target` at the end of the
+    block, or is deleted if the block fails.
 
     Raises:
         FolderTaken: as `may_replace`, before and after the block.
@@ -260,6 +259,6 @@ def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
 
 
 def discard(part: Path, kind: Kind) -> None:
-    """Delete a folder that is of no use any more, unless it holds something not of this program."""
-    if not stranger_in(part, kind):
+    """Delete an unneeded folder, unless it holds files of another origin."""
+    if not foreign_file_in(part, kind):
         shutil.rmtree(part)

@@ -1,5 +1,5 @@
-"""The journal of a run: a line of JSON for everything that ends, written by one process at a time,
-read by any."""
+"""The journal of a run: a line of JSON for each task that ends. One process at a time writes it;
+any process may read it."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ class Busy(Exception):
 class Journal:
     """The journal of a folder, open for writing and locked against every other writer.
 
-    The lock is the system's and ends with the process that holds it, however it ends: none is ever
-    stale.
+    The operating system releases the lock when the process ends, however it ends, so no lock is
+    ever stale.
     """
 
     def __init__(self, folder: Path) -> None:
-        """Open or make it; a last line that was torn is cut off. Raises `Busy`, or `OSError` if it
-        cannot be had."""
+        """Open or create it; an incomplete last line is cut off. Raises `Busy`, or `OSError` if it
+        cannot be opened."""
         self.open_in(folder)
 
     def open_in(self, folder: Path) -> None:
-        """Open it in a folder; raises as the journal itself."""
+        """Open it in a folder; raises as `__init__`."""
         self.path = folder / JOURNAL
         self.file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | BINARY, 0o644)
         try:
@@ -47,7 +47,7 @@ class Journal:
             )
         except BlockingIOError:
             moved = True
-        if moved:  # by the one who held the lock, when it was done
+        if moved:  # by the process that held the lock, when it had finished
             self.close()
             raise Busy
         whole = self.path.read_bytes()
@@ -60,14 +60,14 @@ class Journal:
         self.close()
 
     def close(self) -> None:
-        """Close it, if it is open: Windows moves no folder in which a file is open."""
+        """Close it if it is open: Windows cannot move a folder that contains an open file."""
         if self.file != CLOSED:
             os.close(self.file)
             self.file = CLOSED
 
     def append(self, line: dict[str, Any]) -> None:
-        """Add a line, and hand it to the system; raises `OSError` and leaves no part of it if that
-        cannot be done."""
+        """Append a line and flush it. If that fails, raises `OSError` and leaves no part of the
+        line."""
         text = (json.dumps(plain(line), allow_nan=False) + "\n").encode()
         before = os.fstat(self.file).st_size
         try:
@@ -80,16 +80,16 @@ class Journal:
 
 
 def lines_of(folder: Path, missed: str = "delete that line") -> Iterator[Any]:
-    """The lines of a folder's journal; a last line that was torn is left out.
+    """The lines of a folder's journal without an incomplete last line.
 
     Raises:
-        ValueError: naming another line that is no JSON, and what to do about what is `missed`.
+        ValueError: another line is not JSON; names it, and adds `missed`, which says what to do.
     """
     with opened(folder / JOURNAL) as journal:
         for number, line in enumerate(journal, start=1):
             try:
-                yield json.loads(line.decode())  # for null bytes are taken for UTF-32 else
-            except (ValueError, RecursionError) as error:  # of brackets in brackets in brackets
+                yield json.loads(line.decode())  # because null bytes would be read as UTF-32
+            except (ValueError, RecursionError) as error:  # raised by deeply nested brackets
                 if line.endswith(b"\n"):
                     raise ValueError(
                         f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {missed}"
@@ -97,8 +97,8 @@ def lines_of(folder: Path, missed: str = "delete that line") -> Iterator[Any]:
 
 
 def plain(value: Any) -> Any:
-    """The value as strict JSON can hold it: numpy scalars as Python's, numbers that are not finite
-    as text."""
+    """The value in a form that strict JSON can hold: numpy scalars as Python's, numbers that are
+    not finite as text."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -111,7 +111,7 @@ def plain(value: Any) -> Any:
 
 
 def numbers(value: Any) -> Any:
-    """The inverse of `plain`: "nan", "inf" and "-inf" as numbers again, however deep they are."""
+    """The inverse of `plain`: "nan", "inf" and "-inf" become numbers again, at any depth."""
     if isinstance(value, dict):
         return {key: numbers(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,5 +1,5 @@
-"""What a journal's lines are read by: a table of their kinds, each a model, and in a sentence what
-does not fit."""
+"""Checks the lines of a journal against a table of models, one for each kind, and says in a
+sentence what does not fit."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pydantic_core import ErrorDetails
 
 from reports.run.journal import JOURNAL, lines_of
 
-NOT_FINITE = ("nan", "inf", "-inf")  # as `plain` of journal.py writes them
-SHOWN = 60  # characters of a value that does not fit
+NOT_FINITE = ("nan", "inf", "-inf")  # as written by `plain` of journal.py
+SHOWN = 60  # characters of a wrong value that a message shows
 
 
 def path(text: str) -> str:
@@ -33,7 +33,7 @@ def engine_profile(text: str) -> str:
 
 
 def engine(text: str) -> str:
-    """What stands before the colon; raises `ValueError`."""
+    """The part before the colon; raises `ValueError`."""
     return engine_profile(f"{text}:any").removesuffix(":any")
 
 
@@ -73,7 +73,7 @@ File = Annotated[Words, AfterValidator(path)]
 EngineProfile = Annotated[Words, AfterValidator(engine_profile)]
 Engine = Annotated[Words, AfterValidator(engine)]
 Profile = Annotated[str, Field(pattern=r"\A[A-Za-z0-9_.-]{1,100}\z")]
-# it becomes the name of a file
+# because it becomes a file name
 Name = Annotated[str, Field(pattern=r"\A[a-z0-9][a-z0-9_-]{0,99}\z")]
 Digest = Annotated[str, Field(pattern=r"\A[0-9a-f]{16}\z")]
 Number = Annotated[Any, AfterValidator(number)]
@@ -86,8 +86,7 @@ Step = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Line(BaseModel):
-    """What all lines have in common: types are as they are written; of fields that are not named
-    nothing is asked."""
+    """The base of all lines: types are strict, unknown fields are allowed."""
 
     model_config = ConfigDict(strict=True)
 
@@ -102,12 +101,12 @@ class Machine(Line):
 
 
 class Kinds(NamedTuple):
-    """The lines that a journal may have.
+    """The kinds of lines that a journal may have.
 
     Attributes:
-        models: the key by which a line of a kind is known -> its model.
-        missed: what to do about a line that cannot be used.
-        asked: what to do about a header that cannot.
+        models: the key that identifies a kind -> its model.
+        missed: what the user can do about an unusable line.
+        asked: what the user can do about an unusable header.
     """
 
     models: Mapping[str, type[Line]]
@@ -119,8 +118,8 @@ def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[s
     """Number, kind and line, for each line of a folder's journal.
 
     Raises:
-        ValueError: naming a line that is no JSON, or does not fit, key and value, what is allowed,
-            and what to do.
+        ValueError: a line is not JSON or does not fit; names line, key, value, what is allowed and
+            what to do.
     """
     for number, line in enumerate(lines_of(folder, kinds.missed), 1):
         try:
@@ -134,13 +133,13 @@ def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[s
 
 
 def no_use(folder: Path, number: int, fault: str, remedy: str) -> str:
-    """A sentence on a line that cannot be used, and what to do."""
+    """A sentence on an unusable line, and what to do."""
     return f"{folder / JOURNAL}: line {number}: {fault}; {remedy}"
 
 
 def kind_of(line: Any, models: Mapping[str, type[Line]]) -> str:
-    """Which of the kinds a line is; raises `ValueError`, as the end of a sentence, if it is none or
-    does not fit."""
+    """The kind of a line; raises `ValueError`, with the end of a sentence, if it has none or does
+    not fit."""
     kinds = [kind for kind in models if kind in line] if isinstance(line, dict) else []
     if len(kinds) != 1:
         raise ValueError(f"must be one of {', '.join(models)}")
@@ -152,7 +151,7 @@ def kind_of(line: Any, models: Mapping[str, type[Line]]) -> str:
 
 
 def sentence(fault: ErrorDetails) -> str:
-    """What pydantic found, as `KEY = VALUE: what is allowed`."""
+    """The first fault that pydantic found, as `KEY = VALUE: what is allowed`."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])[1:]
     if fault["type"] == "missing":
         return f"{key}: missing"

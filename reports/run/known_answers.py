@@ -1,5 +1,5 @@
-"""Known answers from outside: SimBenchmark's published bouncing test, made again by adapters and by
-six lines."""
+"""Published results as known answers: SimBenchmark's bouncing test, reproduced by adapters and by
+six lines of Python."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from adapters.engines import ENGINES
 from scenarios.families.placing import lay_out
 
-KNOWN_SCENE = "simbenchmark_bouncing"  # whose run brings this table along
+KNOWN_SCENE = "simbenchmark_bouncing"  # a run of this scenario makes this table
 DISKS, MASS, RADIUS, HEIGHT, GRAVITY, DURATION = 49, 10.0, 0.1, 5.0, 9.81, 20.0
 ENERGY = DISKS * MASS * GRAVITY * HEIGHT  # 24034.5 J
 
@@ -24,7 +24,7 @@ class KnownAnswer:
         column: the engine of the published column.
         dt_s: s.
         published_J2: J2, six digits.
-        made_by: what makes it here: a key of `ENGINES`, or `SIX_LINES`.
+        made_by: what reproduces it: a key of `ENGINES`, or `SIX_LINES`.
         source: where it was published.
     """
 
@@ -35,7 +35,7 @@ class KnownAnswer:
     source: str = "leggedrobotics/SimBenchmark, data/bouncing/sample.csv"
 
     def reproduce(self) -> float:
-        """J2, played here."""
+        """J2, computed here."""
         if self.made_by in SIX_LINES:
             return six_lines(self.dt_s, SIX_LINES[self.made_by])
         return mean_squared_error_of(self.made_by, self.dt_s)
@@ -65,8 +65,8 @@ MEANING = (
 
 
 def mean_squared_error_of(name: str, dt: float) -> float:
-    """J2 from one disk of an engine times 49: the disks never meet. E is taken before each step, as
-    published."""
+    """J2, from one disk of an engine times 49, because the disks never meet. E is taken before each
+    step, as in the publication."""
     scene = lay_out(
         position=[[0.0, HEIGHT]],
         velocity=[[0.0, 0.0]],
@@ -88,11 +88,11 @@ def mean_squared_error_of(name: str, dt: float) -> float:
 
 
 def six_lines(dt: float, falls_when_it_reflects: bool) -> float:
-    """J2 of a ball that moves by v dt, and in a step that finds it in the floor, coming in, is
-    reflected.
+    """J2 of a ball that moves by v dt and is reflected in a step that finds it in the floor and
+    approaching.
 
-    Such a step lets the ball fall first (Bullet), or not at all (ODE, pymunk: the solver aims at e
-    times the velocity before gravity, so that its impulse takes the step's gravity out again).
+    Such a step applies gravity first (Bullet), or not at all (ODE, pymunk: the solver aims at e
+    times the velocity before gravity, so that its impulse cancels the gravity of the step).
     """
     steps = round(DURATION / dt)
     ys, vs = np.empty(steps), np.empty(steps)

@@ -36,8 +36,8 @@ def about(command: str, seed: int) -> dict[str, Any]:
 
 
 def busy_cores(seconds: float = 0.5) -> float:
-    """How many cores others keep busy while this process sleeps so long; nan where the system does
-    not tell."""
+    """Number of cores that other processes keep busy while this one sleeps for `seconds`; nan if
+    the system does not report it."""
     try:
         share = psutil.cpu_percent(seconds) / 100
     except (OSError, ValueError):

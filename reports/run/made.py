@@ -1,8 +1,9 @@
-"""The record of what a command wrote into a folder, so that no other file is ever replaced.
+"""The record of the files that a command wrote into a folder, so that no other file is ever
+replaced.
 
 A folder that a command makes holds `made.json`: the command, whether it has finished, and for each
-file the SHA-256 of what was written, or null while it is being written. Files whose names only this
-program uses are not recorded. Anything else in the folder, or in a folder inside it, is foreign.
+file the SHA-256 of what was written, or null while it is being written. Files with names that only
+this program uses are not recorded. Every other file in the folder or below it is foreign.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from reports.terminal.exits import FolderTaken
 from reports.terminal.foreign_text import encoded, is_part, put_text
 
 MADE = "made.json"
-HEAD = 4096  # bytes at the beginning of a file among which its mark is
+HEAD = 4096  # bytes at the start of a file in which its mark is searched
 
 
 class Kind(NamedTuple):
@@ -40,7 +41,7 @@ class Kind(NamedTuple):
     folders: tuple[str, ...] = ()
 
     def names(self, path: str) -> bool:
-        """Whether a file with this relative path is known by its name alone."""
+        """Whether the name alone of a file with this relative path shows that it is ours."""
         return re.fullmatch(self.named, path) is not None
 
 
@@ -48,10 +49,9 @@ class Made(NamedTuple):
     """made.json.
 
     Attributes:
-        command: that made the folder.
-        finished: whether all that it makes is there.
+        command: that made the folder. finished: whether the command has written everything.
         files: path -> SHA-256, None while it is written.
-        out: name of the folder whose place this one is to take; "" once it has.
+        out: name of the folder that this one will replace; "" once it has.
     """
 
     command: str
@@ -61,7 +61,7 @@ class Made(NamedTuple):
 
 
 def read_made(folder: Path) -> Made | None:
-    """The record of a folder; None if it has none that can be used."""
+    """The record of a folder; None if there is no usable one."""
     path = folder / MADE
     try:
         if not stat.S_ISREG(path.lstat().st_mode):
@@ -72,7 +72,7 @@ def read_made(folder: Path) -> Made | None:
         ValueError,
         TypeError,
         RecursionError,
-    ):  # the last of brackets in brackets in brackets
+    ):  # the last is raised by deeply nested brackets
         return None
     types = {"command": str, "finished": bool, "files": dict, "out": str}
     return (
@@ -81,16 +81,16 @@ def read_made(folder: Path) -> Made | None:
 
 
 def put_made(folder: Path, made: Made) -> None:
-    """Write the record of a folder, whole or not at all."""
+    """Write the record of a folder atomically."""
     put_text(folder / MADE, json.dumps(made._asdict(), indent=1) + "\n")
 
 
-def stranger_in(folder: Path, kind: Kind) -> str:
+def foreign_file_in(folder: Path, kind: Kind) -> str:
     """What in a folder the command did not make, as the rest of a sentence; "" if there is nothing
-    of the kind.
+    foreign.
 
     Raises:
-        OSError: what cannot be looked into.
+        OSError: something cannot be read.
     """
     made = read_made(folder)
     if made is None:
@@ -113,15 +113,14 @@ def stranger_in(folder: Path, kind: Kind) -> str:
 
 
 def is_begun(path: Path) -> bool:
-    """Whether it is the journal of which not a line is written yet, all that is there before the
-    record."""
+    """Whether it is an empty journal, which is created before the record."""
     about = path.lstat()
     return path.name == JOURNAL and stat.S_ISREG(about.st_mode) and not about.st_size
 
 
 def files_below(folder: Path, folders: Sequence[str]) -> Iterator[Path]:
-    """All that is in a folder but `folders`, and in those, in order of their names; no link is
-    followed."""
+    """All entries of a folder except `folders`, and all entries of those, sorted by name; links are
+    not followed."""
     for path in sorted(folder.iterdir()):
         if path.name in folders and stat.S_ISDIR(path.lstat().st_mode):
             yield from files_below(path, ())
@@ -130,12 +129,12 @@ def files_below(folder: Path, folders: Sequence[str]) -> Iterator[Path]:
 
 
 def as_written(path: Path, digest: str | None) -> bool:
-    """Whether a file has the bytes that were recorded, if any were."""
+    """Whether a file has the recorded digest; True if none was recorded."""
     return digest is None or digest == digest_of(path)
 
 
 def digest_of(path: str | Path) -> str:
-    """SHA-256 of a file, 64 hex digits; "" if it cannot be read, or is none that ends."""
+    """SHA-256 of a file, 64 hex digits; "" if it cannot be read or is not a regular file."""
     with suppress(OSError, ValueError):
         if Path(path).is_file():
             with Path(path).open("rb") as file:
@@ -145,13 +144,13 @@ def digest_of(path: str | Path) -> str:
 
 @contextmanager
 def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
-    """Within it the files of these names are written: they are this program's, also if that is
-    broken off.
+    """Context in which the files of these names are written: they count as this program's even if
+    it is interrupted.
 
-    A folder without a record, made before there was one, gets none.
+    A folder without a record gets none.
 
     Raises:
-        FolderTaken: one of them is there and not as this program left it.
+        FolderTaken: one of them exists and is not as this program left it.
     """
     made = read_made(folder)
     if made is None:
@@ -170,7 +169,7 @@ def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
     put_made(folder, made._replace(files=made.files | dict.fromkeys(names)))
     try:
         yield
-    finally:  # also of what was refused, which has written nothing: the record is then what it was
+    finally:  # also after a refusal, which has written nothing: the record is then unchanged
         written: dict[str, str | None] = {
             name: digest_of(folder / name) for name in names if (folder / name).exists()
         }
@@ -181,8 +180,8 @@ MOVE_IT = "move it to another folder, or delete it"
 
 
 def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise `FolderTaken` unless `target`, named by `option`, is absent, empty, or made by the same
-    command alone.
+    """Raise `FolderTaken` unless `target`, the value of `option`, is absent, empty, or made by the
+    same command alone.
 
     `OSError` if it cannot be looked into.
     """
@@ -201,15 +200,15 @@ def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
         raise FolderTaken(
             f"{option} {target}: is where a disk is mounted, and stays there; name a folder in it"
         )
-    if stranger := stranger_in(target, kind):
+    if foreign := foreign_file_in(target, kind):
         raise FolderTaken(
-            f"{option} {target}: {stranger}; name another folder, or move it elsewhere"
+            f"{option} {target}: {foreign}; name another folder, or move it elsewhere"
         )
 
 
 def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
-    """Raise as `may_write`, and also if `target` holds what was interrupted: nothing that has ended
-    is lost."""
+    """Raise as `may_write`, and also if `target` holds an interrupted result, so that no finished
+    part is lost."""
     may_write(target, kind, option)
     made = read_made(target)
     if made is not None and not made.finished:
@@ -223,8 +222,8 @@ def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
 
 
 def sealed(text: str) -> str:
-    """The text of a page or of XML with a comment at its end by which `may_overwrite` knows that
-    nobody changed it."""
+    """The text of a page or of XML with a comment at its end, a digest that shows `may_overwrite`
+    whether it was changed."""
     return f"{text}<!-- as it was written: sha256 {hashlib.sha256(encoded(text)).hexdigest()} -->\n"
 
 
@@ -235,8 +234,8 @@ def is_sealed(data: bytes) -> bool:
 
 
 def may_overwrite(path: Path, mark: bytes, what: str, option: str, seals: bool = True) -> None:
-    """Raise `FolderTaken` unless the file `path` is absent, a pipe or a device, or our own, which
-    nobody has changed, as far as its kind `seals` that.
+    """Raise `FolderTaken` unless the file `path` is absent, a pipe, a device, or one of ours; with
+    `seals` it must also be unchanged.
 
     `OSError` if it cannot be looked into, or its folder is not there.
     """

@@ -1,9 +1,9 @@
-"""What a worker does with a cell. It imports little: a worker that has to be replaced is soon there
-again.
+"""What a worker does with a cell. This module imports little, so that a worker can be replaced
+quickly.
 
-The clock of a cell (--timeout) starts when its first step is due. Before, the engine is imported,
-compiled and loaded, which on a machine that plays it for the first time, and is busy, takes longer
-than most cells.
+The clock of a cell (--timeout) starts with its first step. Before that the engine is imported,
+compiled and loaded, which takes longer than most cells on a busy machine that plays it for the
+first time.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from reports.run.cells import Cell, source_hash, versions
 from reports.run.worker_process import allow, leave
 from scenarios.model import Scenario, State
 
-# s to import, compile and load an engine: up to 30 idle, all of them the first time
+# s to import, compile and load an engine: up to 30 on an idle machine, for all engines the first
+# time
 LOADING = 300.0
 
 
 class CellResult(NamedTuple):
-    """What a worker sends back of a cell: the run, its trajectory packed into a file, and by what
-    it was played."""
+    """What a worker returns for a cell: the run, its trajectory packed into a file, and the
+    versions that played it."""
 
     run: Run
     samples: int
@@ -44,15 +45,15 @@ def play_cell(
     return play_once(row.make, cell.engine, scenario, scenario.dt(cell.substeps), watch)
 
 
-class Begun:
-    """Is given the samples of a cell as it is played: with the first, when the engine is loaded,
-    the clock of the cell begins."""
+class ClockStart:
+    """Called with every sample of a cell. The first sample, when the engine is loaded, starts the
+    clock of the cell."""
 
     def __init__(self, then: Callable[[State], None] = unwatched) -> None:
         self.begun, self.then = False, then
 
     def __call__(self, state: State) -> None:
-        """Start the clock once, then do what is to be done with every state."""
+        """Start the clock at the first call, then call `then`."""
         if not self.begun:
             self.begun = True
             allow()
@@ -60,24 +61,24 @@ class Begun:
 
 
 def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
-    """In the worker: play, leave every good state behind, and send back the run with its trajectory
-    packed."""
+    """In the worker: play, append every good state to the trail, and return the run with its
+    trajectory packed."""
     allow(LOADING)
-    run = play_cell(cell, row, scenario, Begun(lambda state: leave(parts_of(state))))
+    run = play_cell(cell, row, scenario, ClockStart(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
     return CellResult(replace(run, trajectory=None), samples, file, engine())
 
 
 def conform_here(name: str, row: EngineRow) -> list[Finding]:
-    """In the worker: what the probes find; before their clock starts the engine is loaded once, and
-    so compiled."""
+    """In the worker: the findings of the probes. The engine is loaded once before their clock
+    starts, so that it is compiled."""
     allow(LOADING)
-    with suppress(Exception), loaded(row, plain()):  # which the probes will meet again, and say
+    with suppress(Exception), loaded(row, plain()):  # the probes report this exception again
         pass
     allow()
     return conform(name, row)
 
 
 def engine() -> str:
-    """By which source and versions this process plays."""
+    """The source hash and the versions with which this process plays."""
     return repr((versions(), source_hash()))

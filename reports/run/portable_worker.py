@@ -1,5 +1,5 @@
-"""A worker process where none can be handed open files (macOS, Windows): it connects over the
-loopback address, its trail is a file with a name, and a thread reads what it prints."""
+"""A worker process for systems on which it cannot inherit open files (macOS, Windows): it connects
+over the loopback address, its trail is a named file, and a thread reads its output."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from reports.run.worker import PRINTED, STARTING, Worker
 from reports.terminal.foreign_text import legible
 
 WORK = "from reports.run.portable_worker import main; main(sys.argv[1:])"
-KEY = "CROSSCHECK_WORKER"  # the variable with what a process says to be known as ours
-LOOK = 0.05  # s between two looks at whether a process that has not connected still lives
+KEY = "CROSSCHECK_WORKER"  # the variable with the key of our processes
+LOOK = 0.05  # s between two checks whether a process that has not connected is still alive
 
 
 class PortableWorker(Worker):
-    """As `Worker`, by other channels."""
+    """A `Worker` with other channels."""
 
     def start(self) -> None:
-        """Start the process, which will connect."""
+        """Start the process; it connects later."""
         self.folder = tempfile.mkdtemp()
         self.trail_file = Path(self.folder) / "trail"
         self.trail_file.touch()
@@ -54,11 +54,10 @@ class PortableWorker(Worker):
         self.reader.start()
 
     def connect(self) -> None:
-        """Wait for the process to connect, if it has not.
+        """Wait until the process has connected.
 
         Raises:
-            TimeoutError: it has not in `STARTING` s.
-            EOFError: it died.
+            TimeoutError: not within `STARTING` s. EOFError: it died.
         """
         end = monotonic() + STARTING
         while not hasattr(self, "connection"):
@@ -80,15 +79,15 @@ class PortableWorker(Worker):
         return self.connection.recv_bytes()
 
     def read_all(self) -> None:
-        """In a thread: keep the end of what the process prints."""
+        """In a thread: keep the end of the output of the process."""
         with suppress(OSError, ValueError):  # closed
             while new := os.read(self.pipe.fileno(), PRINTED):
                 self.printed = (self.printed + new)[-PRINTED:]
                 if self.show:
                     sys.stderr.write(legible(new.decode(errors="replace")))
 
-    def hear(self, seconds: float) -> None:
-        """Let the thread come to the end of what the process printed, for at most so many s."""
+    def drain(self, seconds: float) -> None:
+        """Wait at most `seconds` until the thread has read all output of the process."""
         self.reader.join(min(seconds, 1.0))
 
     def forget_trail(self) -> None:
@@ -100,20 +99,20 @@ class PortableWorker(Worker):
         return self.trail_file.read_bytes()
 
     def close(self) -> None:
-        """Kill the process, whatever it is doing, and all that it has started."""
+        """Kill the process and all processes that it has started."""
         self.stopped = True
         system.end_all(self.process.pid)
         self.process.wait()
 
     def close_channels(self) -> None:
-        """Delete the trail, and close the rest."""
+        """Delete the trail, and close the other channels."""
         self.door.close()
         self.pipe.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def main(words: Sequence[str]) -> None:
-    """What the process does; its words are PORT TRAIL MEMORY."""
+    """The main function of the process; its arguments are PORT TRAIL MEMORY."""
     port, trail, memory = int(words[0]), words[1], int(words[2])
     line = socket.create_connection(("127.0.0.1", port))
     connection = Connection(line.detach())

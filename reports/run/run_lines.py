@@ -1,4 +1,4 @@
-"""The schema of a run's journal: what every kind of line holds."""
+"""The schema of a run's journal: the fields of every kind of line."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ LONGEST_PASS = 3600.0  # s, of timings
 
 
 class Header(Line):
-    """What was asked for, and by what it was played."""
+    """The request, and the versions that played it."""
 
     command: Words
     seed: Seed
@@ -74,7 +74,7 @@ class CellLine(Line):
 
 
 class Probed(Line):
-    """What one probe found, as `Finding`."""
+    """The result of one probe, with the fields of `Finding`."""
 
     engine: Engine
     profile: Profile
@@ -96,14 +96,14 @@ class ConformanceLine(Line):
 
     @model_validator(mode="after")
     def of_one(self) -> ConformanceLine:
-        """All are of the engine that the line is of."""
+        """All findings are of the engine in `of`."""
         if any(f"{one.engine}:{one.profile}" != self.of for one in self.conformance):
             raise ValueError("conformance: must be of one engine, which `of` names")
         return self
 
 
 class Known(Line):
-    """A published number and ours."""
+    """A published number and the one computed here."""
 
     column: Words
     dt_s: Step
@@ -114,7 +114,7 @@ class Known(Line):
 
 
 class KnownAnswerLine(Line):
-    """A known answer that was made again."""
+    """A reproduced known answer."""
 
     known_answer: Known
     of: Words
@@ -130,7 +130,7 @@ class Checked(Line):
 
 
 class CheckedLine(Line):
-    """The check of a solver's file that plays."""
+    """The check of a solver's file that takes part in the run."""
 
     checked: Checked
     of: EngineProfile
@@ -141,8 +141,8 @@ Costs = Annotated[list[Seconds], Field(min_length=1, max_length=1000)]
 
 
 class TimingLine(Line):
-    """What a cell cost in the first `timed_s` of its scenario: s per simulated second, a number a
-    round; and as much again that setting disks onto the opposite edge took in Python."""
+    """The cost of a cell in the first `timed_s` of its scenario: s per simulated second, one number
+    per round; and in the same form the part spent in Python on wrapping disks at the edges."""
 
     timing: Digest
     copy_: Annotated[Literal[0, 1], Field(alias="copy")]
@@ -152,7 +152,7 @@ class TimingLine(Line):
 
 
 class BesideLine(Line):
-    """What was measured beside the steps of an engine, s, a number a round."""
+    """What was timed beside the steps of an engine: s, one number per round."""
 
     beside: Literal[EMPTY, CALL, READ]  # type: ignore[valid-type]
     of: EngineProfile
@@ -161,7 +161,7 @@ class BesideLine(Line):
 
 
 class Footer(Line):
-    """How much was done."""
+    """Totals of the run."""
 
     tasks: Count
     played: Count

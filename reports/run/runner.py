@@ -1,5 +1,5 @@
-"""Runs tasks in worker processes, here or on other machines, so that what aborts or hangs takes
-nothing along."""
+"""Runs tasks in worker processes, here or on other machines, so that a task that aborts or hangs
+harms no other."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from reports.run.worker_process import Failure
 from reports.terminal.exits import say
 
 TIMEOUT = 60.0  # s a task may take
-# tasks a worker of this machine has been given at most, so that what is urgent comes soon, and none
-# waits
+# tasks queued for a worker of this machine at most: few, so that urgent tasks start soon, but
+# enough that none waits
 AHEAD = 2
 
 LEAST_MEMORY = 400  # MB: Python, numba and the engines take 120, compiling a kernel as much again
-# open files for a worker: what leads to it, twice while it starts; and those of all else
+# open files: for each worker its channels, twice while it starts; and for everything else
 LINES, OTHERS = 5, 100
 
 Task = Callable[[], Any]
 
 
 class NoScheduler(Exception):
-    """There is no cluster where one was said to be, or it has gone."""
+    """The given cluster does not answer, or no longer."""
 
 
 def run_all(
@@ -46,17 +46,15 @@ def run_all(
     alone: Collection[Hashable] = frozenset(),
     urgent: deque[Any] | None = None,
 ) -> Generator[tuple[Any, Any | Failure], None, None]:
-    """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends, every
-    key once.
+    """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends.
 
-    A task may take `timeout` s and `memory` bytes (0: no limit); one that is in `alone` gets a
-    process of its own. With the address of a dask `scheduler` they run on its workers, as many at
-    once as those have threads. What the caller puts into `urgent` meanwhile goes before what is
-    left, and on this machine, whose files it may read. Timings are never taken beside anything
-    else: for them `workers` is 1.
+    A task may take `timeout` s and `memory` bytes (0: no limit). A task in `alone` gets a process
+    of its own. With the address of a dask `scheduler` the tasks run on its workers, one per thread.
+    Tasks that the caller puts into `urgent` meanwhile start before the others, on this machine,
+    whose files they may read. For timings `workers` is 1, so that nothing runs beside them.
 
     Raises:
-        NoScheduler: nothing answers at `scheduler`, or not any more.
+        NoScheduler: nothing answers at `scheduler`, or no longer.
     """
     waiting, lost = deque(tasks.items()), Counter[Hashable]()
     urgent = deque() if urgent is None else urgent
@@ -81,8 +79,8 @@ def run_all(
 
 
 class UnderWay:
-    """The tasks that executors have been given, each with `timeout` s, `memory` bytes, and a
-    process of its own if its key is in `alone`."""
+    """The tasks given to executors, each with `timeout` s, `memory` bytes, and a process of its own
+    if its key is in `alone`."""
 
     def __init__(self, timeout: float, memory: int, alone: Collection[Hashable]) -> None:
         self.timeout, self.memory, self.alone = timeout, memory, alone
@@ -105,9 +103,9 @@ class UnderWay:
 
 
 def outcome_of(future: Future[Any]) -> tuple[Any | Failure, Exception | None]:
-    """What a task gave, its own faults included; or what befell that which carried it out.
+    """The result or `Failure` of a task and None, or None and the exception of its executor.
 
-    Raises `NoScheduler` if it was a cluster, which has gone.
+    Raises `NoScheduler` if the cluster has gone.
     """
     try:
         outcome = future.result()
@@ -119,8 +117,8 @@ def outcome_of(future: Future[Any]) -> tuple[Any | Failure, Exception | None]:
 
 
 def affordable(workers: int) -> int:
-    """As many workers of the `workers` asked for as can start on this machine; says so if those are
-    fewer."""
+    """The number of workers, at most `workers`, that can start on this machine; prints a line if it
+    is fewer."""
     memory: int = psutil.virtual_memory().total // 1_000_000
     files = most_files()
     most = {
@@ -140,7 +138,8 @@ def affordable(workers: int) -> int:
 
 @contextmanager
 def threads(workers: int) -> Iterator[Executor]:
-    """Threads of this machine, each with a worker process of its own; left, all are stopped."""
+    """Context with threads of this machine, each with a worker process; all are stopped at the
+    end."""
     CREW.dismissed = False
     executor = ThreadPoolExecutor(workers)
     try:
@@ -152,7 +151,7 @@ def threads(workers: int) -> Iterator[Executor]:
 
 @contextmanager
 def cluster_or(here: Executor, scheduler: str) -> Iterator[Executor]:
-    """The threads of a cluster's workers, or those that are `here` if there is no `scheduler`."""
+    """The executor of a cluster's workers, or `here` if there is no `scheduler`."""
     if not scheduler:
         yield here
         return
@@ -160,7 +159,7 @@ def cluster_or(here: Executor, scheduler: str) -> Iterator[Executor]:
         try:
             yield executor
         finally:
-            executor.shutdown(wait=False)  # which with dask cancels what is left
+            executor.shutdown(wait=False)  # with dask this cancels the remaining tasks
 
 
 def cluster(scheduler: str) -> Any:
@@ -177,7 +176,7 @@ def cluster(scheduler: str) -> Any:
             f"--scheduler {scheduler}: many machines take the package {missing.name}, which is not"
             " installed; uv sync --extra cluster, or pip install crosscheck2d[cluster]"
         ) from missing
-    # what matters is raised; each of distributed's has its own level
+    # important faults are raised; each logger of distributed has its own level
     for name in logging.root.manager.loggerDict:
         if name.startswith("distributed"):
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -1,9 +1,9 @@
-"""The scene table, which is the part of deviations.csv for one scene: made in a worker as soon as
-the last cell of the scene has ended.
+"""The scene table is the part of deviations.csv for one scene. A worker makes it when the last cell
+of the scene has ended.
 
 It takes two tasks: the first computes the exact answer, within the time that a cell may take; the
-second compares all runs of the scene with it. Both results are kept in files. Where there is no
-answer in time, or none at all, the table says why, and the other scenes go on.
+second compares all runs of the scene with it. Both results are kept in files. If there is no
+answer, or none in time, the table says why, and the other scenes go on.
 """
 
 from __future__ import annotations
@@ -47,33 +47,33 @@ Task = tuple[Path, Callable[[], Any]]  # its result's file, and what a worker ca
 
 
 class SceneTasks:
-    """The two tasks of each scene, its exact answer and its table, which are given out once all
-    cells of the scene have ended.
+    """The two tasks of each scene, its exact answer and its table, which start when all cells of
+    the scene have ended.
 
     Attributes:
-        unkept: scene -> its table, where the file of a trajectory is gone or torn: such a table is
-            not kept, as another copy of the file would change it.
+        unkept: scene -> its table, if the file of a trajectory is missing or damaged: such a table
+            is not kept, because another copy of the file would change it.
         failed: scene -> why it could not be compared.
     """
 
     def __init__(
         self, archive: Archive, missing: Iterable[Cell], timeout: float, warn: Callable[[str], None]
     ) -> None:
-        """`timeout`: s that an exact answer may take; an answer that was stopped after less is
-        computed again. `warn` is called with a sentence for each file that is torn."""
+        """`timeout`: s that an exact answer may take; an answer stopped at a shorter limit is
+        computed again. `warn` is called with a sentence for each damaged file."""
         self.warn = warn
         self.folder, self.engines, self.timeout = archive.folder, archive.header["engines"], timeout
         self.missing = Counter(cell.scene for cell in missing)
         self.records: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
-        self.scenes: dict[Path, str] = {}  # the scene of each task given out
-        self.done: set[Path] = set()  # the tasks of these that have ended
+        self.scenes: dict[Path, str] = {}  # the scene of each task that was started
+        self.done: set[Path] = set()  # those of these tasks that have ended
         self.unkept: dict[str, bytes] = {}
         self.failed: dict[str, Failure] = {}
         for record in archive.records:
             self.put(record)
 
     def put(self, record: dict[str, Any]) -> None:
-        """Take the line of a cell; a later line of the same cell replaces an earlier one."""
+        """Add the line of a cell; a later line of the same cell replaces an earlier one."""
         self.records.setdefault(record["scene"], {})[name_of(record), record["substeps"]] = record
 
     def tasks(self) -> Iterator[Task]:
@@ -82,13 +82,13 @@ class SceneTasks:
             yield from self.next_task(scene)
 
     def cell_ended(self, record: dict[str, Any]) -> Iterator[Task]:
-        """The next task of the scene of a cell that has ended now."""
+        """The next task of the scene of a cell that has just ended."""
         self.put(record)
         self.missing[record["scene"]] -= 1
         yield from self.next_task(record["scene"])
 
     def next_task(self, scene: str) -> Iterator[Task]:
-        """Once all cells of a scene have ended: its answer, then its table, each given out once."""
+        """When all cells of a scene have ended: first its answer, then its table, each once."""
         if self.missing[scene]:
             return
         records = in_order(self.records[scene].values(), self.engines)
@@ -107,7 +107,7 @@ class SceneTasks:
 
     @property
     def playing(self) -> bool:
-        """Whether a cell has not ended yet."""
+        """Whether any cell has not ended yet."""
         return any(self.missing.values())
 
     @property
@@ -120,7 +120,7 @@ class SceneTasks:
         ]
 
     def task_ended(self, path: Path, result: Any) -> Iterator[Task]:
-        """Keep the result of a task, and give out the next task of its scene."""
+        """Keep the result of a task, and return the next task of its scene."""
         scene = self.scenes[path]
         self.done.add(path)
         if path.suffix == ANSWER:
@@ -139,14 +139,14 @@ class SceneTasks:
 
 
 def delete_unless_file(path: Path) -> None:
-    """Delete a pipe or a link in the place of an answer or a scene table, so that nothing is
-    written into it."""
+    """Delete a pipe or a link at the path of an answer or a scene table, so that nothing is written
+    into it."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         path.unlink()
 
 
 def in_order(records: Iterable[dict[str, Any]], engines: Sequence[str]) -> list[dict[str, Any]]:
-    """The lines of a scene's cells in the order of engines that was asked for, coarse dt first."""
+    """The lines of a scene's cells in the requested order of engines, coarse dt first."""
     return sorted(records, key=lambda record: (engines.index(name_of(record)), record["substeps"]))
 
 
@@ -156,8 +156,8 @@ def name_of(record: dict[str, Any]) -> str:
 
 
 class SceneTable(NamedTuple):
-    """A scene's part of deviations.csv; `damaged`: the file of a trajectory is gone or torn, and so
-    the part is not kept."""
+    """A scene's part of deviations.csv; `damaged`: the file of a trajectory is missing or damaged,
+    so the part is not kept."""
 
     csv: bytes
     damaged: bool
@@ -188,20 +188,19 @@ def csv_of(table: pd.DataFrame, header: bool = True) -> bytes:
 
 def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
     """The runs of a scene's cells, compared with its answer and with each other."""
-    scenario = answer.given_to(scenario_of(folder, records))
+    scenario = answer.put_into(scenario_of(folder, records))
     return compare(scenario, [run_of(folder, record) for record in records])
 
 
 def rows_not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
-    """A row that says `why` for each run that ended well and yet is not compared with
-    `versus`."""
+    """A row with the reason `why` for each run that is "ok" but not compared with `versus`."""
     says = f"{NOT_JUDGED}: {why}"
     return table_of([status_row(run, says, versus) for run in runs if run.status == "ok"])
 
 
 def scenario_of(folder: Path, records: Records) -> Scenario:
-    """The scenario of a scene's cells, with the step sizes that were played; raises `Unusable` if
-    the line of a cell does not fit the scene as it is now."""
+    """The scenario of a scene's cells, with the step sizes played; raises `Unusable` if the line of
+    a cell does not fit the present scene."""
     [scenario] = [
         played_scenario(folder, record)
         for record in {one["scene_hash"]: one for one in records}.values()
@@ -212,12 +211,12 @@ def scenario_of(folder: Path, records: Records) -> Scenario:
 
 
 def keep_scene_table(path: Path, csv: bytes) -> None:
-    """Write a scene table whole or not at all, after a line with its digest."""
+    """Write a scene table atomically, after a line with its digest."""
     put_bytes(path, f"{digest(csv)}\n".encode() + csv)
 
 
 def kept_scene_table(path: Path) -> bytes:
-    """What `keep_scene_table` wrote; raises `OSError`, or `ValueError` if the digest is another."""
+    """What `keep_scene_table` wrote; raises `OSError`, or `ValueError` if the digest differs."""
     first, _, csv = all_of(path).partition(b"\n")
     if first != digest(csv).encode():
         raise ValueError(f"{path}: is not what was written; delete it, and it is made again")
@@ -225,7 +224,7 @@ def kept_scene_table(path: Path) -> bytes:
 
 
 def is_kept(path: Path) -> bool:
-    """Whether the file of a scene table is there as it was written."""
+    """Whether the file of a scene table exists unchanged."""
     try:
         return bool(kept_scene_table(path))
     except (OSError, ValueError):
@@ -233,7 +232,7 @@ def is_kept(path: Path) -> bool:
 
 
 def read_scene_table(csv: bytes) -> pd.DataFrame:
-    """A scene table, bit for bit as it was written."""
+    """A scene table, bit for bit as written."""
     empty = {column: [""] for column in NUMBERS}
     return pd.read_csv(
         io.BytesIO(csv), keep_default_na=False, na_values=empty, encoding_errors=PATHS
@@ -241,13 +240,13 @@ def read_scene_table(csv: bytes) -> pd.DataFrame:
 
 
 def answer_file(folder: Path, records: Records) -> Path:
-    """The file of the answer to a scene; its name changes with the scene and the judge's source."""
+    """The file of the answer to a scene; its name depends on the scene and the judge's source."""
     return named_by(folder, records, (records[0]["scene_hash"], judge_hash()), ANSWER)
 
 
 def scene_table_file(folder: Path, records: Records, answer: Answer) -> Path:
-    """The file of a scene table; its name changes with all that decides the table: runs,
-    answer, judge."""
+    """The file of a scene table; its name depends on all that decides the table: runs, answer,
+    judge."""
     found = [as_found(folder, record) for record in records]
     files = [
         tuple(record[name] for name in ("cell", "status", "reason", "file", "damage"))
@@ -264,8 +263,8 @@ def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str)
 
 @cache
 def judge_hash(root: Path = ROOT) -> str:
-    """A hash of the source and the versions that compare runs: after a change of a metric, scene
-    tables are made again."""
+    """A hash of the source and versions that compare runs: if a metric changes, scene tables are
+    made again."""
     files = sorted(path for pattern in JUDGE_SOURCE for path in root.glob(pattern))
     source = b"".join(path.read_bytes() for path in files)
     return hashlib.sha256(source + repr((versions(), pd.__version__)).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Scenes as they are asked for: by name or as a file, with the steps asked for."""
+"""Opens the requested scenes, by name or as a file, with the requested step sizes."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def open_scene(scene: str, seed: int) -> Scenario:
 
 
 def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
-    """What was played, by the line of a cell in the run of `folder`; raises `Unusable` if it does
-    not fit its scene."""
+    """The scenario of a cell, given its line in the run of `folder`; raises `Unusable` if the line
+    does not fit the scene."""
     scene = (
         record["scene"]
         if record["scene"] in SCENARIOS
@@ -42,7 +42,7 @@ def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
 
 
 def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
-    """Raise `Unusable` if the line of a cell is not one of that scenario."""
+    """Raise `Unusable` if the line of a cell does not fit the scenario."""
     for name, value in {"scenario": scenario.name, "dt_s": scenario.dt(record["substeps"])}.items():
         if record[name] != value:
             raise Unusable(
@@ -53,12 +53,12 @@ def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
 
 
 def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:
-    """The scenario with the dt ladder asked for: `dts` in s instead of its own, two finer steps if
+    """The scenario with the requested step sizes: `dts` in s instead of its own, two finer ones if
     `full`.
 
     Raises:
-        ValueError: naming the scenario and the dt that does not divide its sample interval, or is
-            too small.
+        ValueError: a dt does not divide the sample interval, or is too small; names the scenario
+            and the dt.
     """
     ladder, interval = tuple(scenario.substeps), scenario.sample_interval
     most = MOST_STEPS // scenario.intervals
@@ -70,7 +70,7 @@ def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario
             )
         k = round(interval / dt) if dt > 0 else 0
         if k < 1 or abs(k * dt / interval - 1) > 1e-9:
-            # Twelve digits: fewer may be another step than the one they stand for, and refused as
+            # Twelve digits: fewer digits may name another step size, which would be refused as
             # this one is.
             raise ValueError(
                 f"--dt {dt:.12g} does not fit {scenario.name}: allowed is its sample interval "

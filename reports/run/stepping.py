@@ -1,5 +1,5 @@
-"""What is timed of an engine: a run through a scenario; and beside it what the way from Python to
-the engine takes, a step of a world with nothing to do, a call, a read-out."""
+"""What is timed of an engine: a run through a scenario; and besides the overhead: a step of an
+empty world, a call from Python, a read-out."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ EMPTY, CALL, READ = "empty step", "call", "read"
 
 @dataclass(frozen=True)
 class Stepping:
-    """A run of an engine through a scenario: building it is not timed, and nothing is read or heard
-    of."""
+    """A run of an engine through a scenario. Building the scene is not timed; nothing is read, and
+    no collisions are recorded."""
 
     make: Make
     scenario: Scenario
@@ -40,8 +40,8 @@ class Stepping:
 
 @dataclass(frozen=True)
 class EmptySteps:
-    """Steps of a world with one static disk, as no engine here can have less: `EMPTY_STEPS` in one
-    call of `step`, or, `singly`, `CALLS` of one step each."""
+    """Steps of a world with one static disk, the least that every engine accepts: `EMPTY_STEPS` in
+    one call of `step`, or if `singly`, `CALLS` of one step each."""
 
     make: Make
     dt: float
@@ -51,7 +51,7 @@ class EmptySteps:
         """One run."""
         with closing(self.make()) as engine:
             engine.listening = False
-            engine.load(empty(), self.dt)
+            engine.load(empty_world(), self.dt)
             calls, count = (CALLS, 1) if self.singly else (1, EMPTY_STEPS)
             started = perf_counter()
             for _ in range(calls):
@@ -61,8 +61,8 @@ class EmptySteps:
 
 @dataclass(frozen=True)
 class Reading:
-    """`READS` read-outs of a scene after its first step, each after another step: some engines keep
-    what they have read."""
+    """`READS` read-outs of a scene after its first step, each after one more step: some engines
+    cache what they have read."""
 
     make: Make
     scenario: Scenario
@@ -81,9 +81,9 @@ class Reading:
         return Spent(seconds)
 
 
-def beside(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | Reading, int]]:
-    """(what, how to run it, how many there are in a run) of all that is measured beside the steps
-    of an engine in a scenario."""
+def overheads(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | Reading, int]]:
+    """(what, how to run it, count in a run) for everything that is timed beside the steps of an
+    engine in a scenario."""
     dt = scenario.dt(scenario.substeps[-1])
     return [
         (EMPTY, EmptySteps(make, dt, singly=False), EMPTY_STEPS),
@@ -92,7 +92,7 @@ def beside(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | Readi
     ]
 
 
-def empty() -> Scene:
+def empty_world() -> Scene:
     """One static disk, and nothing that moves."""
     return lay_out(
         position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[float("inf")], restitution=1.0
@@ -100,15 +100,15 @@ def empty() -> Scene:
 
 
 def binding_of(step: float, singly: float, scenario: Scenario, substeps: int) -> float:
-    """What the steps and calls of a simulated second take where there is nothing to do, if an empty
-    step takes `step` in a call of many, and `singly` in one of its own."""
+    """s per simulated second that the steps and calls of an empty world take, if an empty step
+    takes `step` s in a call of many steps, and `singly` s in a call of one."""
     steps, calls = rates(scenario, substeps)
     return step * steps + max(singly - step, 0.0) * calls
 
 
 def rates(scenario: Scenario, substeps: int) -> tuple[float, float]:
-    """How many steps, and how many calls of `step`, a simulated second of the scenario takes: in
-    its one call there are many steps, but for those in which a thrust acts."""
+    """Number of steps, and of calls of `step`, in a simulated second of the scenario. One call
+    takes many steps, except while a thrust acts."""
     steps = scenario.intervals * substeps
     calls = sum(1 for _ in thrust_steps(scenario.thrusts, 0, steps, scenario.dt(substeps)))
     return steps / scenario.duration, calls / scenario.duration

@@ -1,5 +1,5 @@
 """A run: play scenarios through engines, each cell once, and write every result to the run's folder
-as soon as it is there."""
+at once."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class RunPlan:
         seed: seed of random scenes.
         dts: step sizes in s instead of each scenario's own; empty: its own.
         full: two finer steps for every scenario.
-        timings: s that the timing pass at the end may take; 0: there is none.
+        timings: s that the timing pass at the end may take; 0: no timing pass.
         command: the command line that runs this plan again.
         folder: the working directory of the command, to which relative paths belong.
         files: path of a scene -> the file that is read instead, such as the kept copy of a deleted
@@ -100,7 +100,7 @@ class RunPlan:
 
 @dataclass(frozen=True)
 class Means:
-    """The processes, time and memory with which a plan is carried out; they change no number.
+    """The processes, time and memory for carrying out a plan; they change no number.
 
     Attributes:
         workers: processes that play at once.
@@ -116,12 +116,12 @@ class Means:
 
 
 class OtherVersions(Exception):
-    """A worker has other source or other library versions than this machine."""
+    """The source or library versions of a worker differ from those of this machine."""
 
 
 def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:
-    """Run every task of the plan whose result the journal does not have, take the timings, and
-    write all results to the journal and its folder."""
+    """Run every task of the plan that has no result in the journal, take the timings, and write all
+    results to the journal and its folder."""
     folder = journal.path.parent
     scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
     tasks = tasks_of(plan, scenarios)
@@ -145,8 +145,8 @@ class Playing:
 
     Attributes:
         scenarios: scene -> its scenario.
-        scene_tasks: gives out the exact answer and the comparison of each scene whose cells have
-            all ended.
+        scene_tasks: the tasks of the scenes whose cells have all ended: exact answer and
+            comparison.
     """
 
     plan: RunPlan
@@ -157,9 +157,10 @@ class Playing:
     progress: Progress
 
     def run(self, missing: Mapping[Any, Callable[[], Any]], tasks: int) -> None:
-        """Carry out the `missing` of so many `tasks`, and compare each scene once its cells have
+        """Carry out the `missing` ones of `tasks` tasks, and compare each scene when its cells have
         ended."""
-        # A solver's file is checked on this machine, where the file is, as scenes are compared.
+        # A solver's file is checked on this machine, because the file is here; so are scenes
+        # compared.
         checks = {task: work for task, work in missing.items() if isinstance(task, Checking)}
         played = {task: work for task, work in missing.items() if task not in checks}
         alone = {task for task in played if isinstance(task, Cell) and self.leaves_state(task)}
@@ -176,11 +177,11 @@ class Playing:
                 self.show_waiting()
 
     def leaves_state(self, cell: Cell) -> bool:
-        """Whether the engine of a cell needs a process of its own for each cell."""
+        """Whether the engine of a cell needs a new process for each cell."""
         return self.plan.engines[cell.engine].leaves_state
 
     def keep(self, task: Any, result: Any) -> Iterable[Any]:
-        """Write the result of a task and show its status; the tasks that can be given out now."""
+        """Write the result of a task and show its status; returns the tasks that can start now."""
         if isinstance(task, Path):  # the file of an exact answer or of a comparison
             return self.scene_tasks.task_ended(task, result)
         if isinstance(task, Cell):
@@ -192,7 +193,8 @@ class Playing:
         return ()
 
     def keep_cell(self, cell: Cell, result: CellResult | Failure) -> dict[str, Any]:
-        """Write the result of a cell and show its status; the cell's line of the journal."""
+        """Write the result of a cell and show its status; returns the cell's line of the
+        journal."""
         scenario = self.scenarios[cell.scene]
         key = cell.key(scene_hash(scenario), self.plan.engines[cell.engine].source)
         line = keep_cell(self.journal, scenario, self.means, cell, key, result)
@@ -201,7 +203,7 @@ class Playing:
         return line
 
     def show_waiting(self) -> None:
-        """Once every cell has ended: show which exact answers the run still waits for."""
+        """When every cell has ended: show for which exact answers the run still waits."""
         if self.scene_tasks.asked and not self.scene_tasks.playing:
             self.progress.say(waiting_for(self.scene_tasks.asked))
 
@@ -222,7 +224,7 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
     copies = {
         copy: scene_text(scenarios[scene])
         for scene, name in named.items()
-        # where the plan reads the copy itself, the scene's own file is gone
+        # if the plan reads the copy itself, the original scene file is gone
         if (copy := stored_scene(folder, name)) != plan.files.get(scene)
     }
     header = plan.header() | {"tasks": tasks, "names": named}
@@ -244,7 +246,7 @@ def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Call
     if KNOWN_SCENE in plan.scenes:
         tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
     for scene, scenario in scenarios.items():
-        question = replace(scenario, truth=None)  # the answer stays with the judge
+        question = replace(scenario, truth=None)  # an engine does not get the exact answer
         for name in told_apart(plan.engines, scenario.scene):
             for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
                 tasks[cell] = partial(play_here, cell, plan.engines[name], question)
@@ -254,10 +256,10 @@ def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Call
 def finished_tasks(
     archive: Archive, plan: RunPlan, means: Means, scenarios: Mapping[str, Scenario]
 ) -> set[Any]:
-    """The tasks whose result the journal has, of the same scene, settings and versions.
+    """The tasks that have a result in the journal, with the same scene, settings and versions.
 
-    A cell is to be played again if it was stopped after less time than it may take now, if its
-    trajectory is gone or damaged, or if it failed for a reason outside the engine.
+    A cell is played again if it was stopped at a shorter time limit than the present one, if its
+    trajectory is missing or damaged, or if it failed for a reason outside the engine.
     """
     keys = {
         line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)
@@ -280,7 +282,7 @@ def finished_tasks(
         if cell.scene not in hashes or cell.engine not in plan.engines:
             continue
         stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
-        lost = record["damage"]  # its trajectory is gone, or not what was written
+        lost = record["damage"]  # its trajectory is missing or damaged
         same = record["cell"] == cell.key(hashes[cell.scene], plan.engines[cell.engine].source)
         if same and not (stopped or lost or record["outside"]):
             done.add(cell)
@@ -344,7 +346,7 @@ def keep_cell(
     key: str,
     result: CellResult | Failure,
 ) -> dict[str, Any]:
-    """Write the trajectory of the cell of that `key`, then its line, which is returned."""
+    """Write the trajectory of the cell with this `key`, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
     run, samples = played.run, played.samples
     if played.played_by != engine():
@@ -380,7 +382,7 @@ def keep_cell(
 
 
 def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
-    """The result of a cell whose worker died or was stopped: the states up to that time."""
+    """The result of a cell whose worker died or was stopped, with the states up to that time."""
     trajectory = from_trail(failure.trail, scenario)
     samples = len(trajectory) if trajectory else 0
     last = (
@@ -407,7 +409,7 @@ def take_timings(
     scenarios: Mapping[str, Scenario],
     progress: Progress,
 ) -> None:
-    """Run the timing pass, unless the journal has its result; no other task runs meanwhile."""
+    """Run the timing pass, unless its result is in the journal; no other task runs meanwhile."""
     cells = cells_to_time(archive, plan.engines, scenarios) if plan.timings else []
     if not cells or is_timed(archive, cells):
         return
@@ -424,7 +426,7 @@ def take_timings(
 
 
 def delete_unused_trajectories(archive: Archive) -> None:
-    """Delete the trajectories of cells that the journal does not name any more."""
+    """Delete the trajectories of cells that the journal no longer names."""
     named = {record["cell"] for record in archive.records}
     for path in (archive.folder / "trajectories").iterdir():
         if path.stem not in named and RUN.names(f"trajectories/{path.name}"):

@@ -1,5 +1,5 @@
-"""Make the tables of a run from its journal, scenario by scenario; a comparison that is kept is not
-made again."""
+"""Makes the tables of a run from its journal, scenario by scenario; a stored comparison is not made
+again."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ class Tables(NamedTuple):
         runs: runs.csv.
         timed: timings.csv.
         answers: scene -> its exact answer, or why there is none.
-        scene_tables: scene -> where its table for deviations.csv is.
-        unkept: scene -> its comparison, of which no scene table is kept: it could not be made, or a
-            file is gone or torn.
-        unjudged: name of a scene -> why it is not held to its answer, or not compared at all,
-            though it should be.
+        scene_tables: scene -> the file of its scene table.
+        unkept: scene -> its comparison, if it has no scene table: it could not be made, or a file
+            is missing or damaged.
+        unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
+            it should be.
     """
 
     runs: pd.DataFrame
@@ -70,8 +70,7 @@ class Tables(NamedTuple):
 
 
 def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
-    """Write deviations.csv, runs.csv and timings.csv; what was compared before and has not changed
-    is not compared again.
+    """Write deviations.csv, runs.csv and timings.csv; unchanged scenes are not compared again.
 
     Raises:
         ValueError: no cell has ended, or a scene is not the one that was played.
@@ -107,7 +106,7 @@ def make_tables(archive: Archive, say: Callable[[str], None]) -> Tables:
     say("writing the tables")
     write_deviations(folder, scene_tables, unkept)
     answer_files = {answer_file(folder, records) for records in by_scene.values()}
-    sweep(folder / "compared", {*scene_tables.values(), *answer_files, seal_of(folder)})
+    delete_stale(folder / "compared", {*scene_tables.values(), *answer_files, seal_of(folder)})
     runs = table_of_runs([record for records in by_scene.values() for record in records], unkept)
     put_text(folder / "runs.csv", runs.to_csv(index=False))
     timed = timings(archive, scenarios_by_name(folder, by_scene))
@@ -124,8 +123,8 @@ def scenarios_by_name(folder: Path, by_scene: Mapping[str, Records]) -> dict[str
 def compare_missing(
     archive: Archive, by_scene: Mapping[str, Records], say: Callable[[str], None]
 ) -> SceneTasks:
-    """Have the answers and make the scene tables that are not kept, in worker processes, each
-    within its time."""
+    """Compute the missing answers and scene tables in worker processes, each within its time
+    limit."""
     (archive.folder / "compared").mkdir(exist_ok=True)
     # As much time as the cells had: it is the same option.
     scene_tasks = SceneTasks(
@@ -133,7 +132,7 @@ def compare_missing(
     )
     tasks = deque(scene_tasks.tasks())
     for records in by_scene.values():
-        scenario_of(archive.folder, records)  # a scene that is another one now is found here
+        scenario_of(archive.folder, records)  # raises if a scene has changed
     with closing(run_all({}, os.cpu_count() or 1, scene_tasks.timeout, urgent=tasks)) as results:
         for path, result in results:
             name = by_scene[scene_tasks.scenes[path]][0]["scenario"]
@@ -152,12 +151,12 @@ def not_compared(failure: Failure) -> str:
 def unkept_comparison(
     folder: Path, records: Records, answer: Answer, scene_table: bytes | Failure
 ) -> Comparison:
-    """What can be shown of a scene of which no scene table is kept; what could not be compared is
-    held to no answer."""
+    """What can be shown of a scene without a scene table; if its comparison failed, it is compared
+    with no answer."""
     runs = [run_of(folder, record) for record in records]
     scenario = scenario_of(folder, records)
     if isinstance(scene_table, bytes):
-        scenario, truth = answered(answer.given_to(scenario))
+        scenario, truth = answered(answer.put_into(scenario))
         return Comparison(scenario, truth, runs, read_scene_table(scene_table))
     why = not_compared(scene_table)
     scenario = replace(scenario, truth=None, without_truth=why)
@@ -165,15 +164,15 @@ def unkept_comparison(
 
 
 def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
-    """The comparisons in reading order; only the runs at the middle dt hold their trajectories: no
-    other is drawn."""
+    """The comparisons in reading order. Only runs at the middle dt have their trajectories, because
+    no others are drawn."""
     comparisons = []
     for scene, records in ordered(archive).items():
         if scene in tables.unkept:
             comparisons.append(tables.unkept[scene])
             continue
         scenario, truth = answered(
-            tables.answers[scene].given_to(scenario_of(archive.folder, records))
+            tables.answers[scene].put_into(scenario_of(archive.folder, records))
         )
         runs = [
             run_of(
@@ -195,8 +194,8 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
 
 
 def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
-    """Scene -> the lines of its cells, in the order of scenes and engines that was asked for,
-    coarse dt first."""
+    """Scene -> the lines of its cells, in the requested order of scenes and engines, coarse dt
+    first."""
     by_scene: dict[str, list[dict[str, Any]]] = {scene: [] for scene in archive.header["scenes"]}
     for record in archive.records:
         by_scene[record["scene"]].append(record)
@@ -207,39 +206,38 @@ def ordered(archive: Archive) -> dict[str, list[dict[str, Any]]]:
 def write_deviations(
     folder: Path, scene_tables: Mapping[str, Path], unkept: Mapping[str, Comparison]
 ) -> None:
-    """Put the scenes' scene tables one after the other into deviations.csv, and its digest beside
-    them."""
+    """Concatenate the scene tables into deviations.csv, and store its digest beside them."""
     all_of_it = hashlib.sha256()
     with whole(folder / "deviations.csv") as file:
         for number, (scene, scene_table) in enumerate(scene_tables.items()):
             csv = csv_of(unkept[scene].table) if scene in unkept else kept_scene_table(scene_table)
-            rows = csv.partition(b"\n")[2] if number else csv  # the names of the columns once
+            rows = csv.partition(b"\n")[2] if number else csv  # the header only once
             text = encoded(rows.decode(errors=PATHS))
             all_of_it.update(text)
             file.write(text)
-    with whole(seal_of(folder)) as file:  # also where somebody has put a pipe
+    with whole(seal_of(folder)) as file:  # even if there is a pipe at this path
         file.write(all_of_it.hexdigest()[:16].encode())
 
 
 def seal_of(folder: Path) -> Path:
-    """Where the digest of deviations.csv is kept: `diff` believes no other table."""
+    """The file with the digest of deviations.csv; `diff` refuses a table with another digest."""
     return folder / "compared" / "deviations.digest"
 
 
 def is_sealed(folder: Path) -> bool:
-    """Whether deviations.csv is as it was written."""
+    """Whether deviations.csv is unchanged."""
     return all_of(seal_of(folder)) == digest(all_of(folder / "deviations.csv")).encode()
 
 
-def sweep(folder: Path, kept: Set[Path]) -> None:
-    """Delete the answers and scene tables that are of something else, and no other file."""
+def delete_stale(folder: Path, kept: Set[Path]) -> None:
+    """Delete the answers and scene tables that are not in `kept`, and no other file."""
     for other in set(folder.iterdir()) - kept:
         if is_part(other) or RUN.names(f"{folder.name}/{other.name}"):
             other.unlink()
 
 
-def settled(name: str, pair: Sequence[Any]) -> str:
-    """A setting, what was asked for, and what the engine then has, as runs.csv has it."""
+def setting_text(name: str, pair: Sequence[Any]) -> str:
+    """A setting, its requested value and the value in the engine, in the format of runs.csv."""
     asked, used = pair
     return f"{name}: asked {'default' if asked is None else asked}, used {used}"
 
@@ -247,8 +245,7 @@ def settled(name: str, pair: Sequence[Any]) -> str:
 def table_of_runs(
     records: Sequence[dict[str, Any]], unkept: Mapping[str, Comparison]
 ) -> pd.DataFrame:
-    """A row a cell: what was played, how it ended, how long the engine took, with which settings
-    and versions."""
+    """A row for each cell: what was played, status, engine time, settings and versions."""
     found = {
         (run.scenario, run.name, run.dt): {"status": run.status, "reason": run.reason}
         for comparison in unkept.values()
@@ -272,7 +269,9 @@ def table_of_runs(
         | found.get((record["scenario"], name_of(record), record["dt_s"]), {})
         | {
             "until_s": float(record["until_s"]),
-            "settings": "; ".join(map(settled, record["settings"], record["settings"].values())),
+            "settings": "; ".join(
+                map(setting_text, record["settings"], record["settings"].values())
+            ),
             "versions": "; ".join(
                 f"{name} {version}" for name, version in record["versions"].items()
             ),

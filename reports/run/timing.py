@@ -1,4 +1,4 @@
-"""Times what is to be compared in interleaved rounds of shuffled order, and keeps every sample."""
+"""Times the things to compare in interleaved, shuffled rounds, and keeps every sample."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-# s a sample lasts at least: some 10 000 ticks of the clock, so that reading it weighs nothing
+# s, least duration of a sample: some 10 000 ticks of the clock, so that reading it costs nothing
 LEAST = 1e-3
-MOST_RUNS = 20  # in one sample, as making ready takes time, too
-FEWEST_ROUNDS = 3  # of a run so long that its time is used up earlier
-WARM_UP = -1  # the round that is stored, but not counted
+MOST_RUNS = 20  # runs in one sample, because setting up takes time, too
+FEWEST_ROUNDS = 3  # rounds of a run so long that its time is used up earlier
+WARM_UP = -1  # the warm-up round, which is stored but not counted
 
 
 class Spent(NamedTuple):
-    """Seconds inside `step`, and the part of them that went into wrapping in Python."""
+    """Seconds inside `step`, and those of them spent on wrapping at the edges in Python."""
 
     seconds: float
     wrapping: float = 0.0
 
 
 class Timed(NamedTuple):
-    """One thing to be timed: `run` makes ready, runs once, and returns what it spent; one run is
-    `amount` of something.
+    """One thing to be timed: `run` sets up, runs once, and returns the time spent; one run is worth
+    `amount`.
 
-    `amount` is in the unit in which the cost is given: simulated seconds, or steps.
+    The cost is per unit of `amount`: a simulated second, or a step.
     """
 
     key: Any
@@ -38,8 +38,8 @@ class Timed(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One measurement: whose, in which round and place of it, s per unit of amount, and over how
-    many runs."""
+    """One measurement: its key, its round and place in the round, s per unit of amount, and number
+    of runs."""
 
     key: Any
     round: int
@@ -50,8 +50,8 @@ class Sample(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """An engine's time over its own time again, over `pairs` of such ratios: the median, the
-    quartiles, the least and the largest."""
+    """The ratios of an engine's time to a second timing of it, of `pairs` pairs: median, quartiles,
+    least and largest."""
 
     pairs: int
     low: float
@@ -62,7 +62,8 @@ class Noise(NamedTuple):
 
     @property
     def floor(self) -> float:
-        """How far from 1 half of the ratios read at most; inf where nothing was timed twice."""
+        """The largest distance from 1 of the middle half of the ratios; inf if nothing was timed
+        twice."""
         return max(abs(self.low - 1), abs(self.high - 1)) if self.pairs else inf
 
 
@@ -82,13 +83,13 @@ def interleaved(
     limit: float = inf,
     fewest: int = FEWEST_ROUNDS,
 ) -> list[Sample]:
-    """Samples of all of `what`, warm-up round first; each round visits all of it, in a new
+    """Samples of all of `what`, the warm-up round first; each round visits everything in a new
     random order.
 
-    What has spent `budget` s of its own sits out the rounds left, but never the first `fewest`
-    after the warm-up. Slow change of the machine (heat, clock, neighbours) thus meets all alike.
-    The garbage collector is off meanwhile, as in `timeit`. After `limit` s it ends, and a round
-    that is not whole by then is left out: of the rounds kept nothing is missing.
+    A thing that has used `budget` s skips the remaining rounds, but never the first `fewest` after
+    the warm-up. Slow changes of the machine (heat, clock, other processes) thus affect all alike.
+    The garbage collector is off meanwhile, as in `timeit`. It ends after `limit` s, and an
+    incomplete last round is left out.
     """
     rng = np.random.default_rng(seed)
     spent = {one.key: 0.0 for one in what}
@@ -115,7 +116,7 @@ def interleaved(
 
 
 def sampled(one: Timed, k: int, place: int) -> Sample:
-    """One sample: as many runs as it takes to fill `LEAST`."""
+    """One sample: as many runs as fill `LEAST` s."""
     seconds, wrapping, runs = 0.0, 0.0, 0
     while runs == 0 or (seconds < LEAST and runs < MOST_RUNS):
         spent = one.run()

@@ -1,5 +1,5 @@
-"""The timing pass of a run: when every cell has ended, one process measures the time of steps in
-interleaved rounds, while no other task of the run is under way."""
+"""The timing pass of a run: when every cell has ended, one process times the steps in interleaved
+rounds, while no other task runs."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from reports.run.stepping import (
     EMPTY,
     READ,
     Stepping,
-    beside,
     binding_of,
+    overheads,
 )
 from reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
 from reports.run.worker_process import allow
 from scenarios.model import Scenario
 
-ROUNDS = 9  # at most, the warm-up not counted
+ROUNDS = 9  # rounds at most, without the warm-up
 SCENES = (
     "free_fall",  # flight
     "oblique_e09",  # one collision
@@ -37,14 +37,14 @@ SCENES = (
     "gas_of_100",  # a crowd
     "frictional_box",  # a crowd with friction
 )
-"""Scenes with different work for an engine, one at least in each situation of the report."""
-# Disks times steps, over all step sizes of a scene: of a scene with more only the first part is
-# timed, the same for every engine, as a second of a stack costs otherwise at the start than later.
-WORK = 30_000  # all of it takes a second and a half a round
-# s of a part: what takes longer is not timed again, its cost is that of when it was played
+"""Scenes with different kinds of work, at least one for each situation of the report."""
+# Disks times steps, over all step sizes of a scene: if a scene has more, only its first part is
+# timed, the same for every engine, because the cost of a second of a stack changes with time.
+WORK = 30_000  # all engines together take 1.5 s in a round
+# s: a longer part is not timed again, its cost is that of the cell as played
 SLOW = 0.1
-SHARE = 0.1  # s of its own after which a cell sits out the rounds left, but for the first three
-BUSY = 0.10  # a noise floor beyond it: no time is shown
+SHARE = 0.1  # s after which a cell skips the remaining rounds, except the first three
+BUSY = 0.10  # with a higher noise floor no times are shown
 STARTING = 120.0  # s to import and compile the engines, before the first round
 
 TABLE = "timings.csv"
@@ -63,9 +63,9 @@ COLUMNS = [
     "wrapping_us_per_s",
     "again_us_per_s",
 ]
-"""Of timings.csv: µs of engine time per simulated second (median and quartiles of the rounds), of
-which `binding` is what as many steps and calls take in a world with nothing to do; µs of one
-read-out; `again` is the same cell timed a second time in the same rounds, where it was."""
+"""The columns of timings.csv: µs of engine time per simulated second (median and quartiles of the
+rounds); `binding`, the part that the same number of steps and calls takes in an empty world; µs of
+one read-out; `again`, the same cell timed a second time in the same rounds, if it was."""
 
 
 class CellToTime(NamedTuple):
@@ -77,19 +77,19 @@ class CellToTime(NamedTuple):
     row: EngineRow
     scenario: Scenario
     substeps: int
-    seconds: float  # that it took when it was played
+    seconds: float  # s that it took as played
 
     @property
     def is_slow(self) -> bool:
-        """Whether its part takes longer than `SLOW`, as it was played."""
+        """Whether its part took longer than `SLOW` as played."""
         return self.seconds * self.part.duration / self.scenario.duration > SLOW
 
     @property
     def part(self) -> Scenario:
-        """The scenario, or as much of its beginning as has `WORK`."""
+        """The scenario, or the first part of it with `WORK` disk steps."""
         scenario = self.scenario
         work = scenario.scene.n * scenario.intervals * sum(scenario.substeps)
-        # Halved, so that another ladder of steps times the same part, if it can.
+        # Halved, so that other step sizes time the same part if they can.
         halvings = max(0, ceil(log2(max(work, 1) / WORK)))
         samples = max(1, scenario.intervals // 2**halvings)
         return replace(scenario, duration=samples * scenario.sample_interval)
@@ -98,7 +98,7 @@ class CellToTime(NamedTuple):
 def cells_to_time(
     archive: Archive, engines: Mapping[str, EngineRow], scenarios: Mapping[str, Scenario]
 ) -> list[CellToTime]:
-    """The cells that are timed: of `timed_scenes`, those that were played to their end."""
+    """The cells to be timed: those of `timed_scenes` that were played to their end."""
     played = {record["scene"] for record in archive.records if record["status"] == "ok"}
     chosen = set(timed_scenes([scene for scene in scenarios if scene in played]))
     return [
@@ -118,14 +118,14 @@ def cells_to_time(
 
 
 def timed_scenes(played: Sequence[str]) -> list[str]:
-    """Those of `SCENES` that were played, then others in their order, to as many as `SCENES`."""
+    """The played scenes of `SCENES`, then others in order, up to the number of `SCENES`."""
     known = [scene for scene in SCENES if scene in played]
     return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
 
 
 @dataclass(frozen=True)
 class Pass:
-    """The task of the worker: it times `cells`, and what is measured beside them, within
+    """The task of the worker: it times `cells`, and the overhead of their engines, within
     `seconds`."""
 
     cells: Sequence[CellToTime]
@@ -133,8 +133,8 @@ class Pass:
     seed: int
 
     def __call__(self) -> list[dict[str, Any]]:
-        """A line of the journal for each thing that was timed; none if not even the warm-up
-        fits."""
+        """A line of the journal for each thing timed; none if not even the warm-up fits into the
+        time."""
         allow(self.seconds + STARTING)
         started = perf_counter()
         slow = [cell for cell in self.cells if cell.is_slow]
@@ -143,8 +143,8 @@ class Pass:
             for cell, copies in in_turns([cell for cell in self.cells if not cell.is_slow])
             for timed in (timed_cell(cell, copy) for copy in range(copies))
         ]
-        what += besides(self.cells)
-        left = self.seconds - (perf_counter() - started)  # the engines have been imported, too
+        what += overheads_of(self.cells)
+        left = self.seconds - (perf_counter() - started)  # importing the engines counts, too
         samples = interleaved(what, ROUNDS, SHARE, self.seed, left)
         rounds: dict[Any, list[Sample]] = {}
         for sample in samples:
@@ -154,8 +154,8 @@ class Pass:
 
 
 def in_turns(cells: Sequence[CellToTime]) -> list[tuple[CellToTime, int]]:
-    """The cells to time, and how often each takes part: twice at the middle step size of its scene,
-    which gives the noise floor."""
+    """The cells to time, with a number for each timing. Cells at the middle step size of a scene
+    are timed twice, which gives the noise floor."""
     return [(cell, 2 if cell.substeps == cell.scenario.middle_substeps else 1) for cell in cells]
 
 
@@ -166,20 +166,19 @@ def timed_cell(cell: CellToTime, copy: int) -> Timed:
     return Timed(key, Stepping(cell.row.make, part, cell.substeps), part.duration)
 
 
-def besides(cells: Sequence[CellToTime]) -> list[Timed]:
-    """The empty steps, calls and read-outs of all engines that have an answer to a world with
-    nothing to do."""
+def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
+    """The empty steps, calls and read-outs of all engines that accept an empty world."""
     found: dict[Any, Timed] = {}
     for cell in cells:
-        for what, run, amount in beside(cell.row.make, cell.scenario):
-            # Nothing but a read-out depends on the scene.
+        for what, run, amount in overheads(cell.row.make, cell.scenario):
+            # Only a read-out depends on the scene.
             key = ("beside", what, cell.name, cell.scenario.name if what == READ else "")
             found.setdefault(key, Timed(key, run, amount))
     return [timed for timed in found.values() if can(timed)]
 
 
 def can(timed: Timed) -> bool:
-    """Whether it runs: an engine may refuse a world in which nothing moves."""
+    """Whether it runs; an engine may refuse a world in which nothing moves."""
     with suppress(Exception):
         timed.run()
         return True
@@ -187,7 +186,7 @@ def can(timed: Timed) -> bool:
 
 
 def counted_rounds(samples: Sequence[Sample]) -> Sequence[Sample]:
-    """Those without the warm-up, unless that took so long that there is no other."""
+    """The samples without the warm-up; with it if there are no others."""
     return [sample for sample in samples if sample.round != WARM_UP] or samples
 
 
@@ -203,15 +202,15 @@ def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
 
 
 def as_played(cell: CellToTime) -> dict[str, Any]:
-    """The line of the journal for a cell that is not timed again: what it took to play, listening
-    for collisions, so rather too much than too little."""
+    """The line of the journal for a cell that is not timed again: its time as played, an upper
+    bound, because collisions were recorded."""
     until = cell.scenario.duration
     cost = [cell.seconds / until]
     return {"timing": cell.key, "copy": 0, "timed_s": until, "cost": cost, "wrapping": [0.0]}
 
 
 def is_busy(archive: Archive) -> bool:
-    """Whether something else kept the machine so busy that no time is worth showing."""
+    """Whether other work kept the machine so busy that times are not shown."""
     return noise_floor(archive).floor > BUSY
 
 
@@ -221,7 +220,7 @@ def is_timed(archive: Archive, cells: Sequence[CellToTime]) -> bool:
 
 
 def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame:
-    """timings.csv, `COLUMNS`: a row a cell that was timed.
+    """timings.csv with `COLUMNS`: a row for each timed cell.
 
     scenarios: by name, with their steps.
     """
@@ -253,8 +252,8 @@ def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame
 
 
 def binding(archive: Archive, name: str, scenario: Scenario, substeps: int) -> float:
-    """s per simulated second that the steps and calls of an engine take where there is nothing to
-    do; nan where that is not known."""
+    """s per simulated second that the steps and calls of an engine take in an empty world; nan if
+    that is not known."""
     step, singly = (median_of(archive.beside.get((what, name, ""))) for what in (EMPTY, CALL))
     return binding_of(step, singly, scenario, substeps)
 
@@ -265,6 +264,6 @@ def median_of(costs: Sequence[float] | None) -> float:
 
 
 def noise_floor(archive: Archive) -> Noise:
-    """How far the time of an engine is from its own time again, over all cells timed twice."""
+    """The ratios of the two timings of a cell, over all cells timed twice."""
     pairs = [lines for lines in archive.timings.values() if {0, 1} <= lines.keys()]
     return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])

@@ -1,5 +1,5 @@
-"""Worker processes, seen from the parent: one may abort, hang or use up the memory, and the parent
-learns how it ended."""
+"""Worker processes, seen from the parent: a worker may abort, hang or use up the memory, and the
+parent learns how it ended."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from adapters.safe_path import path_of_this, python
 from reports.run.worker_process import CLOCK, Failure, out_of_memory
 from reports.terminal.foreign_text import legible
 
-# s for Python to start and to import what a task is made of, on a machine that is busy
+# s for Python to start and to import the modules of a task, on a busy machine
 STARTING = 120.0
-OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # exits that no engine makes by a fault of its own
-# bytes of what a task prints that are kept: faulthandler writes up to 100 lines a thread
+OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # signals that a fault of an engine does not cause
+# bytes kept of the output of a task: faulthandler writes up to 100 lines a thread
 PRINTED = 65536
 WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
 # the calls that wait for what a solver's file answers
 ASKING = ("own_solver/process.py", "adapters/system.py")
-# of the thread that got the signal, which is the one that plays: others only watch
+# of the thread that got the signal, which is the one that plays; other threads only watch
 INNERMOST = re.compile(
     r'Current thread [^\n]*most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)'
 )
 
 
 class Worker:
-    """A process and three channels to it: tasks and results, its output, and the trail of its task.
+    """A process with three channels: tasks and results, its output, and the trail of its task.
 
     The trail is a file without a name that both processes hold open: what a task writes there is
     kept when the worker dies.
@@ -51,7 +51,7 @@ class Worker:
         self.start()
 
     def start(self) -> None:
-        """Start the process, with its channels."""
+        """Start the process with its channels."""
         self.connection, theirs = Pipe()
         self.output, printing = os.pipe()
         self.trail = os.memfd_create("trail")
@@ -60,10 +60,11 @@ class Worker:
         os.close(printing)
 
     def do(self, task: Callable[[], Any], timeout: float) -> bytes | Failure | None:
-        """Carry out a task: its result, pickled, or how it failed; None if another worker should
-        try it again.
+        """Carry out a task; returns the pickled result, or how it failed, or None if another worker
+        should try again.
 
-        `timeout` counts from when the worker has the task, and again from each call of `allow`.
+        `timeout` counts from the arrival of the task in the worker, and again from each call of
+        `allow`.
         """
         self.printed = b""
         self.forget_trail()
@@ -86,10 +87,10 @@ class Worker:
             return Failure("timeout", said, self.left(), outside=not begun)
 
     def connect(self) -> None:
-        """Nothing: the process has had its end of the connection from the start."""
+        """Does nothing: the process has its end of the connection from the start."""
 
     def answer(self, timeout: float) -> bytes:
-        """The next message of the worker; its output meanwhile is kept. Raises `TimeoutError`, or
+        """The next message of the worker; its output until then is kept. Raises `TimeoutError`, or
         `EOFError` if the worker died."""
         end = monotonic() + timeout
         lines: list[Any] = [self.connection, self.output]
@@ -103,7 +104,7 @@ class Worker:
                 raise TimeoutError
 
     def listen(self) -> int:
-        """Read the output of the worker and keep the end of it; returns how many bytes came, 0 at
+        """Read some output of the worker and keep the end of it; returns the number of bytes, 0 at
         the end."""
         new = os.read(self.output, PRINTED)
         self.printed = (self.printed + new)[-PRINTED:]
@@ -111,16 +112,17 @@ class Worker:
             sys.stderr.write(legible(new.decode(errors="replace")))
         return len(new)
 
-    def hear(self, seconds: float) -> None:
-        """Read the output to its end, for at most so many s."""
+    def drain(self, seconds: float) -> None:
+        """Read the output to its end, for at most `seconds`."""
         end = monotonic() + seconds
         while wait([self.output], None if seconds == inf else max(0.0, end - monotonic())):
             if not self.listen():
                 return
 
     def death(self, begun: bool) -> Failure | None:
-        """How a worker died, its task `begun` or not; None if it was killed from outside."""
-        self.hear(inf)
+        """How a worker died; None if it was killed from outside. `begun`: whether it had begun its
+        task."""
+        self.drain(inf)
         code = self.process.wait()
         if code in OUTSIDE:
             return None
@@ -132,23 +134,23 @@ class Worker:
         )
 
     def abort(self) -> str:
-        """Kill a worker that hangs; returns where in Python it was."""
+        """Kill a worker that hangs; returns the place in Python where it hung."""
         if os.name == "posix":
-            self.process.send_signal(signal.SIGABRT)  # faulthandler answers even from within C
-            self.hear(1.0)
+            self.process.send_signal(signal.SIGABRT)  # faulthandler works even inside C code
+            self.drain(1.0)
         self.process.kill()
         self.process.wait()
         return self.place()
 
     def place(self) -> str:
-        """The place in Python at which faulthandler was called, and the last line of output before
-        it, as the end of a sentence."""
+        """The place in Python that faulthandler printed, and the last line of output before it, as
+        the end of a sentence."""
         printed = self.printed.decode(errors="replace")
         before, fatal, dump = printed.rpartition("Fatal Python error: ")
         found = INNERMOST.search(dump)
         file = "/".join(Path(found[1]).parts[-2:]) if found else ""
         place = f" in {found[3]}, line {found[2]} of {file}" if found else ""
-        # a solver's file runs in a process of its own, whose place in the file is not known here
+        # a solver's file runs in another process, so the place in the file is not known here
         if file in ASKING:
             place = ", while the solver's file had not come back from a call"
         said = [line for line in (before if fatal else printed).splitlines() if line.strip()]
@@ -164,7 +166,7 @@ class Worker:
         return os.pread(self.trail, os.fstat(self.trail).st_size, 0)
 
     def close(self) -> None:
-        """Kill the process, whatever it is doing."""
+        """Kill the process."""
         self.stopped = True
         self.process.kill()
         self.process.wait()
@@ -173,15 +175,15 @@ class Worker:
         self.close_channels()
 
     def close_channels(self) -> None:
-        """Let go of what the process had besides its connection."""
+        """Close the channels besides the connection."""
         for line in (self.output, self.trail):
             os.close(line)
 
 
 def start(theirs: Connection, trail: int, printing: int, memory: int) -> subprocess.Popen[bytes]:
-    """A new interpreter at the other end of a worker's channels."""
-    # The same path as here, so that it finds the modules of a task, but none that only lie in the
-    # folder in which this command was started.
+    """Start a new interpreter at the other end of a worker's channels."""
+    # The same sys.path as here, so that it finds the modules of a task, but none that are only in
+    # the folder in which this command was started.
     return subprocess.Popen(
         [*python(WORK), *map(str, (theirs.fileno(), trail, memory))],
         stdin=subprocess.DEVNULL,

@@ -1,5 +1,5 @@
-"""What runs in a worker process: it takes tasks from the parent one at a time and sends back what
-they give."""
+"""The code of a worker process: it takes tasks from the parent one at a time and sends back their
+results."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 from adapters import system
 
-CLOCK = b"clock "  # before a number of s; no pickle begins so
-LONGEST = 1e6  # s, for what is stopped only with the run
-# s without a task after which a process leaves: workers on other machines outlive the run
+CLOCK = b"clock "  # marks a number of s; no pickle begins with it
+LONGEST = 1e6  # s, of a task that only ends with the run
+# s without a task after which a process exits: workers on other machines outlive the run
 IDLE = 60.0
 
 _trail: int | None = None
@@ -28,10 +28,9 @@ class Failure(NamedTuple):
 
     Attributes:
         status: "crashed", "timeout" or "error", as in `STATUSES` of run.py.
-        reason: why.
-        trail: what it left.
-        outside: whether it failed for a reason outside what it plays: the machine, the memory, this
-            program. Another time it may not.
+        reason: why. trail: the bytes that the task left.
+        outside: whether the reason is outside the engine: the machine, the memory, this program.
+            Another try may succeed.
     """
 
     status: str
@@ -41,23 +40,23 @@ class Failure(NamedTuple):
 
 
 def leave(parts: Sequence[Any]) -> None:
-    """Append bytes to the trail of this task, which survives the process; nothing outside a
+    """Append bytes to the trail of this task, which survives the process. Does nothing outside a
     worker."""
     if _trail is not None:
-        # a trail that cannot be kept is no fault of the engine that is played
+        # if the trail cannot be written, the engine is not at fault
         with contextlib.suppress(OSError):
             os.write(_trail, b"".join(parts))
 
 
 def allow(seconds: float = 0.0) -> None:
-    """From now on this task may take `seconds`, or its time-out if that is longer; nothing outside
-    a worker."""
+    """From now on this task may take `seconds`, or its time-out if that is longer. Does nothing
+    outside a worker."""
     if _parent is not None:
         _parent.send_bytes(CLOCK + str(seconds).encode())
 
 
 def serve(connection: Connection, memory: int) -> None:
-    """Carry out tasks until there are none left; whatever a task raises is a `Failure`."""
+    """Carry out tasks until there are no more; an exception of a task becomes a `Failure`."""
     while connection.poll(IDLE):
         try:
             packed = connection.recv_bytes()
@@ -73,9 +72,9 @@ def serve(connection: Connection, memory: int) -> None:
             allow()
             answer = pickle.dumps(task())
         except MemoryError as error:
-            error.__traceback__ = None  # lets go of the frames, and so of what they hold
+            error.__traceback__ = None  # releases the frames, and so the objects they hold
             connection.send_bytes(pickle.dumps(out_of_memory(memory)))
-            return  # what is not let go of ends with the process
+            return  # whatever is not released ends with the process
         except Exception as error:  # an engine may raise anything
             # of `NotStarted`; an import of it here would take long
             outside = bool(getattr(error, "outside", False))
@@ -86,16 +85,17 @@ def serve(connection: Connection, memory: int) -> None:
 
 
 def out_of_memory(memory: int) -> Failure:
-    """What comes of a task that took more than `memory` bytes, 0: than there is."""
+    """The failure of a task that took more than `memory` bytes, or with 0 more than the machine
+    has."""
     limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
     return Failure("error", f"MemoryError: took {limit}", outside=True)
 
 
 def prepare(memory: int) -> None:
-    """What a process must be before an engine is let in.
+    """Prepare a process before it runs an engine.
 
-    A crash prints where Python was and writes no core; Ctrl-C is left to the parent, who alone
-    decides what it means; data beyond `memory` bytes cannot be had; it dies with its parent.
+    A crash prints the place in Python and writes no core. Ctrl-C is handled by the parent only.
+    More than `memory` bytes of data cannot be allocated. The process dies with its parent.
     """
     faulthandler.enable()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -106,14 +106,15 @@ def prepare(memory: int) -> None:
 
 
 def main(arguments: Sequence[Any]) -> None:
-    """What the process does; its words are CONNECTION TRAIL MEMORY: two file descriptors and a
-    number of bytes."""
+    """The main function of the process; its arguments are CONNECTION TRAIL MEMORY: two file
+    descriptors and a number of bytes."""
     connection, trail, memory = (int(argument) for argument in arguments)
     work(Connection(connection), trail, memory)
 
 
 def work(connection: Connection, trail: int, memory: int) -> None:
-    """Carry out the tasks that come by a connection; `trail`: the descriptor of its file."""
+    """Carry out the tasks that arrive by a connection; `trail`: the descriptor of the trail's
+    file."""
     global _trail, _parent
     _trail, _parent = trail, connection
     prepare(memory)

@@ -14,7 +14,7 @@ import numpy as np
 from adapters.play import play_once
 from reports.compare import laws
 from reports.run.scenes import open_scene
-from reports.run.stepping import Make, Stepping, beside
+from reports.run.stepping import Make, Stepping, overheads
 from reports.run.timing import Sample, Timed, interleaved
 from reports.run.timing_pass import can
 from scenarios.model import Scenario, Trajectory
@@ -108,13 +108,13 @@ def times_of(
 ) -> list[Sample]:
     """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of
     the scene; of those in `also` by (name, what) what is measured beside it, s each, see
-    `stepping.beside`, but what the engine refuses."""
+    `stepping.overheads`, but what the engine refuses."""
     scenario = held(scene, seed).scenario
     what = [
         Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
         for key, make in engines.items()
     ]
     for name, make in also.items():
-        besides = (Timed((name, each), run, k) for each, run, k in beside(make, scenario))
+        besides = (Timed((name, each), run, k) for each, run, k in overheads(make, scenario))
         what += filter(can, besides)
     return interleaved(what, rounds, budget, seed)

@@ -44,7 +44,7 @@ class Measured:
         budget: the columns of `budget.budget_of`.
         samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place,
             cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes;
-            of the kinds of `stepping.beside` in s each.
+            of the kinds of `stepping.overheads` in s each.
         truths: as `models.closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.

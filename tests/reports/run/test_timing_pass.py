@@ -141,7 +141,7 @@ def test_what_takes_long_has_three_rounds_and_leaves_the_others_to_the_rest(
         Timed(("beside", key, "", ""), partial(Spent, seconds), 1.0)
         for key, seconds in {"long": 2 * SHARE, "short": SHARE / 100}.items()
     ]
-    monkeypatch.setattr(timing_pass, "besides", lambda _: what)
+    monkeypatch.setattr(timing_pass, "overheads_of", lambda _: what)
     monkeypatch.setattr(timing_pass, "ROUNDS", 9)  # which is 1 in all other tests
     lines = timing_pass.Pass([], 5.0, 0)()
 
@@ -198,7 +198,7 @@ def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest
     refusing = timing_pass.CellToTime(
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
-    monkeypatch.setattr("reports.run.stepping.empty", partial(int, "no world"))
+    monkeypatch.setattr("reports.run.stepping.empty_world", partial(int, "no world"))
     lines = timing_pass.Pass([refusing], 5.0, 0)()
 
     assert [line.get("timing") or line["beside"] for line in lines].count("key") == 1

@@ -21,10 +21,10 @@ from reports.run.made import (
     MADE,
     Kind,
     Made,
+    foreign_file_in,
     may_overwrite,
     put_made,
     read_made,
-    stranger_in,
     writing,
 )
 from reports.terminal.exits import FolderTaken
@@ -155,12 +155,12 @@ def test_a_folder_in_which_somebody_has_put_something_stays_as_it_is(
 def test_the_folder_of_a_run_is_known_for_what_it_is(finished: Path):
     """The control of the test above: where nobody has put anything, nothing is found; a run is no
     measurement."""
-    assert stranger_in(finished, RUN) == ""
+    assert foreign_file_in(finished, RUN) == ""
     assert {"machine.json", "scenes/two-disks.toml", "report.html"} <= set(
         read_made(finished).files
     )  # type: ignore[union-attr]
     assert (
-        stranger_in(finished, Kind("crosscheck speed"))
+        foreign_file_in(finished, Kind("crosscheck speed"))
         == "was made by crosscheck run, not by crosscheck speed"
     )
 
@@ -422,9 +422,9 @@ def test_what_was_being_written_when_it_was_killed_is_ours(tmp_path: Path):
     (part / "runs.csv").write_text("scenario,eng")
     (part / ".crosscheck-4711.part").write_text("{")
 
-    assert stranger_in(part, RUN) == ""
+    assert foreign_file_in(part, RUN) == ""
     (part / "report.html").write_text("not ours: nobody was writing it")
-    assert "holds report.html" in stranger_in(part, RUN)
+    assert "holds report.html" in foreign_file_in(part, RUN)
 
 
 def test_what_is_refused_before_it_is_written_leaves_the_record_as_it_was(tmp_path: Path):
@@ -437,7 +437,7 @@ def test_what_is_refused_before_it_is_written_leaves_the_record_as_it_was(tmp_pa
         raise ZeroDivisionError
     assert (tmp_path / MADE).read_bytes() == before
     (tmp_path / "runs.csv").write_text("as I would have it")
-    assert "holds runs.csv, which is not as" in stranger_in(tmp_path, RUN)
+    assert "holds runs.csv, which is not as" in foreign_file_in(tmp_path, RUN)
 
 
 def test_what_is_made_anew_takes_its_place_whole_or_not_at_all(tmp_path: Path):
