@@ -151,6 +151,7 @@ CALLED = {
 
 # causes that lie where the normal of a pair is made, and those that name it but lie elsewhere
 ABOUT_NORMAL = re.compile(r"\bnormal\b|\bd[xy] is")
+SIGN_OF_J = "sign of the normal or of J"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
 GUARD = re.compile(r"==\s*0\b")  # two at the same place
 ASSIGNS = re.compile(r"([\w.,\s\[\]]+?)\s*[-+*/]?=(?![=>])")
@@ -260,6 +261,9 @@ class Source:
             return [*made, *detecting(seen)]
         if row.task == "2b":
             return made or displacing(seen, row.cause)
+        if row.task == "2c" and SIGN_OF_J in row.cause:
+            # The displacement has the same normal, and is judged by itself: J comes first.
+            return [*impelling(seen, "mass"), *(a.line for a in seen if is_write(a, "velocity"))]
         if row.task == "2c":
             return made or impelling(seen, row.cause)
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []

@@ -29,6 +29,7 @@ FAULTY = (
     "typo_in_d.js",
     "state_in_impulse.py",
     "two_overlap_and_b_sign.js",
+    "impulse_sign.js",
 )
 COUNTS = {  # keeps a count of its calls, which it also writes into the sphere
     "count.js": "let n = 0;\nfunction integrate(s, dt) { s.alpha = ++n; }\n",
@@ -139,6 +140,15 @@ def test_an_endless_loop_is_filed_under_the_part_it_stands_in(name: str, tmp_pat
 
     assert one.faults[0].task == mutant.task
     assert "does not come back" in one.sentences[0]
+
+
+def test_a_wrong_sign_of_j_shows_the_line_of_j_first(checks: dict[str, FileCheck]):
+    """And those that apply it; not those of the normal, by which the displacement is right."""
+    lines = [text for _, text in begin_with(checks["impulse_sign.js"]).lines]
+
+    assert lines[0].startswith("var J = (1 + restitution)")
+    assert len(lines) == 5
+    assert all(".velocity." in line for line in lines[1:])
 
 
 def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, FileCheck]):
