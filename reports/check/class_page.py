@@ -1,4 +1,4 @@
-"""Writes the page of a class: points, common causes, and of each student what to begin with."""
+"""Writes the page of a class: points, common causes, and the first fault of each student."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from reports.page.documents import render
 from reports.run.made import sealed
 from reports.terminal.foreign_text import put_text
 
-BINS = 10  # of the distribution, each a tenth of the points
+BINS = 10  # bars of the distribution, each a tenth of the points
 
 
 NOTHING = "No file that can be checked."
@@ -26,7 +26,7 @@ PLACE = re.compile(r" \(line \d+, column \d+\)")
 
 
 class Bar(NamedTuple):
-    """A bar of a chart: what it counts, how many students, its share of the longest, percent."""
+    """A bar of a chart: label, number of students, length as percent of the longest."""
 
     label: str
     students: int
@@ -34,7 +34,7 @@ class Bar(NamedTuple):
 
 
 def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
-    """Write the page of a class to `path`, over whatever is there; raises `OSError`."""
+    """Write the page of a class to `path`, overwriting what is there; raises `OSError`."""
     root, checks = marked[0].root, [one.check for one in marked]
     html = render(
         "check/class.html.j2",
@@ -57,8 +57,8 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
 
 
 def distribution(marked: Sequence[Marked]) -> dict[str, int]:
-    """How many students have how many points, in tenths of what there is; the last holds all of
-    them."""
+    """The number of students in each tenth of the possible points; the last bar includes full
+    marks."""
     most = marked[0].most
     tenths = Counter(min(int(one.points / most * BINS), BINS - 1) for one in marked)
     names = [f"{number(most * k / BINS)} to {number(most * (k + 1) / BINS)}" for k in range(BINS)]
@@ -66,7 +66,8 @@ def distribution(marked: Sequence[Marked]) -> dict[str, int]:
 
 
 def causes(marked: Sequence[Marked]) -> dict[str, int]:
-    """How many students have each cause, the most common first, else in the order of the tasks."""
+    """The number of students with each cause, the most common first, then in the order of the
+    tasks."""
     found = Counter[str]()
     for one in marked:
         found.update(set(causes_of(one)))

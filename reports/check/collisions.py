@@ -1,4 +1,5 @@
-"""A pair before a collision and what the collision changed, as the laws of impact take it."""
+"""A pair before a collision and what the collision changed, in the form that the laws of impact
+use."""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ class PairCollision(NamedTuple):
 
     @property
     def vn(self) -> float:
-        """Its part along n; negative where they approach."""
+        """The component of u along n; negative if they approach."""
         return float(self.u @ self.n)
 
     @property
@@ -42,7 +43,7 @@ class PairCollision(NamedTuple):
 
 
 def collision_of(balls: tuple[Ball, ...], after: list[Ball]) -> PairCollision:
-    """A pair and how it was displaced."""
+    """The `PairCollision` of a pair, with its displacement."""
     a, b = balls
     n, d = direction(a, b)
     shifts = (np.subtract(y.x, x.x) for x, y in zip(balls, after))
@@ -50,9 +51,9 @@ def collision_of(balls: tuple[Ball, ...], after: list[Ball]) -> PairCollision:
 
 
 Impulse = Callable[[PairCollision, float], Array]
-"""What A gets from B by a law, N s, from a pair and the restitution."""
+"""A law: (pair, restitution) -> impulse on A from B, N s."""
 
 
 def changes(balls: tuple[Ball, ...], after: list[Ball]) -> Array:
-    """(2, 2) m/s, what was added to both velocities."""
+    """(2, 2) m/s, the changes of both velocities."""
     return np.array([np.subtract(y.v, x.v) for x, y in zip(balls, after)])

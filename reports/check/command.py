@@ -1,4 +1,5 @@
-"""`crosscheck check`: one file or a folder of them, as a table, a page, or a format of formats/."""
+"""`crosscheck check`: checks a file or a folder of them, and writes a table, a page, or a format of
+formats/."""
 
 from __future__ import annotations
 
@@ -44,16 +45,16 @@ from reports.terminal.progress import Progress
 if TYPE_CHECKING:
     from reports.check.smallest_scene import Smallest
 
-# What an earlier page of ours begins with, and nothing else does: it may be written over.
+# Only pages written by this command start with this; they may be overwritten.
 PAGE = b'<meta name="generator" content="crosscheck check">'
-CHECKING = 600.0  # s that a file may take: what each of its calls may take adds up to less
-# how the names of files and folders begin that no student wrote
+CHECKING = 600.0  # s that a file may take: more than the sum of the limits of its calls
+# prefixes of files and folders that no student wrote
 NOBODYS = (".", "__", "node_modules")
 
 
-# the name that the exercise gives the file, and ours
+# the file names of the exercise and of this project
 EXPECTED = ("exercise.js", "solver.py")
-# What students hand in instead of a file, and nobody keeps beside a class.
+# Suffixes of what students hand in instead of a solver.
 HANDED_IN = (
     *(".zip", ".rar", ".7z", ".tar", ".gz", ".tgz", ".bz2", ".xz"),
     *(".pdf", ".doc", ".docx", ".odt", ".rtf", ".ipynb", ".ts"),
@@ -61,7 +62,7 @@ HANDED_IN = (
 
 
 class Output(NamedTuple):
-    """An output: the option that asks for it, its format, and its file; None if it is printed."""
+    """An output: its option, its format, and its file; None if it is printed."""
 
     option: str
     format: str
@@ -69,7 +70,7 @@ class Output(NamedTuple):
 
 
 class Grading(NamedTuple):
-    """How a check becomes marks: points, how ids are read, whether causes are left out."""
+    """How a check becomes marks: points, pattern of ids, whether causes are left out."""
 
     points: Points
     id_pattern: re.Pattern[str] | None
@@ -77,8 +78,8 @@ class Grading(NamedTuple):
 
 
 def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Grading) -> None:
-    """Check what is at `path` and say it; exits 0, 1 (a fault was found) or 2 (there is nothing to
-    check)."""
+    """Check the file or folder `path` and print the result; exits 0, 1 (a fault was found) or 2
+    (nothing to check)."""
     single = any(FORMATS[one.format].single for one in outputs)
     files = submission_of(path) if single else files_of(path)
     several = path.is_dir() and not single
@@ -116,8 +117,8 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
 def outputs_of(
     as_json: bool, junit: Path | None, formats: Sequence[str], outs: Sequence[Path]
 ) -> list[Output]:
-    """What is to be written; each --format goes to the --out of the same place, a single one
-    without --out is printed. Exits 2 if that makes no sense."""
+    """The outputs to write. Each --format belongs to the --out at the same position; a single one
+    without --out is printed. Exits 2 if they do not match."""
     for name in formats:
         if name not in FORMATS:
             refuse([f"--format {name}: is none of {', '.join(FORMATS)}"])
@@ -134,7 +135,7 @@ def outputs_of(
 
 
 def grading_of(points: Path | None, id_pattern: str, hints: str) -> Grading:
-    """How marks are given; exits 2 if that makes no sense."""
+    """The `Grading` of these options; exits 2 if one is invalid."""
     if hints not in HINTS:
         refuse([f"--hints {hints}: is none of {', '.join(HINTS)}"])
     try:
@@ -159,9 +160,9 @@ def marks_of(
     not_read: Sequence[str],
     scenes: Sequence[Smallest],
 ) -> list[Marked]:
-    """The marks of each file; says on standard error where an id is not sure to be one.
+    """The marks of each file; warns on standard error about doubtful ids.
 
-    scenes: of a single file, those that show its faults.
+    scenes: for a single file, those that show its faults.
     """
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
@@ -179,7 +180,7 @@ def marks_of(
 
 def submission_of(path: Path) -> list[Path]:
     """The solver of one student: the file `path`, or the only solver in that folder, or the only
-    one there that is named as the exercise says; else the folder itself."""
+    one there with a name of the exercise; else the folder itself."""
     if not path.is_dir():
         return files_of(path)
     found = solvers_below(path)
@@ -189,7 +190,7 @@ def submission_of(path: Path) -> list[Path]:
 
 
 def one_of_several(folder: Path) -> FileCheck:
-    """What is said of a submission without a solver, or with several."""
+    """The message on a submission without a solver, or with several."""
     files = [place_of(file, folder) for file in solvers_below(folder)]
     if not files:
         return check_file(folder)
@@ -198,14 +199,14 @@ def one_of_several(folder: Path) -> FileCheck:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, in order of their names; exits 2 if there is none.
+    """The file, or all solvers below a folder, sorted by name; exits 2 if there are none.
 
-    Links to nothing are among them, and so is what stands for a student without a solver: an
-    archive, a PDF, or a folder as `is_missing` says.
+    Dangling links are included, and so are entries of students without a solver: an archive, a PDF,
+    or a folder that `is_missing`.
     """
     try:
         there = path.exists()
-    except OSError as fault:  # a name of 300 letters, say
+    except OSError as fault:  # for example a name of 300 letters
         refuse([f"{path}: {fault.strerror or fault}; name a file or a folder"])
     if not there:
         refuse([f"{path}: is not there; name an Exercise.js, a solver.py or a folder of them"])
@@ -227,7 +228,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def solvers_below(folder: Path) -> list[Path]:
-    """The files that may be solvers, and links to nothing, in order of their names."""
+    """The files that may be solvers, and dangling links, sorted by name."""
     return sorted(
         file
         for file in folder.rglob("*")
@@ -239,7 +240,7 @@ def solvers_below(folder: Path) -> list[Path]:
 
 
 def visible(paths: Iterable[Path]) -> list[Path]:
-    """Those that a person, not a program, may have put there."""
+    """The paths that a person, not a program, may have put there."""
     return [path for path in paths if not path.name.startswith(NOBODYS)]
 
 
@@ -253,8 +254,8 @@ def is_missing(path: Path, foldered: bool) -> bool:
 
 
 def others_in(folder: Path, files: Sequence[Path]) -> list[str]:
-    """The names of what lies in the folder itself and has no row: files that can be no solver, and
-    folders that hold none, which end in a slash."""
+    """The names of entries of the folder without a row: files that cannot be solvers, and folders
+    without one, which end in a slash."""
     with_row = {file.relative_to(folder).parts[0] for file in files}
     return sorted(
         f"{one.name}/" if one.is_dir() else one.name
@@ -265,7 +266,7 @@ def others_in(folder: Path, files: Sequence[Path]) -> list[str]:
 
 def places_for(page: Path | None, outputs: Sequence[Output]) -> None:
     """Exit 2, before anything is checked, if an output cannot be written, or would replace a file
-    that is none of ours."""
+    of another origin."""
     taken = {} if page is None else {os.path.realpath(page): "is where the page goes"}
     if page is not None:
         place_for("--page", page, PAGE, "page of a check")
@@ -298,8 +299,8 @@ def is_handed_out(file: Path) -> bool:
 
 
 def checked(files: Sequence[Path]) -> list[FileCheck]:
-    """The checks in order, as many at once as there are cores, in workers: those can be stopped
-    whatever they do. Of files with the same text one is judged, and speaks for all."""
+    """The checks in order, one worker per core, which can always be stopped. Files with the same
+    text are judged once."""
     alike: dict[Hashable, list[Path]] = {}
     for file in files:
         alike.setdefault(identity_of(file), []).append(file)
@@ -317,14 +318,14 @@ def checked(files: Sequence[Path]) -> list[FileCheck]:
 
 
 def check_here(file: Path) -> FileCheck:
-    """In a worker: the check of a file; where it can be, by the process of the file before."""
+    """In a worker: the check of a file, in the process of the previous file if possible."""
     keep_processes()
     return check_file(file)
 
 
 def identity_of(file: Path) -> Hashable:
-    """What is the same of two files only if a check cannot tell them apart; of what is no solver's
-    text its own path. A Python file can see its name."""
+    """A key that is equal for two files only if their checks must agree; for a file that is no
+    solver, its path. A Python file can read its own name."""
     try:
         solver = read_solver(file)
     except NotASolver:
@@ -341,12 +342,12 @@ def named_for(file: Path, one: FileCheck) -> FileCheck:
 
 
 def not_checked(file: Path, failure: Failure) -> FileCheck:
-    """What is said of a file whose check did not come to its end."""
+    """The check of a file whose check was not completed."""
     return FileCheck(file, [], f"{file}: could not be checked: {failure.status}: {failure.reason}")
 
 
 def scenes_of(one: FileCheck) -> list[Smallest]:
-    """Of each fault that has a sentence the smallest scene that shows it, if one is found."""
+    """The smallest scene that shows each fault with a sentence, if one is found."""
     if not one.faults or one.restitution is None or one.solver is None:
         return []
     search = partial(scenes_here, one.solver, one.restitution, one.findings, keeps_state(one.rows))
@@ -371,7 +372,7 @@ def make_class_page(path: Path, marked: Sequence[Marked]) -> None:
 
 
 def put_page(path: Path, put: Callable[[], None]) -> None:
-    """Write a page and say where it is; exits 2 if that is not possible."""
+    """Write a page and print its path; exits 2 if that fails."""
     try:
         put()
     except OSError as fault:
@@ -383,7 +384,8 @@ def put_page(path: Path, put: Callable[[], None]) -> None:
 def scenes_here(
     solver: SolverText, restitution: float, findings: Sequence[CheckRow], afresh: bool
 ) -> list[Smallest]:
-    """In a worker: the smallest scenes that show these faults of a solver; none if it fails."""
+    """In a worker: the smallest scenes that show these faults of a solver; none if the solver
+    fails."""
     from reports.check.smallest import smallest_scenes
 
     try:
@@ -394,7 +396,7 @@ def scenes_here(
 
 
 def write(output: Output, text: str) -> None:
-    """Write a file that was asked for; exits 2 if that is not possible."""
+    """Write a requested file; exits 2 if that fails."""
     assert output.path is not None
     try:
         put_text(output.path, text)

@@ -1,4 +1,5 @@
-"""Which faults follow from one in an earlier task: a mistake is one fault, wherever it shows."""
+"""Which faults follow from one in an earlier task: a mistake counts as one fault, however many
+tasks show it."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from dataclasses import replace
 
 from reports.check.rows import FOLLOWS, TASKS, UNKNOWN, CheckRow
 
-# One mistake in the distance or the normal, by the words that its tasks have for it.
+# The causes that different tasks report for one mistake in the distance or the normal.
 SAME_MISTAKE = (
     {
         "the squared distance is compared with a size that is not squared",
@@ -39,12 +40,12 @@ SAME_MISTAKE = (
         "dy is used for dx, too",
     },
 )
-# what is said of velocities where no formula gives them
+# causes of wrong velocities that no known formula gives
 NOT_EXPLAINED = (UNKNOWN, "unknown: ", "the restitution depends", "the file has e = ")
 
 
 def with_consequences(rows: Sequence[CheckRow]) -> list[CheckRow]:
-    """The rows, with the verdict "follows" for a fault that is another task's as well."""
+    """The rows, with the verdict "follows" for a fault that an earlier task already has."""
     first: dict[str, str] = {}  # cause -> the task that has it first
     for row in sorted(rows, key=lambda row: list(TASKS).index(row.task)):
         if row.verdict == "fault" and row.cause not in (FOLLOWS, UNKNOWN):
@@ -55,9 +56,9 @@ def with_consequences(rows: Sequence[CheckRow]) -> list[CheckRow]:
 
 
 def followed(row: CheckRow, first: dict[str, str], pushed: bool) -> CheckRow:
-    """A fault, or what it follows from.
+    """A fault, or a row that follows from another.
 
-    first: of each cause the task that has it first; pushed: as `displaced_velocities` says.
+    first: cause -> the first task that has it; pushed: the result of `displaced_velocities`.
     """
     if row.cause == FOLLOWS:
         return replace(row, verdict="follows")
@@ -70,5 +71,5 @@ def followed(row: CheckRow, first: dict[str, str], pushed: bool) -> CheckRow:
 
 
 def displaced_velocities(rows: Iterable[CheckRow]) -> bool:
-    """Whether the displacement of (b) was found to change velocities."""
+    """Whether a row says that the displacement of (b) changes velocities."""
     return any((row.task, row.name, row.verdict) == ("2b", "velocities", "fault") for row in rows)

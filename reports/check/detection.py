@@ -1,4 +1,4 @@
-"""Task 2 (a): which spheres a solver takes to collide."""
+"""Task 2 (a): which spheres collide according to a solver."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from reports.check.rows import CheckRow, judged, near, shown
 Rule = Callable[[float, float, float, float], bool | None]
 
 
-# (dx, dy, size of A, size of B) in m -> whether they would be taken to collide, None if either
+# (dx, dy, size of A, size of B) in m -> whether they collide by the rule, None if either
 RULES: dict[str, Rule] = {
     "": lambda x, y, a, b: np.hypot(x, y) < a + b,
     "only the size of A is used": lambda x, y, a, b: np.hypot(x, y) < a,
@@ -51,7 +51,7 @@ RULES: dict[str, Rule] = {
     "every pair is taken to be apart": lambda x, y, a, b: False,
 }
 
-# As JavaScript reads it: + before ^, and what ^ takes is cut to a whole number.
+# As JavaScript reads it: + binds before ^, and ^ truncates its operands to integers.
 SQUARES: dict[str, Callable[[float, float], float]] = {
     "dx ^ 2 + dy ^ 2": lambda x, y: int(x) ^ int(2 + y) ^ 2,
     "(dx ^ 2) + (dy ^ 2)": lambda x, y: (int(x) ^ 2) + (int(y) ^ 2),
@@ -64,8 +64,8 @@ REACHES: dict[str, Callable[[float], float]] = {
 
 
 def rooted(square: Callable[[float, float], float]) -> Rule:
-    """Whether the root is below the sum of the sizes; that of a negative number is NaN, which may
-    go either way."""
+    """Whether the root is below the sum of the sizes; the root of a negative number is NaN, which
+    may compare either way."""
     return lambda x, y, a, b: None if square(x, y) < 0 else bool(square(x, y) < (a + b) ** 2)
 
 
@@ -75,7 +75,7 @@ def compared(square: Callable[[float, float], float], reach: Callable[[float], f
 
 
 BITS = "^ is not a power but XOR, which acts on bits"
-# Only asked of a file that has a ^: some give the pattern of a file that compares nothing.
+# Only for a file that contains a ^: some of these match a file that compares nothing.
 XOR = {
     f"{BITS}: the root of {left}": rooted(square) for left, square in SQUARES.items() if "^" in left
 }
@@ -84,7 +84,7 @@ XOR |= {
     for (left, square), (right, reach) in product(SQUARES.items(), REACHES.items())
     if "^" in left + right
 }
-# >= and < bind before ^, too: what is compared is the 2.
+# >= and < bind before ^, too: the comparison is with the 2.
 XOR |= {
     f"{BITS}: dx ^ 2 + dy ^ 2 < (sizeA + sizeB) ^ 2": lambda x, y, a, b: (
         (int(x) ^ int(2 + y) ^ (a + b > 2) ^ 2) != 0
@@ -100,18 +100,18 @@ XOR |= {
 
 
 def acts(question: tuple[Ball, ...], after: list[Ball]) -> bool:
-    """Whether a call changed where two spheres are or how they move."""
+    """Whether a call changed the positions or velocities of two spheres."""
     return any(not (near(b.x, a.x) and near(b.v, a.v)) for a, b in zip(question, after))
 
 
 def reacted(question: Question, answer: Answer) -> bool:
-    """Whether a pair is taken to collide: it changes, or the call fails in what follows the
+    """Whether a pair collides according to the solver: it changes, or the call fails after the
     comparison."""
     return bool(answer.failed) or acts(question.balls, answer.last)
 
 
 def detection_rows(answers: dict[str, Answer], text: str) -> list[CheckRow]:
-    """The rows of (a); `text` of the file."""
+    """The rows of (a); `text`: of the file."""
     return [
         reach(answers, (XOR if "^" in code_of(text) else {}) | RULES),
         touch(answers["touch"]),
@@ -120,7 +120,8 @@ def detection_rows(answers: dict[str, Answer], text: str) -> list[CheckRow]:
 
 
 def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
-    """Which of many pairs react, and the first of the rules that gives this pattern."""
+    """The row on which of many pairs react; its cause is the first of the rules that gives this
+    pattern."""
     seen = []
     for question, answer in named(answers, "reach/"):
         a, b = question.balls
@@ -157,13 +158,13 @@ ASKED = "Which pairs are taken to collide?"
 
 
 def no_number(answers: dict[str, Answer]) -> bool:
-    """Whether all pairs, near or far, lose their positions."""
+    """Whether the positions of all pairs, near or far, become NaN or infinite."""
     reached = [answer.last for _, answer in named(answers, "reach/") if answer.balls]
     return bool(reached) and not np.isfinite([[b.x for b in balls] for balls in reached]).any()
 
 
 def mixed_up(answers: dict[str, Answer]) -> bool:
-    """Whether the sum of the positions decides, as printed by a slip in the lesson."""
+    """Whether the sum of the positions decides, as in a misprint of the lesson."""
     for question, answer in named(answers, "reach/"):
         a, b = question.balls
         summed = float(np.hypot(*np.add(a.x, b.x)))
@@ -183,8 +184,8 @@ def touch(answer: Answer) -> CheckRow:
 
 
 def same_centre(answer: Answer, others_fail: bool) -> CheckRow:
-    """Two spheres at one place have no normal, and the exercise does not say what becomes of them;
-    but the call must come back. `others_fail`: it fails for other pairs, too."""
+    """Two spheres at one place have no normal, and the exercise does not define the result; but the
+    call must return. `others_fail`: it fails for other pairs, too."""
     asked = "What becomes of two spheres whose centres are at the same place?"
     if answer.failed and answer.failed.kind == "timeout" and not others_fail:
         cause = f"for two spheres at the same place the function {answer.failed}"

@@ -20,13 +20,13 @@ from reports.check.questions import (
     answered,
     ball,
     fresh_world,
-    stuck,
+    was_stopped,
 )
 from reports.check.rows import CheckRow
 
-# s that a call may take where others are known to take for ever; a right one takes microseconds
+# s that a call may take if others are known not to return; a right one takes microseconds
 SOON = 0.1
-FAR = "reach/25"  # two spheres four times as far from each other, in x and in y, as they touch
+FAR = "reach/25"  # two spheres four times as far apart, in x and in y, as when they touch
 
 
 def rows_until_failure(
@@ -35,8 +35,8 @@ def rows_until_failure(
     """The fault in the part that fails, and the rows of the parts before it, as far as they can be
     judged.
 
-    A pair for which the call fails is taken to collide, and has the places and the velocities that
-    the call had given it. Raises `SolverFailed` if the process is lost.
+    If the call fails for a pair, the pair counts as colliding, with the positions and velocities at
+    the failure. Raises `SolverFailed` if the process is lost.
     """
     failed = failed_calls(answers)
     shown = SHOWN["2"] if SHOWN["2"] in failed else next(iter(failed))
@@ -44,8 +44,8 @@ def rows_until_failure(
     assert stopped is not None
     part = source.part_of(shown, stopped.line)
     detection: list[CheckRow] = []
-    if stopped.kind != "memory":  # after which nobody knows what state the process is in
-        limit = SOON if stuck(answers) else LIMIT
+    if stopped.kind != "memory":  # after that the state of the process is unknown
+        limit = SOON if was_stopped(answers) else LIMIT
         left = left_by(process, [FAR, SHOWN["2"]], limit)
         if fails_at_once(left):
             part = "2a"
@@ -66,11 +66,11 @@ def rows_until_failure(
 
 
 def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[str, Answer]:
-    """The answers to these questions in a fresh world; of a call that fails with the spheres as it
-    has left them, if they still have all their numbers.
+    """The answers to these questions in a fresh world; for a call that fails, with the spheres as
+    it left them, if they still have all their numbers.
 
-    limit: s that a call may take. Each question is a request of its own: the worker answers none
-    after a call that it had to stop.
+    limit: s that a call may take. Each question is a separate request, because the worker answers
+    none after a call that it had to stop.
     """
     process.request(fresh_world(process))
     found: dict[str, Answer] = {}
@@ -85,21 +85,26 @@ def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[
 
 
 def needed(answers: dict[str, Answer]) -> list[str]:
-    """The questions that (a) and (b) are judged by; where each call has to be waited for, one in
-    four of the pairs that tell which are taken to collide."""
+    """The questions that judge (a) and (b); if every call runs into its time limit, only one in
+    four of the pairs that judge (a)."""
     pairs = [name for name in answers if name.startswith("reach/")]
-    return ["touch", "same centre", *projection.DISPLACED, *pairs[:: 4 if stuck(answers) else 1]]
+    return [
+        "touch",
+        "same centre",
+        *projection.DISPLACED,
+        *pairs[:: 4 if was_stopped(answers) else 1],
+    ]
 
 
 def fails_at_once(left: dict[str, Answer]) -> bool:
-    """Whether the call fails for two spheres that are far from each other as it does for two that
-    overlap, before it moves any: it fails before it knows which of the two it has."""
+    """Whether the call fails for two distant spheres just as for two that overlap, before it moves
+    any: it fails before it compares distances."""
     return all(bool(left[name].failed) and not moved(left, name) for name in (FAR, SHOWN["2"]))
 
 
 def doubtful(left: dict[str, Answer]) -> list[str]:
-    """The questions to ask once more with more time: those whose call failed before it moved a
-    sphere, except overlapping pairs that only tell whether they are taken to collide.
+    """The questions to repeat with more time: those whose call failed before it moved a sphere,
+    except overlapping pairs that only judge (a).
 
     On a busy machine a call may be stopped before it has done anything.
     """
@@ -120,7 +125,8 @@ def moved(left: dict[str, Answer], name: str) -> bool:
 
 
 def beyond_detection(part: str, detection: list[CheckRow], left: dict[str, Answer]) -> str:
-    """The part that fails: none that comes out right, whatever was read before the failure."""
+    """The part that fails; a part that gives right results does not, whatever was read before the
+    failure."""
     if part != "2a" or any(row.verdict == "fault" for row in detection):
         return part
     return "2c" if moved(left, SHOWN["2"]) else "2b"

@@ -1,5 +1,5 @@
-"""Before a function is judged: is it there, does it come back, does it change what it is given and
-nothing else?"""
+"""Checks before a function is judged: does it exist, does it return, does it change its arguments
+and nothing else?"""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from reports.check.questions import QUESTIONS, Answer, Ball
 from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
-MAY_FAIL = ("same centre",)  # is judged by a row of its own
+MAY_FAIL = ("same centre",)  # judged by its own row
 
 
 def implemented(
     task: str, there: bool, answers: dict[str, Answer], text: str
 ) -> tuple[list[CheckRow], bool]:
-    """The rows on the function of a task and its arguments, and whether it can be judged
-    further."""
+    """The rows on the function of a task and its arguments, and whether further checks are
+    possible."""
     function = FUNCTIONS[task]
     if not there:
-        missing = f"not implemented: the file has no function {function}{instead(function, text)}"
+        missing = (
+            f"not implemented: the file has no function {function}{similar_name(function, text)}"
+        )
         return [not_implemented(task, "there is no such function", missing)], False
     if failed_calls(answers):
         return [failure(task, task, answers)], False
@@ -30,13 +32,13 @@ def implemented(
         for name, answer in answers.items()
         if answer.balls
     ):
-        idle = nothing(function, answers.values())
+        idle = why_unchanged(function, answers.values())
         return [not_implemented(task, "nothing is changed", idle)], False
     return [arguments(task, function, answers.values())], True
 
 
 def failed_calls(answers: dict[str, Answer]) -> dict[str, Answer]:
-    """The answers of calls that failed, of those that a right function comes back from."""
+    """The answers of failed calls, among those from which a right function returns."""
     return {
         name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL
     }
@@ -53,7 +55,7 @@ def failure(task: str, part: str, answers: dict[str, Answer]) -> CheckRow:
 
 
 def not_implemented(task: str, got: str, cause: str) -> CheckRow:
-    """The fault of a function that is missing, or changes nothing."""
+    """The fault that a function is missing, or changes nothing."""
     asked = f"Does {FUNCTIONS[task]} change the spheres it is given?"
     return judged("implemented", task, asked, got, "it changes them", False, cause)
 
@@ -61,7 +63,7 @@ def not_implemented(task: str, got: str, cause: str) -> CheckRow:
 def same_again(
     function: str, answers: dict[str, Answer], others: dict[str, Answer]
 ) -> list[CheckRow]:
-    """A fault if answers depend on what was asked before, in the part of the task that they change;
+    """A fault if answers depend on earlier questions, in the part of the task that they affect;
     else nothing. `others`: the answers that differ."""
     mine = {name: other for name, other in others.items() if name in answers}
     if not mine:
@@ -83,7 +85,7 @@ def same_again(
 
 
 def keeps_state(rows: Iterable[CheckRow]) -> bool:
-    """Whether a file was found to remember what it was called with."""
+    """Whether a row says that the file keeps state between calls."""
     return any(row.name == SAME_AGAIN and row.verdict == "fault" for row in rows)
 
 
@@ -102,8 +104,8 @@ def changed_part(answers: dict[str, Answer], others: dict[str, Answer]) -> str:
     return "2c" if differs(lambda answer: [b.v for b in answer.last]) else "2d"
 
 
-def instead(function: str, text: str) -> str:
-    """What the file has that may have been meant; "" if nothing is like it."""
+def similar_name(function: str, text: str) -> str:
+    """A similar name in the file that may have been meant; "" if there is none."""
     names = re.findall(r"\b(?:function\s*\*?|def|const|let|var)\s+(\w+)", text)
     if function in names:
         return ", but one inside another function or class, where it cannot be called"
@@ -112,8 +114,8 @@ def instead(function: str, text: str) -> str:
     return f", but {meant}" if meant else ""
 
 
-def nothing(function: str, answers: Iterable[Answer]) -> str:
-    """Why nothing may have changed."""
+def why_unchanged(function: str, answers: Iterable[Answer]) -> str:
+    """A likely reason why nothing changed."""
     answers = list(answers)
     if any(answer.returned for answer in answers):
         return f"{function} returns something new; it must change the spheres it is given"
@@ -144,5 +146,5 @@ def arguments(task: str, function: str, answers: Iterable[Answer]) -> CheckRow:
 
 
 def changed(before: tuple[Ball, ...], after: list[Ball]) -> bool:
-    """Whether any number of any sphere is another."""
+    """Whether any number of any sphere differs."""
     return any(not near(y.numbers(), x.numbers()) for x, y in zip(before, after))

@@ -1,5 +1,5 @@
-"""Known mistakes in the impulse of a collision and in the new velocities, as formulas; and which
-of them a solver makes.
+"""Known mistakes in the impulse of a collision and in the new velocities, as formulas, and the
+search for those that a solver makes.
 
 J = -(1 + e) (vA - vB).n / (1/mA + 1/mB), vA' = vA + J n / mA, vB' = vB - J n / mB, n the unit
 vector from B to A (Newton's law of impact; Landau & Lifshitz, Mechanics, 17).
@@ -28,18 +28,18 @@ def scaled(factor: Callable[[PairCollision, float], float]) -> Impulse:
 
 
 def along(normal: Callable[[PairCollision], Array]) -> Impulse:
-    """The right impulse but for its normal."""
+    """The right impulse with another normal."""
     return lambda h, e: -(1 + e) * (h.u @ normal(h)) * h.mu * normal(h)
 
 
 def unit(vector: Array) -> Array:
-    """Its direction; NaN of a vector of no length."""
+    """The unit vector along it; NaN for a zero vector."""
     direction: Array = vector / np.hypot(*vector)
     return direction
 
 
 def tangent(h: PairCollision) -> Array:
-    """n turned by a quarter."""
+    """n rotated by a quarter turn."""
     return np.array([-h.n[1], h.n[0]])
 
 
@@ -52,7 +52,7 @@ HALF_TURNED = (
     "the normal points the wrong way where xA < xB: atan gives half of the directions, atan2 all"
 )
 APPROACH = "the test for approach has the wrong sign: only pairs that part get an impulse"
-# What a solver may take for J n, N s
+# Formulas for J n, N s: the right one and wrong ones
 IMPULSES: dict[str, Impulse] = {
     "": scaled(lambda h, e: 1.0),
     NEVER: scaled(lambda h, e: 0.0),
@@ -153,8 +153,8 @@ IMPULSES: dict[str, Impulse] = {
 
 
 class Update(NamedTuple):
-    """What a solver may do with P = J n: the changes of both velocities, m/s; and the task the
-    mistake is in."""
+    """A possible use of P = J n: the changes of both velocities, m/s; and the task of the
+    mistake."""
 
     change: Change
     task: str = "2d"
@@ -206,7 +206,7 @@ UPDATES: dict[str, Update] = {
 }
 
 
-# only asked of a file that states another e than 1, as it may be written for this one
+# only for a file that states an e other than 1, because a file may be written for e = 1
 ELASTIC: dict[str, Impulse] = {
     "e is not used: the collision is elastic": scaled(lambda h, e: 2 / (1 + e)),
     "x and y are treated as two collisions on a line, and without e": (
@@ -218,14 +218,13 @@ SLIPS = IMPULSES | scalar_products() | ELASTIC
 
 @dataclass(frozen=True)
 class Finding:
-    """What the collisions say.
+    """The explanation of a file's collisions.
 
     Attributes:
-        impulse, update: the mistake in the impulse and the one in the update, "" where there is
-            none.
+        impulse, update: the mistake in the impulse and that in the update; "" if there is none.
         task: of the update.
         e: the restitution used.
-        law, change: its formula for the impulse, and for the change of both velocities by it.
+        law, change: the formula for the impulse, and that for the change of both velocities.
     """
 
     impulse: str
@@ -237,13 +236,13 @@ class Finding:
 
     @property
     def mistake(self) -> str:
-        """The one to begin with."""
+        """The mistake to report first."""
         return self.impulse or self.update
 
 
 def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | None:
-    """The impulse and the update that give every collision, fewest mistakes first; None if nothing
-    does."""
+    """The impulse and the update that reproduce every collision, with the fewest mistakes; None if
+    none do."""
     seen = [
         (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
         for name, q in COLLISIONS.items()
@@ -267,12 +266,12 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
 def fitting(
     pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[PairCollision, Array]], e: float
 ) -> Finding | None:
-    """The first impulse and update of `pairs` that give every collision."""
+    """The first impulse and update of `pairs` that reproduce every collision."""
     with np.errstate(all="ignore"):
         for impulse, update in pairs:
             law, row = SLIPS[impulse], UPDATES[update]
             right = [near(row.change(h, law(h, e), e), came, 0.1) for h, came in seen]
-            # By a wrong law some of these pairs may part, and a test for approach then ends it.
+            # By a wrong law some of these pairs separate; a test for approach then skips them.
             ended = [impulse != "" and near(came, 0.0) for _, came in seen]
             if any(right) and all(np.logical_or(right, ended)):
                 return Finding(impulse, update, row.task, e, law, row.change)

@@ -1,4 +1,4 @@
-"""Task 2 (c) and (d): the impulse of a collision and what it does to both velocities."""
+"""Task 2 (c) and (d): the impulse of a collision and the new velocities."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from scenarios.model import Array
 
 @dataclass(frozen=True)
 class Seen:
-    """A collision of a file, and what is known of its mistakes.
+    """A collision computed by a file, and its known mistakes.
 
     Attributes:
-        pair: before the collision; of several that were asked about one that shows what is wrong.
+        pair: before the collision; of all collisions asked, one that shows the fault.
         after: velocities of A and B after it, (2, 2) m/s.
-        found: the impulse and the update that give all collisions, None if none do.
-        e: the restitution that it is judged by.
-        impulse, update: the mistake in (c) and the one in (d), "" where none is known.
-        opposite: whether in every collision A and B get opposite impulses: whatever J is, it is
-            applied as (d) has it.
+        found: the impulse and the update that reproduce all collisions, None if none do.
+        e: the restitution by which it is judged.
+        impulse, update: the mistake in (c) and the one in (d); "" if none is known.
+        opposite: whether A and B get opposite impulses in every collision: then J, right or wrong,
+            is applied as in (d).
     """
 
     pair: PairCollision
@@ -40,7 +40,7 @@ class Seen:
 
     @property
     def mistake(self) -> str:
-        """The one to begin with."""
+        """The mistake to report first."""
         return self.impulse or self.update or (self.found.mistake if self.found else "")
 
     @property
@@ -50,24 +50,25 @@ class Seen:
 
     @property
     def computed_impulse(self) -> Array:
-        """J n as the file computes it, right or wrong, so that (d) is judged by itself, N s."""
+        """J n as computed by the file, right or wrong, N s; so (d) is judged independently of
+        (c)."""
         if self.found:
             return self.found.law(self.pair, self.found.e)
         return self.received if self.opposite else self.right_impulse
 
     @property
     def change(self) -> Array:
-        """What was added to both velocities, (2, 2) m/s."""
+        """The changes of both velocities, (2, 2) m/s."""
         return self.after - [self.pair.va, self.pair.vb]
 
     @property
     def received(self) -> Array:
-        """What A got from B, N s."""
+        """The impulse on A from B, N s."""
         return np.asarray(self.pair.ma * self.change[0])
 
     @property
     def shown_impulse(self) -> Array:
-        """J n as far as it is known, N s: a mistake in (d) changes what A gets."""
+        """J n as far as it is known, N s: a mistake in (d) changes the impulse on A."""
         return self.computed_impulse if self.found else self.received
 
     @property
@@ -88,7 +89,7 @@ def impulse_rows(
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), bystanders(answers)]
     seen = seen_in(answers, restitution, found)
-    spoilt = "2d" if seen.right_c else "2c"  # the part whose mistake spoils energy and restitution
+    spoilt = "2d" if seen.right_c else "2c"  # the part that makes energy and restitution wrong
     return [
         normal_impulse(seen),
         tangential_impulse(seen),
@@ -98,7 +99,7 @@ def impulse_rows(
         new_velocity(seen, 0),
         new_velocity(seen, 1),
         momentum(seen),
-        # The velocities say more of a mistake in (d) than the energy that it spoils.
+        # A mistake in (d) shows more clearly in the velocities than in the energy.
         *(spoilt_rows(seen, restitution, spoilt) if spoilt == "2d" else []),
         symmetry(answers, seen),
         bystanders(answers),
@@ -106,9 +107,9 @@ def impulse_rows(
 
 
 def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
-    """The row of (c) where the function fails in (d): J is right, if in every collision one of the
-    spheres got it before the failure; restitution and energy then need no rows. Else nothing: J is
-    not known."""
+    """The row of (c) if the function fails in (d). J is right if in every collision one of the
+    spheres got it before the failure; restitution and energy then need no rows. Otherwise J is not
+    known: no row."""
     if not all(answers[name].balls for name in COLLISIONS):
         return []
     seen = [
@@ -126,7 +127,7 @@ def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
 
 
 def asked_of_impulse(pair: PairCollision) -> str:
-    """The question on J."""
+    """The question about J."""
     return (
         f"What impulse does A get from B, for masses of {shown(pair.ma)} and {shown(pair.mb)} kg?"
     )
@@ -159,26 +160,26 @@ def opposite_impulses(answers: dict[str, Answer]) -> bool:
 
 
 def swapped(name: str) -> str:
-    """The question on the same pair with A and B exchanged in the call."""
+    """The question about the same pair with A and B exchanged in the call."""
     return name.replace("collision/", "swapped/")
 
 
 def normal_impulse(seen: Seen) -> CheckRow:
-    """J."""
+    """The row on J, the impulse along the normal."""
     return judged(
         "impulse",
         "2c",
         asked_of_impulse(seen.pair),
         f"{shown(seen.shown_impulse @ seen.pair.n)} N s along the normal",
         f"{shown(seen.right_impulse @ seen.pair.n)} N s",
-        # what is wrong across the normal is the next row's
+        # the next row judges the tangential part
         seen.right_c or near(seen.received @ seen.pair.n, seen.right_impulse @ seen.pair.n),
         seen.impulse,
     )
 
 
 def tangential_impulse(seen: Seen) -> CheckRow:
-    """None, as there is no friction."""
+    """The row on the tangential impulse, which is 0 because there is no friction."""
     across = float(seen.shown_impulse @ tangent(seen.pair))
     return judged(
         "tangential part",
@@ -192,7 +193,7 @@ def tangential_impulse(seen: Seen) -> CheckRow:
 
 
 def spoilt_rows(seen: Seen, restitution: Restitution, task: str) -> list[CheckRow]:
-    """Energy and restitution, in the task whose mistake they show."""
+    """The rows on energy and restitution, in the task whose mistake they show."""
     added = energy(seen.pair, seen.change)
     kept = bool(added <= 1e-9)  # J; any loss is explained by the rows on the impulse
     return [
@@ -213,7 +214,7 @@ def spoilt_rows(seen: Seen, restitution: Restitution, task: str) -> list[CheckRo
 
 
 def new_velocity(seen: Seen, k: int) -> CheckRow:
-    """The velocity of A (k = 0) or B (k = 1), by the impulse that the file computes."""
+    """The row on the velocity of A (k = 0) or B (k = 1), for the impulse that the file computes."""
     before, mass = ((seen.pair.va, seen.pair.ma), (seen.pair.vb, seen.pair.mb))[k]
     change = (1 - 2 * k) * seen.computed_impulse / mass
     return judged(
@@ -229,7 +230,7 @@ def new_velocity(seen: Seen, k: int) -> CheckRow:
 
 
 def momentum(seen: Seen) -> CheckRow:
-    """Of both together, which no collision changes."""
+    """The row on the total momentum, which no collision changes."""
     added = seen.pair.ma * seen.change[0] + seen.pair.mb * seen.change[1]
     return judged(
         "momentum",
@@ -243,7 +244,7 @@ def momentum(seen: Seen) -> CheckRow:
 
 
 def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
-    """The one row on velocities that are no numbers: nothing else can be read from them."""
+    """The only row if velocities are not numbers: nothing else can be judged."""
     if not finite(answers, "x"):
         why = "the positions become NaN or infinite before it"
         return [not_asked("impulse", "2c", why), not_asked("velocity of A", "2d", why)]
@@ -287,8 +288,8 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
 
 
 def partly(answers: dict[str, Answer], e: float) -> str:
-    """Where no single mistake gives all collisions: that the order of A and B matters, that only
-    the tangent is wrong, or that some collisions are right; else ""."""
+    """A cause if no single mistake explains all collisions: the order of A and B matters, only the
+    tangential part is wrong, or some collisions are right; else ""."""
     if not alike_if_swapped(answers):
         return UNALIKE
     if only_across(answers, e):
@@ -315,7 +316,7 @@ def only_across(answers: dict[str, Answer], e: float) -> bool:
 
 
 def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
-    """The questions of `COLLISIONS` whose velocities are not those of the formula."""
+    """The questions of `COLLISIONS` whose velocities differ from the formula."""
     wrong = []
     for name, question in COLLISIONS.items():
         h = collision_of(question.balls, answers[name].last)
@@ -328,14 +329,15 @@ def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
 
 
 def energy(collision: PairCollision, came: Array) -> float:
-    """J, what a collision adds to the kinetic energy."""
+    """J (joule), the kinetic energy that a collision adds."""
     before = collision.ma * collision.va @ collision.va + collision.mb * collision.vb @ collision.vb
     va, vb = collision.va + came[0], collision.vb + came[1]
     return float(collision.ma * va @ va + collision.mb * vb @ vb - before) / 2
 
 
 def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> CheckRow:
-    """On pairs that move apart: nothing, or the printed formula; both are free."""
+    """The row on pairs that move apart: no impulse, or that of the printed formula; the choice is
+    free."""
     asked = "Which impulse acts on a pair that overlaps and moves apart?"
     expected = "none, or that of the formula"
     seen = [
@@ -367,7 +369,7 @@ FIRST = next(iter(COLLISIONS))
 
 
 def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(COLLISIONS)) -> bool:
-    """Whether the velocities after each of these collisions do not depend on who is called A."""
+    """Whether the velocities after each of these collisions do not depend on which sphere is A."""
     return all(
         near([b.v for b in answers[name].last], [b.v for b in answers[swapped(name)].last])
         for name in asked
@@ -375,8 +377,8 @@ def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(CO
 
 
 def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
-    """The velocities must not depend on which sphere is called A. If both get opposite impulses,
-    (d) is right, and the impulse is what depends on it."""
+    """The velocities must not depend on which sphere is A. If both get opposite impulses, (d) is
+    right, and the impulse depends on it."""
     first = next((name for name in COLLISIONS if not alike_if_swapped(answers, [name])), FIRST)
     task, mistake = ("2c", seen.impulse) if seen.opposite else ("2d", seen.update)
     return judged(
@@ -391,7 +393,8 @@ def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
 
 
 def bystanders(answers: dict[str, Answer]) -> CheckRow:
-    """Forces, angles, spins, masses and sizes are not changed by a collision without friction."""
+    """The row on force, angle, spin, mass and size, which a collision without friction does not
+    change."""
     words = {
         "F": "force",
         "alpha": "alpha",

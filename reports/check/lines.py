@@ -1,5 +1,5 @@
-"""Which lines of a solver's file a row is about, found by spheres that report from which line each
-of their numbers is read or written."""
+"""Finds the lines of a solver's file that a row is about, with spheres that record the line of each
+read and write of their numbers."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from adapters.own_solver.restitution import code_of
 from reports.check.questions import QUESTIONS, Question, fresh_world
 from reports.check.rows import SAME_AGAIN, CheckRow
 
-LIMIT = 0.5  # s a traced call may take: one that never comes back is known from its first accesses
-# task -> the question that shows which lines do what
+LIMIT = 0.5  # s a traced call may take: the first accesses are enough for one that never returns
+# task -> the question that is traced
 SHOWN = {"1": "force", "2": "collision/light on heavy"}
-MOST = 5  # lines of a row
-LONGEST = 160  # characters of a line; a minified file is a single one
+MOST = 5  # lines in a row
+LONGEST = 160  # characters of a line; a minified file is a single line
 
 
 class Access(NamedTuple):
@@ -24,9 +24,8 @@ class Access(NamedTuple):
 
     Attributes:
         kind: "r" or "w".
-        sphere: its place in the question.
-        field: of the sphere; "position" for its x and its y.
-        lines: of the file in the calls that led to it, from the innermost on.
+        sphere: its index in the question. field: of the sphere; "position" for both x and y.
+        lines: the lines of the file on the call stack, the innermost first.
     """
 
     kind: str
@@ -36,15 +35,15 @@ class Access(NamedTuple):
 
     @property
     def line(self) -> int:
-        """The line that reads or writes; 0 if it is not known."""
+        """The line of the access; 0 if it is not known."""
         return self.lines[0] if self.lines else 0
 
 
 def accesses_of(process: SolverProcess, question: Question) -> list[Access]:
-    """What the calls of a question read and write, in order, in a fresh world; until they fail, if
-    they do. Raises `SolverFailed` if the process is lost."""
+    """The reads and writes of the calls of a question, in order, in a fresh world, up to a failure
+    if there is one. Raises `SolverFailed` if the process is lost."""
     if process.surface == "advance":
-        return []  # its spheres are arrays, which report nothing
+        return []  # its spheres are arrays, which record nothing
     *_, seen = process.request(
         [
             *fresh_world(process),
@@ -56,8 +55,8 @@ def accesses_of(process: SolverProcess, question: Question) -> list[Access]:
 
 
 def outside_helpers(seen: list[Access]) -> list[Access]:
-    """The accesses. A line that writes positions and velocities alike is in a helper, which sets
-    any vector: its accesses get the line that called it."""
+    """The accesses without those of helper functions. A line that writes both positions and
+    velocities is in a helper, which sets any vector; its accesses get the line of the caller."""
     written: dict[int, set[str]] = {}
     for access in seen:
         if access.kind == "w":
@@ -78,9 +77,9 @@ def outside_helpers(seen: list[Access]) -> list[Access]:
 
 
 def part_of(seen: Sequence[Access], failed_at: int, text: str) -> str:
-    """The part of task 2 in which a call failed, by what it had read and written until then.
+    """The part of task 2 in which a call failed, judged by its accesses until then.
 
-    failed_at: the line that threw; 0 for a call that never came back.
+    failed_at: the line that threw; 0 for a call that never returned.
     """
     statement = text.splitlines()[failed_at - 1] if failed_at else ""
     if WRITES_VELOCITY.search(statement) or any_write(seen, "velocity"):
@@ -92,7 +91,7 @@ def part_of(seen: Sequence[Access], failed_at: int, text: str) -> str:
     displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
     before = [a for a in seen[displaced + 1 :] if not failed_at or a.line != failed_at]
     if all((who, field) in {(a.sphere, a.field) for a in before} for who, field in FOR_IMPULSE):
-        return "2d"  # all that the impulse needs has been read
+        return "2d"  # everything that the impulse needs has been read
     if displaced >= 0 or any(a.field == "velocity" for a in seen):
         return "2c"
     return "2b" if {(a.sphere, a.field) for a in before} >= FOR_DISTANCE else "2a"
@@ -107,25 +106,25 @@ FOR_DISTANCE = {(who, field) for who in (0, 1) for field in ("position", "size")
 
 
 def repeated(seen: Sequence[Access]) -> str:
-    """The field that a call without end reads or writes again and again; "" if it does not."""
+    """The field that an endless call reads or writes repeatedly; "" if there is none."""
     again = seen[-1:] and sum(access.line == seen[-1].line for access in seen) > LOOPS
     return seen[-1].field if again else ""
 
 
-LOOPS = 40  # accesses from one line; a call that is right needs a dozen
+LOOPS = 40  # accesses from one line; a right call needs a dozen
 
 
 def is_write(access: Access, field: str) -> bool:
-    """Whether it writes this field."""
+    """Whether the access writes this field."""
     return (access.kind, access.field) == ("w", field)
 
 
 def any_write(seen: Iterable[Access], field: str) -> bool:
-    """Whether one of them writes this field."""
+    """Whether one of the accesses writes this field."""
     return any(is_write(access, field) for access in seen)
 
 
-# row of task 1 -> the fields that it is about
+# row of task 1 -> the fields that it judges
 WRITTEN = {
     "velocity": ("velocity",),
     "position": ("position",),
@@ -139,7 +138,7 @@ WRITTEN = {
     "velocity of A": ("velocity",),
     "velocity of B": ("velocity",),
 }
-# row of the step -> what performSimStep calls where it is about that
+# row of the step -> the function that performSimStep calls on the lines in question
 CALLED = {
     "all spheres": "integrate",
     "pairs": "sphereSphereCollisionHandling",
@@ -149,7 +148,7 @@ CALLED = {
 }
 
 
-# causes that lie where the normal of a pair is made, and those that name it but lie elsewhere
+# causes on the lines that compute the normal of a pair, and those that name it but are elsewhere
 ABOUT_NORMAL = re.compile(r"\bnormal\b|\bd[xy] is")
 SIGN_OF_J = "sign of the normal or of J"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
@@ -164,8 +163,7 @@ def assigned(statement: str) -> list[str]:
 
 
 def detecting(seen: Sequence[Access]) -> list[int]:
-    """The lines that read the size of either sphere for the first time, before anything is
-    written."""
+    """The lines that first read the size of either sphere, before any write."""
     first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
     sizes = [a for a in seen[:first_write] if a.field == "size"]
     both = next((k + 1 for k, a in enumerate(sizes) if a.sphere != sizes[0].sphere), 1)
@@ -173,8 +171,8 @@ def detecting(seen: Sequence[Access]) -> list[int]:
 
 
 def displacing(seen: Sequence[Access], cause: str) -> list[int]:
-    """The lines that write positions, of both spheres or of the one that is at fault. If the cause
-    is in the overlap, they come after the line that computes it: the last that reads sizes."""
+    """The lines that write positions, of both spheres or of the one at fault. If the cause is in
+    the overlap, the line that computes it comes first: the last that reads sizes."""
     who = re.match(r"(?:only )?([AB])\b", cause)
     spheres = {"AB".index(who[1])} if who else {0, 1}
     writes = [a.line for a in seen if is_write(a, "position") and a.sphere in spheres]
@@ -183,8 +181,8 @@ def displacing(seen: Sequence[Access], cause: str) -> list[int]:
 
 
 def impelling(seen: Sequence[Access], cause: str) -> list[int]:
-    """The lines that compute the impulse: those that read velocities or those that read masses, as
-    the cause says. If there are none, the lines that write velocities."""
+    """The lines that compute the impulse: those that read velocities or masses, depending on the
+    cause. If there are none, the lines that write velocities."""
     displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
     moving = {a.line for a in seen if is_write(a, "position")}
     writes = [a.line for a in seen if is_write(a, "velocity")]
@@ -207,7 +205,7 @@ def cut(line: str) -> str:
 
 
 class Source:
-    """The text of a file, and what its two functions read and write, traced when it is asked for.
+    """The text of a file, and the accesses of its two functions, traced when needed.
 
     Its methods raise `SolverFailed` if the process is lost.
     """
@@ -217,7 +215,7 @@ class Source:
         self.traced: dict[str, list[Access]] = {}
 
     def accesses(self, question: str) -> list[Access]:
-        """What a question makes the file read and write; nothing where it lacks the function."""
+        """The accesses that a question causes; none if the file lacks the function."""
         needed = QUESTIONS[question].calls[0][0]
         if question not in self.traced:
             has = self.process.functions[needed]
@@ -226,7 +224,7 @@ class Source:
         return self.traced[question]
 
     def part_of(self, question: str, failed_at: int) -> str:
-        """The part of task 2 in which the call of a question failed, at this line."""
+        """The part of task 2 in which the call of a question failed, at the line `failed_at`."""
         return part_of(self.accesses(question), failed_at, self.text)
 
     def of(self, row: CheckRow) -> list[tuple[int, str]]:
@@ -247,7 +245,7 @@ class Source:
         return [(k, cut(self.lines[k - 1].strip())) for k in shown if k <= len(self.lines)]
 
     def accessing(self, row: CheckRow) -> list[int]:
-        """The lines that read or write what a row of the two tasks is about."""
+        """The lines that read or write the numbers that a row of the two tasks judges."""
         seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
         if row.name in WRITTEN:
             who = {"velocity of A": {0}, "velocity of B": {1}}.get(row.name, {0, 1})
@@ -269,11 +267,10 @@ class Source:
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
 
     def making(self, seen: Sequence[Access], cause: str) -> list[int]:
-        """The lines that make the normal, or the distance from it, if the cause is about that.
+        """The lines that compute the normal or the distance, if the cause is about these.
 
-        These read positions and write none; those after them, until a velocity is written, that
-        change what they have made; and for the distance those that use it before anything is
-        written.
+        They are lines that read positions and write none; later lines that change the result before
+        a velocity is written; and for the distance lines that use it before any write.
         """
         if ABOUT_OTHERS.search(cause) or not (ABOUT_NORMAL.search(cause) or "square" in cause):
             return []
@@ -300,8 +297,8 @@ class Source:
         return [k for k in sums if made and re.search(used, code[k - 1])][:2]
 
     def calls(self, name: str) -> list[int]:
-        """The lines of performSimStep that a row of the step is about; of one about the edges that
-        of projectObjects."""
+        """The lines of performSimStep that a row of the step is about; for a row about the edges
+        the head of projectObjects."""
         if name not in CALLED:
             return self.heads("projectObjects" if name in ("edges", "ufo") else "performSimStep")
         code, function = code_of(self.text).splitlines(), CALLED[name]

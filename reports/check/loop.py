@@ -1,5 +1,5 @@
-"""The step around the two tasks: every sphere once, every pair, the edges; judged by the file's own
-functions."""
+"""The step around the two tasks: every sphere once, every pair, the edges. The file's own functions
+give the expected results."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ EDGES = {"right": (5.2, 0.1), "left": (-5.2, -0.1), "top": (0.1, 3.2), "bottom":
 ONTO = {"right": (-5.0, 0.1), "left": (5.0, -0.1), "top": (0.1, -3.0), "bottom": (-0.1, 3.0)}
 # a pair that collides
 A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.0, r=0.3)
-# a pair that overlaps by half a millimetre after a step, and not if only one of the two moves
+# a pair that overlaps by 0.5 mm after a step if both move, and not if only one does
 LEFT, RIGHT = Ball((-0.3, 0.0), (1.0, 0.0), r=0.3), Ball((0.3015, 0.0), (-1.0, 0.0), r=0.3)
 
 
 def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
-    """The rows of the step; where the file has none, a row that says so.
+    """The rows of the step; if the file has no step, a row that says so.
 
-    `faulty`: the functions it calls are.
+    `faulty`: whether the functions that it calls have faults.
     """
     has = process.functions
     if not (has["begin"] and has["step"]):
@@ -52,7 +52,7 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
 
 
 def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None]:
-    """The numbers of the spheres that initScene makes in a fresh world; or a fault if it makes
+    """The numbers of the spheres that initScene makes in a fresh world, or a fault if it makes
     none."""
     *_, begun, start = process.request([*fresh_world(process), ("globals", None, LIMIT)])
     if isinstance(begun, SolverFailed):
@@ -118,7 +118,7 @@ def put(spheres: tuple[Ball, ...], i: int, a: Ball, j: int, b: Ball) -> tuple[Ba
 
 
 def parked(n: int) -> tuple[Ball, ...]:
-    """Small spheres at rest in four rows near the edges, so that nothing touches."""
+    """Small spheres at rest in four rows near the edges, without contacts."""
     columns = -(-n // 4)
     x, y = np.linspace(-4.5, 4.5, columns), (-2.6, -2.0, 2.0, 2.6)
     return tuple(
@@ -128,7 +128,7 @@ def parked(n: int) -> tuple[Ball, ...]:
 
 
 def integrated(question: Question, came: dict[str, Answer]) -> CheckRow:
-    """Every sphere moves as one alone does by the file's own integrate."""
+    """The row on integration: every sphere moves as by one call of the file's own integrate."""
     asked = "Does a step integrate every sphere once?"
     after, end = came["free"].last, came["alone"].last[0]
     moved = np.subtract(end.x, question.balls[0].x)
@@ -147,7 +147,7 @@ def integrated(question: Question, came: dict[str, Answer]) -> CheckRow:
 
 
 def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str:
-    """What a step does to sphere `k` instead of integrating it once."""
+    """The likely cause if a step does not integrate sphere `k` exactly once."""
     steps = [call[2] for call in watched.calls if call[:2] == ("integrate", k)]
     if near(after.v, before.v):
         return "a loop of performSimStep leaves spheres out"
@@ -159,10 +159,9 @@ def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str
 
 
 def against_itself(question: Question, came: dict[str, Answer]) -> CheckRow | None:
-    """What becomes of a sphere that is given to the collision function twice; None if none is.
+    """The row on a sphere that is passed to the collision function twice; None if none is.
 
-    No two spheres are near each other here, so that a sphere which changes has collided with
-    itself.
+    No two spheres are near each other here, so a sphere that changes has collided with itself.
     """
     alone = [call[1] for call in came["watched"].calls if is_with_itself(call)]
     if not alone:
@@ -180,12 +179,12 @@ def against_itself(question: Question, came: dict[str, Answer]) -> CheckRow | No
 
 
 def is_with_itself(call: tuple[Any, ...]) -> bool:
-    """Whether it gives the collision function one of the file's spheres twice."""
+    """Whether a call passes one of the file's spheres twice to the collision function."""
     return bool(call[0] == "collide" and call[1] == call[2] >= 0)
 
 
 def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
-    """Every pair that is made to overlap collides, and no other sphere changes."""
+    """The row on pairs: every overlapping pair collides, and no other sphere changes."""
     silent, others = [], []
     for name, question in asked.items():
         if not name.startswith("pair"):
@@ -220,12 +219,13 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
 
 
 def struck_in(question: Question, came: Answer) -> set[int]:
-    """The spheres whose velocities a step without forces has changed."""
+    """The spheres whose velocities a step without forces changes."""
     return {k for k, (b, a) in enumerate(zip(question.balls, came.last)) if not near(a.v, b.v)}
 
 
 def integration_first(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
-    """A pair that touches only at the end of the step collides in it, if all were integrated."""
+    """The row on order: a pair that touches only at the end of a step collides in it if all spheres
+    are integrated first."""
     missed = [
         name_of(*map(int, name.split()[-2:]))
         for name, question in asked.items()
@@ -243,8 +243,8 @@ def integration_first(asked: dict[str, Question], came: dict[str, Answer]) -> Ch
 
 
 def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
-    """A step sets a sphere beyond an edge to the place where projectObjects sets it; all spheres
-    are at rest, so that nothing else moves them."""
+    """The row on the edges in a step: a sphere beyond an edge ends where projectObjects puts it.
+    All spheres are at rest, so that nothing else moves them."""
     wrong = [k for k, (a, b) in enumerate(zip(came.last, alone.last)) if not near(a.x, b.x)]
     got = f"{name_of(wrong[0])} is at {shown(came.last[wrong[0]].x)} m" if wrong else "yes"
     expected = (
@@ -263,13 +263,13 @@ def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
 
 
 def name_of(*spheres: int) -> str:
-    """Spheres as people call them."""
+    """The name of a sphere in messages."""
     return " and ".join("the ufo" if k == 0 else f"asteroid {k - 1}" for k in spheres)
 
 
 def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool) -> list[CheckRow]:
-    """An asteroid beyond an edge comes in at the opposite one; a ufo that leaves is set back to its
-    start."""
+    """The rows on projectObjects: an asteroid beyond an edge enters at the opposite one; a ufo that
+    leaves is set back to its start."""
     pairs = list(zip(question.balls, came.last))[1:]
     got, expected, cause = next(
         filter(None, map(wrong_at_edge, ONTO.items(), pairs)), ("yes", "yes", "")
@@ -296,8 +296,8 @@ def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool)
 def wrong_at_edge(
     edge: tuple[str, tuple[float, float]], pair: tuple[Ball, Ball]
 ) -> tuple[str, str, str] | None:
-    """What came of one beyond this edge, what should have, and the likely cause; None if it is
-    right."""
+    """The result for a sphere beyond this edge, the expected result, and the likely cause; None if
+    it is right."""
     (name, onto), (before, after) = edge, pair
     if not near(after.x, onto):
         got = f"one beyond the {name} edge, at {shown(before.x)} m, is set to {shown(after.x)} m"

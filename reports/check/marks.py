@@ -1,4 +1,4 @@
-"""What a check is worth: points task by task, and the id of the student."""
+"""The marks of a check: points for each task, and the id of the student."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from reports.check.verdict import WITHOUT_NUMBERS, FileCheck, headline, numbers_
 if TYPE_CHECKING:
     from reports.check.smallest_scene import Smallest
 
-# Names of files that say nothing of who wrote them: then the folder does.
+# File names that do not identify the student; then the folder name does.
 ANYBODYS = ("exercise", "solver")
 
 
@@ -27,8 +27,8 @@ class TaskMark(NamedTuple):
     Attributes:
         task: its key in `TASKS`.
         status: the worst verdict of its questions.
-        points, most: what it gets, of how many.
-        not_judged: points of questions that could not be asked; they are not in `points`.
+        points, most: points given and points possible. not_judged: points of questions that could
+        not be asked; not included in `points`.
     """
 
     task: str
@@ -39,16 +39,16 @@ class TaskMark(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Its name."""
+        """The name of the task."""
         return task_title(self.task)
 
 
 @dataclass(frozen=True)
 class Marked:
-    """A check with the student's id and the points.
+    """A check with the student's id and points.
 
-    root: the file or folder that was given; worth: what each question gives; low: whether feedback
-    leaves out causes, lines and formulas; not_read: what else lies in `root` and has no row;
+    root: the file or folder given; worth: points of each question; low: whether feedback omits
+    causes, lines and formulas; not_read: other entries of `root`, without a row;
     scenes: the smallest that show its faults, if a format has them.
     """
 
@@ -62,7 +62,7 @@ class Marked:
 
     @cached_property
     def tasks(self) -> list[TaskMark]:
-        """The marks of the tasks that give points, and of those that have a fault."""
+        """The marks of the tasks that give points or have a fault."""
         found = self.check.tasks
         return [
             mark_of(self.check, task, self.worth.get(task, {}))
@@ -77,7 +77,7 @@ class Marked:
 
     @property
     def most(self) -> float:
-        """The points that a right solver gets."""
+        """The points of a right solver."""
         return rounded(sum(mark.most for mark in self.tasks))
 
     @property
@@ -87,29 +87,29 @@ class Marked:
 
     @property
     def status(self) -> Status:
-        """Of the whole file."""
+        """The status of the whole file."""
         if self.check.refused:
             return "refused"
         return "right" if self.check.passed else "fault"
 
     @property
     def brief(self) -> str:
-        """The sentence to begin with, without the file's path; "" of a file without a fault."""
+        """The first sentence, without the file's path; "" for a file without a fault."""
         if self.check.passed:
             return ""
         return self.check.brief.removeprefix(f"{self.check.path}: ")
 
     @property
     def summary(self) -> str:
-        """What a student reads above the tasks."""
+        """The text for a student above the tasks."""
         if self.check.refused:
             return self.brief
         said = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
         return f"{said} {number(self.points)} of {number(self.most)} points."
 
     def feedback(self, task: str) -> list[str]:
-        """What a student reads of a task, a line each: faults with their numbers, what follows,
-        what was free, what could not be asked."""
+        """The lines for a student about a task: faults with their numbers, consequences, free
+        choices, questions that could not be asked."""
         if self.check.refused:
             return [self.brief]
         rows = self.check.of(task)
@@ -126,8 +126,8 @@ class Marked:
         return lines
 
     def of(self, row: CheckRow) -> list[str]:
-        """A fault for the student: question and numbers; unless `low` its likely cause, the lines
-        of the file and the exercise's formula, too."""
+        """A fault for the student: question and numbers; unless `low` also the likely cause, the
+        lines of the file and the exercise's formula."""
         if self.low:
             said = headline(row) if row.name in WITHOUT_NUMBERS else f"{row.name}: wrong answer."
             return [" ".join([said, *numbers_of(row)])]
@@ -142,12 +142,12 @@ def follows(row: CheckRow) -> bool:
 
 
 def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark:
-    """The mark of a task, whose questions give `worth` points each.
+    """The mark of a task with the points `worth` of each question.
 
-    A question that could not be asked gives none. A cause costs the points of one question: of
-    those that it spoils the one with most points, or, if these have none, the question of the task
-    with fewest. A task that is not implemented, or fails, costs all of its points. What follows
-    from a fault costs nothing.
+    A question that could not be asked gives no points. A cause costs the points of one question: of
+    the wrong answers it explains, the one with most points; if these have no points, the question
+    of the task with fewest. A task that is not implemented, or fails, gives no points. Consequences
+    of a fault cost nothing.
     """
     most, rows = sum(worth.values()), check.of(task)
     cheapest = min(filter(None, worth.values()), default=0.0)
@@ -167,8 +167,8 @@ def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark
 
 
 def asked(name: str, rows: Sequence[CheckRow]) -> bool:
-    """Whether a question was asked, by the rows of its task. One without a row counts as asked if
-    every row of the task was."""
+    """Whether a question was asked, according to the rows of its task. One without a row counts as
+    asked if all rows of the task were asked."""
     verdicts = {row.name: row.verdict for row in rows}
     if name in verdicts:
         return OUTCOMES[verdicts[name]].points != "not judged"
@@ -176,11 +176,11 @@ def asked(name: str, rows: Sequence[CheckRow]) -> bool:
 
 
 def id_of(file: Path, root: Path, pattern: re.Pattern[str] | None = None) -> str:
-    """The id of the student whose `file`, or folder, was found at or below `root`.
+    """The id of the student whose file or folder `file` is at or below `root`.
 
-    It is what `pattern` matches in the path, or its first group; without a match the name of the
-    student's folder, or of the file; of an Exercise.js or solver.py in no folder of a student that
-    of the folder it is in.
+    It is the match of `pattern` in the path, or its first group. Without a match it is the name of
+    the student's folder, or of the file; for an Exercise.js or solver.py without a student's
+    folder, the name of its folder.
     """
     if pattern is not None and (match := pattern.search(place_of(file, root))):
         return match[1] if pattern.groups and match[1] is not None else match[0]
@@ -193,8 +193,8 @@ def id_of(file: Path, root: Path, pattern: re.Pattern[str] | None = None) -> str
 
 
 def place_of(file: Path, root: Path) -> str:
-    """The path of a file below the folder that was given; of one that was given itself all of it,
-    from its own folder on."""
+    """The path of a file relative to the folder given; for a file given directly, its folder and
+    name."""
     return "/".join(file.relative_to(root).parts) if file != root else file.resolve().name
 
 

@@ -1,5 +1,4 @@
-"""Task 1: one sphere, one step; the formula a wrong integration follows is found among those it
-could follow.
+"""Task 1: one sphere, one step; a wrong integration is compared with known wrong formulas.
 
 Symplectic Euler: v' = v + F/m dt, then x' = x + v' dt; spin and angle alike (Hairer, Lubich &
 Wanner, Geometric Numerical Integration, I.1).
@@ -23,7 +22,7 @@ G: Array = np.array([0.0, -9.81])  # m/s2
 
 
 def taken(vector: Array, part: int) -> Array:
-    """One part of a vector for both; an angular quantity has only one."""
+    """A vector with one component in both places; an angular quantity has only one."""
     return np.full_like(vector, vector.flat[part if vector.ndim else 0])
 
 
@@ -64,7 +63,7 @@ UNDER_FORCE: dict[str, Law] = {
         v + f / m * dt / 1000
     ),
 }
-# the same of a torque, with the size as a sixth
+# the same for a torque, with the size as a sixth argument
 UNDER_TORQUE: dict[str, Law] = {
     name: (lambda *given, law=law: law(*given[:5])) for name, law in UNDER_FORCE.items()
 } | {
@@ -126,14 +125,14 @@ MOVED: dict[str, Law] = {
 
 
 def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
-    """The rows of task 1; the function has been called without failing."""
+    """The rows of task 1, for a function whose calls do not fail."""
     seen = [
         (QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0])
         for name in FORCED
     ]
     linear = [(np.array(b.v), np.array(b.F), b.m, b.MoI, dt) for b, dt, _ in seen]
     angular = [(np.array(b.w), np.array(b.torque), b.MoI, b.m, dt, b.r) for b, dt, _ in seen]
-    # The positions are judged by the velocities that came, so that one mistake is found once.
+    # The positions are judged with the file's own velocities, so that one mistake counts once.
     places = [
         (np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen
     ]
@@ -197,7 +196,7 @@ def law_row(
     came: list[Any],
     words: dict[str, str],
 ) -> CheckRow:
-    """A row whose cause is the law of the table that gives what came."""
+    """A row whose cause is the formula of the table that reproduces the answers."""
     found = follows(laws, given, came)
     with np.errstate(all="ignore"):
         right = laws[""](*given[0])
@@ -216,7 +215,7 @@ def law_row(
 
 
 def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
-    """The mistakes in x and y where they are not the same, or one is right."""
+    """The mistakes in x and y, if they differ or one is right."""
     axes = []
     for axis in range(2):
         asked = [
@@ -230,7 +229,7 @@ def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], came: list[Any]
 
 
 def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
-    """Where the velocity is also multiplied by a constant: which."""
+    """The constant, in words, if the velocity is also multiplied by one."""
     given = [question[:5] for question in given]
     coasting_v, coasting_came = np.asarray(given[2][0]), np.asarray(came[2], float)
     factor = float(np.mean(coasting_came / coasting_v))
@@ -242,7 +241,7 @@ def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
 
 
 def turning(answers: dict[str, Answer]) -> CheckRow:
-    """An angle beyond half a turn: it may be set back by whole turns, which is free."""
+    """The row on an angle beyond half a turn: it may be reduced by whole turns, a free choice."""
     seen = [(QUESTIONS[name], answers[name].last[0]) for name in TURNED]
     ways = [
         (question.balls[0].alpha + after.w * question.calls[0][2], after.alpha)
@@ -261,7 +260,8 @@ def turning(answers: dict[str, Answer]) -> CheckRow:
 
 
 def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:
-    """Without a force velocity and spin stay; `mistake`: what is known to be wrong with them."""
+    """The row on a sphere without force: velocity and spin stay constant. `mistake`: their known
+    mistake."""
     return judged(
         "coasting",
         "1",
@@ -274,7 +274,7 @@ def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:
 
 
 def lasting(answer: Answer) -> CheckRow:
-    """Force and torque stay until the keys change them."""
+    """The row on force and torque, which stay until the keys change them."""
     before, after = QUESTIONS["force twice"].balls[0], answer.last[0]
     right = near(after.F, before.F) and near(after.torque, before.torque)
     cleared = near(after.F, (0, 0)) or near(after.torque, 0)
@@ -294,7 +294,7 @@ def lasting(answer: Answer) -> CheckRow:
 
 
 def untouched(seen: list[tuple[Ball, float, Ball]]) -> CheckRow:
-    """Mass, inertia and size are no business of an integration."""
+    """The row on mass, inertia and size, which an integration must not change."""
     changed = [
         name
         for name in ("m", "MoI", "r")

@@ -1,5 +1,5 @@
-"""What a verdict means elsewhere: in points, in the table of a class, in JUnit, in the systems that
-keep marks. It is decided here only."""
+"""The one table of what a verdict means in points, in the table of a class, in JUnit, and in
+grading systems."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Status = Verdict | Literal["refused"]
 
 
 class Outcome(NamedTuple):
-    """What a status is elsewhere.
+    """The meaning of a status in other systems.
 
     Attributes:
         short: in the table of a class.
-        points: what becomes of the points of a question: "not judged" ones are not given.
+        points: the effect on the points of a question: "not judged" points are not given.
         junit: the element that a JUnit test case holds; "" for none.
         gradescope: the status of a test of Gradescope.
         classroom: the status of a test of GitHub Classroom.
@@ -31,10 +31,10 @@ class Outcome(NamedTuple):
 OUTCOMES: dict[Status, Outcome] = {
     "right": Outcome("ok", "given", "", "passed", "pass"),
     "free choice": Outcome("ok", "given", "", "passed", "pass"),
-    # wrong because of a fault elsewhere, which has cost its points there
+    # wrong because of a fault in another task, which costs its points there
     "follows": Outcome("<-", "given", "skipped", "passed", "pass"),
     "fault": Outcome("FAULT", "lost", "failure", "failed", "fail"),
-    # nothing is known of it: a person may look
+    # nothing is known: a person may look
     "not asked": Outcome("-", "not judged", "skipped", "failed", "error"),
     # no solver at all
     "refused": Outcome("-", "not judged", "error", "failed", "error"),

@@ -1,4 +1,4 @@
-"""Writes check.html: what was found in one file, and the smallest scenes that show it, with the
+"""Writes check.html: the findings in one file, and the smallest scenes that show them, with the
 file's motion beside the exact one."""
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from reports.terminal.foreign_text import put_text
 from scenarios.model import Trajectory
 
 GENERATOR = "crosscheck check"
-# apart from the truth in any light, by style.py
+# distinct from the truth on light and dark pages, by style.py
 YOURS = style.Look("#a3123a", "#ff7a93", (), "diamond", True)
-# Faults stand first; what a group is, is said in words.
+# Faults come first; each group has an explanation.
 GROUPS: dict[Verdict, tuple[str, str]] = {
     "fault": (
         "Faults",
@@ -45,7 +45,7 @@ SCRIPTS = (*ENGINE, "check/check.js")
 
 
 class SceneShown(NamedTuple):
-    """A smallest scene as the page has it: in words, and as a replay of some layers."""
+    """A smallest scene on the page: in words, and as a replay with its layers."""
 
     smallest: Smallest
     title: str
@@ -56,8 +56,8 @@ class SceneShown(NamedTuple):
 
 
 def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None:
-    """Write the page of one file, with the smallest scenes that show its faults, to `path`, over
-    whatever is there."""
+    """Write the page of one file, with the smallest scenes that show its faults, to `path`,
+    overwriting what is there."""
     shows = [scene_shown(check.path.name, smallest) for smallest in scenes]
     names = dict.fromkeys(name for one in shows for name in one.layers)
     looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
@@ -101,7 +101,7 @@ def scene_shown(name: str, smallest: Smallest) -> SceneShown:
 
 
 def layers_of(name: str, smallest: Smallest) -> list[tuple[Run | None, Trajectory]]:
-    """The file's motion, and the exact one on top, as the replay takes them."""
+    """The layers of the replay: the file's motion, and the exact one on top."""
     yours = Run(
         name.replace(":", "_"), "own", smallest.scenario.name, DT, trajectory=smallest.yours
     )

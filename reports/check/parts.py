@@ -36,7 +36,7 @@ PLACES = {  # (0: A, 1: B; 0: x, 1: y)
 
 
 def scalar_products() -> dict[str, Impulse]:
-    """The impulses with one slip in (vA - vB).n, by what the slip is."""
+    """Mistake -> the impulse with that one mistake in (vA - vB).n."""
     return {
         f"in the scalar product {where} {how}": with_slip(places, one)
         for (where, places), (how, one) in product(PLACES.items(), PRODUCTS.items())
@@ -44,7 +44,7 @@ def scalar_products() -> dict[str, Impulse]:
 
 
 def with_slip(places: set[tuple[int, int]], one: Callable[..., float]) -> Impulse:
-    """The right impulse but for the products at `places`, which are made by `one`."""
+    """The right impulse, except that `one` computes the products at `places`."""
 
     def impulse(h: PairCollision, e: float) -> Array:
         v, total = (h.va, h.vb), 0.0
@@ -57,7 +57,7 @@ def with_slip(places: set[tuple[int, int]], one: Callable[..., float]) -> Impuls
 
 
 # (p: its part of +J n for A, -J n for B; q: the part along the other axis; all of it along n; mass,
-# mass of the other; velocity before; e) -> what is added to one velocity along one axis, m/s
+# mass of the other; velocity before; e) -> change of one velocity along one axis, m/s
 COMPONENTS: dict[str, Callable[..., float]] = {
     "": lambda p, q, whole, m, other, v, e: p / m,
     "is never changed": lambda p, q, whole, m, other, v, e: 0.0,
@@ -83,8 +83,8 @@ COMPONENTS: dict[str, Callable[..., float]] = {
 def components(
     seen: Sequence[tuple[PairCollision, Array]], right: Impulse, e: float
 ) -> tuple[str, Change] | None:
-    """The mistakes in the components of both velocities, if the impulse is right, and what they do
-    together; None if a component follows no law of `COMPONENTS`."""
+    """The mistakes in the components of both velocities, if the impulse is right, and their
+    combined effect; None if a component follows no formula of `COMPONENTS`."""
     found = {}
     for who, axis in product((0, 1), (0, 1)):
         came = [change[who, axis] for _, change in seen]
@@ -108,7 +108,7 @@ def components(
 
 
 def component(name: str | None, h: PairCollision, P: Array, who: int, axis: int, e: float) -> float:
-    """What a law of `COMPONENTS` adds, m/s."""
+    """The change by a formula of `COMPONENTS`, m/s."""
     sign, masses, v = 1 - 2 * who, (h.ma, h.mb), (h.va, h.vb)[who]
     own, other = masses[who], masses[1 - who]
     return COMPONENTS[name or ""](

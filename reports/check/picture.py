@@ -1,4 +1,4 @@
-"""The smallest scene that shows a fault as a PNG, for systems that show no page."""
+"""The smallest scene that shows a fault as a PNG, for systems without HTML pages."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from reports.check.smallest_scene import Smallest
 
 SIDE = 480  # pixels, of the longer side
-MARGIN = 0.2  # m around what is drawn
+MARGIN = 0.2  # margin, m
 FARTHEST = 20.0  # m: what is farther away is not drawn
 START, EXACT, YOURS = (150, 150, 150), (30, 30, 30), (163, 18, 58)  # as on the page of a file
 THIN, THICK = 2, 3  # pixels
-FINER = 4  # drawn as many times as large, and made smaller, which gives smooth edges
-EVERY = 2  # samples from dot to dot
+FINER = 4  # drawn this many times larger and scaled down, for smooth edges
+EVERY = 2  # samples between two dots
 LEGEND = (
     "Grey: the start. Black: the exact answer after {t:g} s. Red: your solver after {t:g} s. The"
     " line from a centre shows the angle; dots show the way."
@@ -29,26 +29,26 @@ LEGEND = (
 
 
 def data_url(one: Smallest) -> str:
-    """The picture as a text that a browser shows."""
+    """The picture as a data URL."""
     return f"data:image/png;base64,{b64encode(png(drawn(one))).decode()}"
 
 
 def label(one: Smallest) -> str:
-    """What the picture shows, in words, and what is wrong in it."""
+    """A caption: what the picture shows and what is wrong in it."""
     said = f"The smallest scene that shows {faults_of(one)}: {one.fault}."
     spheres = [f"Sphere {k} starts {line}." for k, line in enumerate(scene_lines(one.scenario))]
     return " ".join([said, *spheres, LEGEND.format(t=one.scenario.duration)])
 
 
 def png(picture: Image.Image) -> bytes:
-    """The picture as a file."""
+    """The bytes of the picture as a PNG file."""
     file = BytesIO()
     picture.save(file, "png", optimize=True)
     return file.getvalue()
 
 
 def drawn(one: Smallest) -> Image.Image:
-    """Where the spheres start, where each motion ends, and the ways there."""
+    """The picture: start of the spheres, end of each motion, and the paths."""
     scene = one.scenario.scene
     motions = [(one.truth, EXACT, THICK), (one.yours, YOURS, THIN)]
     there = [(motion, colour, width) for motion, colour, width in motions if motion is not None]
@@ -64,8 +64,8 @@ def drawn(one: Smallest) -> Image.Image:
 
 
 class Paper:
-    """A picture, y up, on which these places (m, 2) and the start of a scene have room. What is
-    farther away than `FARTHEST`, or nowhere (NaN), is not drawn."""
+    """A picture, y up, with room for these places (m, 2) and the start of a scene. Places farther
+    away than `FARTHEST`, or NaN, are not drawn."""
 
     def __init__(self, places: Array, scene: Scene) -> None:
         seen = np.concatenate([scene.position, places[(np.abs(places) <= FARTHEST).all(axis=1)]])
@@ -78,7 +78,7 @@ class Paper:
         self.draw = ImageDraw.Draw(self.picture)
 
     def at(self, place: Array) -> Array:
-        """Where in the picture a place is."""
+        """The pixel of a place."""
         there: Array = (place - self.corner) * [1, -1] * self.scale * FINER
         return there
 

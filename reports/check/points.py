@@ -13,7 +13,7 @@ from reports.check.rows import TASKS
 
 DEFAULT = Path(__file__).parent / "tasks.toml"
 # The questions that may have points, by task. "loop" and "scenes" have none by default: the
-# exercise hands out the step, and a scene is wrong only where a task is.
+# exercise provides the step, and a scene is wrong only if a task is.
 QUESTIONS = {
     "1": (
         *("velocity", "position", "spin", "angle", "turns"),
@@ -35,7 +35,7 @@ Points = Mapping[str, Mapping[str, float]]
 
 
 class BadPoints(ValueError):
-    """A file of points that cannot be used; the message names it and says what to change."""
+    """An unusable file of points; the message names it and says what to change."""
 
 
 def read_points(path: Path = DEFAULT) -> Points:
@@ -67,7 +67,8 @@ def points_text(path: Path) -> str:
 
 
 def of_task(path: Path, task: str, given: Any) -> dict[str, float]:
-    """The points of the questions of a task: as they are given, or a number shared as by default.
+    """The points of the questions of a task: as given, or one number distributed in the default
+    proportions.
 
     Raises `BadPoints`.
     """
@@ -83,8 +84,7 @@ def of_task(path: Path, task: str, given: Any) -> dict[str, float]:
 
 
 def shares(task: str) -> dict[str, float]:
-    """The points that the questions of a task have by default; the same for all where it has
-    none."""
+    """The default points of the questions of a task; equal if it has none."""
     given = tomllib.loads(DEFAULT.read_text(encoding="utf-8"))
     return given.get(task) or dict.fromkeys(QUESTIONS[task], 1.0)
 

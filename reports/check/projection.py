@@ -1,4 +1,4 @@
-"""Task 2 (b): where a solver puts two spheres that overlap."""
+"""Task 2 (b): the displacement of two overlapping spheres."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scenarios.model import Array
 
 class Shift(NamedTuple):
     """The displacement of a pair: of A along the normal, of B against it, and the larger one across
-    it; and before it the overlap, the distance and the sum of the sizes. All in m."""
+    it; and before the call the overlap, the distance and the sum of the sizes. All in m."""
 
     a: float
     b: float
@@ -27,7 +27,7 @@ class Shift(NamedTuple):
 
 
 WRONG_SIGN = "the sign is wrong: they are moved into each other"
-# (shift) -> the displacement of both together that a mistake would give, m
+# (shift) -> the total displacement of both that a mistake gives, m
 TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the positions are never changed: not implemented": lambda s, a, b: 0.0,
     WRONG_SIGN: lambda s, a, b: -s.overlap,
@@ -73,13 +73,13 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 
 
 def moved_together(answers: dict[str, Answer]) -> bool:
-    """Whether pairs that collide are displaced the wrong way."""
+    """Whether colliding pairs are moved into each other."""
     shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 
 
 def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
-    """The displacement of a pair in the frame of its normal."""
+    """The displacement of a pair, relative to its normal."""
     a, b = question
     n, distance = direction(a, b)
     t = np.array([-n[1], n[0]])
@@ -93,7 +93,7 @@ TAKEN_TO_BE_APART = "the overlapping pairs of these questions are taken to be ap
 
 
 def reacts(answers: dict[str, Answer]) -> bool:
-    """Whether the function does something with every pair that collides; to fail is something."""
+    """Whether the function reacts to every colliding pair; a failure is a reaction."""
     return all(
         answers[name].failed
         or not np.array_equal(
@@ -104,8 +104,7 @@ def reacts(answers: dict[str, Answer]) -> bool:
 
 
 def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
-    """The rows of (b) where the function fails later, by the places at which it left the
-    spheres."""
+    """The rows of (b) if the function fails later, from the positions at the failure."""
     if not reacts(answers):
         return [not_asked("one point", "2b", TAKEN_TO_BE_APART)]
     readable = all(answers[name].balls for name in DISPLACED)
@@ -117,8 +116,8 @@ def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
 
 
 def displaced(before: tuple[Ball, ...], answer: Answer) -> bool:
-    """Whether a call that failed had displaced a pair before: the pair is in its right place, or
-    all four coordinates are others. Any other place may be one on the way."""
+    """Whether a failed call had finished the displacement of a pair: the pair is in the right
+    place, or all four coordinates changed. Otherwise the failure may have come in between."""
     if not answer.failed:
         return True
     shift = shift_of(before, answer.last)
@@ -127,12 +126,12 @@ def displaced(before: tuple[Ball, ...], answer: Answer) -> bool:
 
 
 def in_one_point(shift: Shift) -> bool:
-    """Whether two spheres that overlapped touch after their displacement along the normal."""
+    """Whether two overlapping spheres touch after their displacement along the normal."""
     return near(shift.a + shift.b, shift.overlap, 0.1) and near(shift.across, 0.0, 0.1)
 
 
 def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[CheckRow]:
-    """The rows of (b); `found`: what the velocities say."""
+    """The rows of (b); `found`: the explanation of the velocities."""
     seen = [
         (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
         for name, q in COLLISIONS.items()
@@ -172,8 +171,8 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
 
 
 def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
-    """The row on a pair at relative rest: its displacement changes no velocity. None if a mistake
-    in the impulse explains the change, or velocities are not numbers."""
+    """The row on a pair at relative rest, whose displacement must not change a velocity. None if a
+    mistake in the impulse explains the change, or velocities are not numbers."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
     if not kept and answers["at rest to each other"].failed:
@@ -202,23 +201,24 @@ def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
 
 
 Pairs = list[tuple[tuple[Ball, ...], Shift, list[Ball]]]
-"""Of every pair that collides: before the call, how it was displaced, after the call."""
+"""For every colliding pair: the state before the call, its displacement, the state after the
+call."""
 
 
 def total_cause(seen: Pairs) -> str:
-    """The mistake that gives the displacement of all pairs; "" if none does."""
+    """The mistake that explains the displacement of all pairs; "" if none does."""
     mistakes = (no_numbers, half_of_one, b_as_a, across_cause, wrong_total)
     return next((cause for mistake in mistakes if (cause := mistake(seen))), "")
 
 
 def no_numbers(seen: Pairs) -> str:
-    """That positions are lost, before any other cause is looked for; "" if none is."""
+    """The cause that positions are not numbers, which is tested before any other; "" if all are."""
     finite = np.isfinite([b.x for *_, after in seen for b in after]).all()
     return "" if finite else "the positions become NaN or infinite"
 
 
 def half_of_one(seen: Pairs) -> str:
-    """That one sphere stays where it is and the other is moved by half of the overlap."""
+    """The cause that only one sphere is moved, by half of the overlap; else ""."""
     halved = all(near(s.a + s.b, s.overlap / 2, 0.1) for _, s, _ in seen)
     for who, still in (("A", "b"), ("B", "a")):
         if halved and all(abs(getattr(s, still)) <= 1e-9 for _, s, _ in seen):
@@ -227,14 +227,15 @@ def half_of_one(seen: Pairs) -> str:
 
 
 def b_as_a(seen: Pairs) -> str:
-    """That both are moved the same way, by distances that add up to the overlap."""
+    """The cause that both are moved the same way, by distances that add up to the overlap; else
+    ""."""
     alike = (near(abs(s.a) + abs(s.b), s.overlap, 0.1) and s.a * s.b < 0 for _, s, _ in seen)
     return "B is moved the same way as A: its sign is wrong" if all(alike) else ""
 
 
 def wrong_total(seen: Pairs) -> str:
-    """The formula of `TOTALS` that gives the displacement of both together, if all pairs are moved
-    along their normals."""
+    """The formula of `TOTALS` that gives the total displacement, if all pairs are moved along their
+    normals."""
     if not all(near(s.across, 0.0, 0.1) for _, s, _ in seen):
         return ""
     with np.errstate(all="ignore"):
@@ -260,7 +261,7 @@ WAYS: dict[str, Callable[[Array, Ball, Ball], Array]] = {
 
 
 def across_cause(seen: Pairs) -> str:
-    """Along what else they are moved, or one of them is; "" if along nothing that is known."""
+    """The cause that one or both are moved in another known direction; else ""."""
     moved = [way_of([(b[who], b[1 - who], after[who]) for b, _, after in seen]) for who in (0, 1)]
     if moved[0] == moved[1]:
         return f"they are moved {moved[0]}" if moved[0] else ""
@@ -273,8 +274,8 @@ def across_cause(seen: Pairs) -> str:
 
 
 def way_of(seen: list[tuple[Ball, Ball, Ball]]) -> str | None:
-    """Along what one of a pair is moved, of (it before, the other, it after); "" along the normal,
-    None if unknown."""
+    """The direction in which one of a pair is moved, from (it before, the other, it after); "" for
+    the normal, None if unknown."""
     ways: dict[str, Callable[[Array, Ball, Ball], Array]] = {"": lambda n, one, other: n} | WAYS
     for name, way in ways.items():
         crosses = []
@@ -293,7 +294,7 @@ SET = ("position", "position.x", "position.y")
 
 
 def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
-    """Whether a position, or one part of it, is the displacement itself, which is along the
+    """Whether a position, or one component of it, equals the displacement itself, along the
     normal."""
     crosses = []
     for one, other, after in seen:
@@ -305,7 +306,7 @@ def was_set(which: str, seen: list[tuple[Ball, Ball, Ball]]) -> bool:
 
 
 def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
-    """How the overlap is shared, and what that does to the centre of mass: a free choice."""
+    """The row on how the overlap is shared, and the motion of the centre of mass: a free choice."""
     a, b = balls
     share = shift.a / shift.overlap
     known = {
@@ -341,7 +342,7 @@ ONE = (
 
 
 def separation(answer: Answer) -> CheckRow:
-    """Whether a pair is displaced that overlaps and moves apart: a free choice."""
+    """The row on a pair that overlaps and moves apart: whether to displace it is a free choice."""
     shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     if answer.failed and not moved:

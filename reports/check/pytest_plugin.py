@@ -1,5 +1,5 @@
-"""`pytest --solver FILE`: the check of a solver as tests, in anybody's project; imports what it
-needs when it runs."""
+"""`pytest --solver FILE`: the check of a solver as tests, in any project. Its modules are imported
+only when it runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The option, repeatable."""
+    """Add the option, which is repeatable."""
     group = parser.getgroup("crosscheck", "a hand-written solver of 2D disks")
     group.addoption(
         "--solver",
@@ -26,7 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.Item]) -> None:
-    """Add a test a row, before all others."""
+    """Add a test for each row, before all others."""
     for name in reversed(session.config.getoption("--solver")):
         items[:0] = SolverFile.from_parent(
             session, path=(session.config.invocation_params.dir / name)
@@ -34,10 +34,10 @@ def pytest_collection_modifyitems(session: pytest.Session, items: list[pytest.It
 
 
 class SolverFile(pytest.File):
-    """A solver's file as something that holds tests."""
+    """A solver's file as a collector of tests."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """A test a row."""
+        """A test for each row."""
         from adapters.own_solver.file import NotASolver
         from reports.check.solver import check_solver
 
@@ -63,7 +63,8 @@ class RowItem(pytest.Item):
         self.row = row
 
     def runtest(self) -> None:
-        """Fail by a fault, skip what could not be asked or follows from a fault."""
+        """Fail for a fault, skip if the question could not be asked or the row follows from a
+        fault."""
         if self.row.verdict in ("not asked", "follows"):
             pytest.skip(self.row.cause)
         if self.row.verdict == "fault":
@@ -72,7 +73,7 @@ class RowItem(pytest.Item):
     def repr_failure(
         self, excinfo: pytest.ExceptionInfo[BaseException], *given: Any, **named: Any
     ) -> str:
-        """The row in words, without a traceback, which would not be that of the solver."""
+        """The row in words; a traceback would not be that of the solver."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))
         from reports.check.evidence import evidence
@@ -81,5 +82,5 @@ class RowItem(pytest.Item):
         return "\n  ".join([self.row.asked, likely, *evidence(self.row)])
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Where the test is said to be."""
+        """The reported location of the test."""
         return self.path, None, f"{self.path.name}: {self.row.name}"

@@ -1,5 +1,5 @@
-"""The questions: a few spheres each, on which a solver's functions are called; and its answers,
-which must not depend on the question before."""
+"""The questions: a few spheres each, on which a solver's functions are called; and the answers,
+which must not depend on earlier questions."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from reports.check.rows import TOLERANCE
 from scenarios.model import Array
 
 LIMIT = 1.0  # s a question may take: it needs a few microseconds
-TOGETHER = 50  # fresh worlds of a request: what it may take is limited, too
+TOGETHER = 50  # fresh worlds in a request, because its time is limited, too
 BEGINNING = 2.0  # s that initScene may take
-LOADING = 3.0  # s that the file may take to be loaded anew
+LOADING = 3.0  # s that loading the file again may take
 
 
 class Ball(NamedTuple):
@@ -37,7 +37,7 @@ class Ball(NamedTuple):
     r: float = 0.5
 
     def numbers(self) -> list[float]:
-        """The 12 numbers that the worker makes a sphere of."""
+        """The 12 numbers from which the worker makes a sphere."""
         return [
             *self.x,
             *self.v,
@@ -58,8 +58,8 @@ def ball(numbers: ArrayLike) -> Ball:
 
 
 class Question(NamedTuple):
-    """Spheres and what is called on them; `world`: they are the file's own ufo and asteroids;
-    `watch`: the answer has the calls that the file makes of its own functions."""
+    """Spheres and the calls on them; `world`: use the file's own ufo and asteroids; `watch`: record
+    the calls that the file makes to its own functions."""
 
     balls: tuple[Ball, ...]
     calls: tuple[tuple[Any, ...], ...]
@@ -68,7 +68,7 @@ class Question(NamedTuple):
 
     @property
     def request(self) -> dict[str, object]:
-        """As the worker takes it."""
+        """The request to the worker."""
         spheres = [b.numbers() for b in self.balls]
         return {
             "spheres": spheres,
@@ -80,16 +80,16 @@ class Question(NamedTuple):
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a question.
+    """The answer to a question.
 
     Attributes:
-        balls: the spheres after each call; of a question that failed those of the calls before, or
-            as `left_by` of failing.py finds them.
-        returned: whether a function gave back an object.
-        strayed: whether the file's own ufo or asteroids changed, though they had no part in it.
+        balls: the spheres after each call; for a failed question those of the calls before it, or
+            those found by `left_by` of failing.py.
+        returned: whether a function returned an object. strayed: whether the file's own ufo or
+        asteroids changed, though they were not arguments.
         strange: fields that the spheres did not have before.
         kept: global numbers of the file that the calls have changed.
-        calls: what the file called, of a question that is watched: ("integrate", sphere, dt),
+        calls: the calls of the file, for a watched question: ("integrate", sphere, dt),
             ("collide", sphere, sphere), ("wrap",).
         failed: how it failed, or None.
     """
@@ -109,8 +109,8 @@ class Answer:
 
 
 def forced(dt: float, **changes: Any) -> Question:
-    """A sphere with a force and a torque, integrated once; its mass and inertia are those of no
-    solid disk."""
+    """A sphere with a force and a torque, integrated once; its mass and inertia do not fit a solid
+    disk."""
     plain = Ball((0.3, -0.7), (1.1, -0.4), (2.0, 3.0), 0.2, 0.9, 0.7, 1.7, 0.6, 0.25)
     return Question((plain._replace(**changes),), (("integrate", 0, dt),))
 
@@ -127,7 +127,7 @@ def meeting(
     turn: float,
     depth: float = 0.12,
 ) -> Question:
-    """Two spheres of 0.5 and 0.3 m that overlap by `depth` m, b lying in the direction `turn` rad
+    """Two spheres of 0.5 and 0.3 m that overlap by `depth` m, with b in the direction `turn` rad
     from a."""
     d = 0.8 - depth
     a = Ball((0.2, -0.1), va, (0.5, -0.3), 0.4, 0.6, 0.2, masses[0], 0.7, 0.5)
@@ -145,7 +145,7 @@ def meeting(
     return pair(a, b)
 
 
-# m; sums below, near and above 1, where squares tell
+# m; sums below, near and above 1, where squares differ from the values
 SIZES = ((0.25, 0.5), (0.6, 0.35), (1.5, 0.75), (0.9, 0.9))
 TURNS = (0.0, 0.65, 1.57, 3.6)  # rad
 # distances over the sum of sizes
@@ -165,7 +165,7 @@ def head_on(speed: float) -> Question:
 
 
 def questions() -> dict[str, Question]:
-    """All but those about the file's own scene, by name."""
+    """All questions by name, except those about the file's own scene."""
     found = {
         "force": forced(0.1),
         "force, other numbers": forced(
@@ -196,7 +196,7 @@ def questions() -> dict[str, Question]:
         found[f"reach/{k}"] = pair(
             a, Ball(tuple(np.array(a.x) + d * n), tuple(-0.9 * n), r=rb, m=2.1)
         )
-    # last: where this call never comes back, the others were answered before
+    # last, so that the others are answered if this call never returns
     found["same centre"] = pair(Ball((0.1, 0.2), (1.0, 0.5)), Ball((0.1, 0.2), (-0.5, 0.3), m=2.0))
     return found
 
@@ -207,11 +207,11 @@ QUESTIONS = questions()
 def ask(
     process: SolverProcess, asked: dict[str, Question], afresh: bool = False
 ) -> dict[str, Answer]:
-    """The answers by name; `afresh`: each question in a world of its own, else all in the one that
-    is there. Raises `SolverFailed` if the process is lost."""
+    """The answers by name; `afresh`: ask each question in a fresh world, else all in the present
+    one. Raises `SolverFailed` if the process is lost."""
     before = fresh_world(process) if afresh else []
     answers: dict[str, Answer] = {}
-    # One request for all, where the worker puts no call again that did not come back.
+    # One request for all: the worker does not repeat a call that did not return.
     for names in batched(asked, TOGETHER if afresh else len(asked)):
         requests: list[Request] = []
         for name in names:
@@ -229,7 +229,7 @@ def batched(names: Iterable[str], size: int) -> Iterator[list[str]]:
 
 
 def fresh_world(process: SolverProcess) -> list[Request]:
-    """Requests that load the file anew, and let it make its scene."""
+    """Requests that load the file again and call its initScene."""
     begin: list[Request] = [("begin", None, BEGINNING)] if process.functions["begin"] else []
     return [("renew", None, LOADING), *begin]
 
@@ -237,16 +237,16 @@ def fresh_world(process: SolverProcess) -> list[Request]:
 def ask_in_two_orders(
     process: SolverProcess, asked: dict[str, Question]
 ) -> tuple[dict[str, Answer], dict[str, Answer]]:
-    """The answer to each question, asked first in a fresh world; and the answers that differ when
-    other questions come before.
+    """The answer to each question in a fresh world, and the answers that differ after other
+    questions.
 
-    A fresh world takes V8 10 ms. So all questions are asked in one world, and in the reverse order
-    in a second one. If both give the same answers, what was asked before does not matter. If not,
-    each question is asked again in a world of its own.
+    A fresh world costs 10 ms in V8. So all questions are asked in one world, and in reverse order
+    in a second one. If the answers agree, earlier questions do not matter. If not, each question is
+    asked again in a fresh world.
     """
     process.request(fresh_world(process))
     answers = ask(process, asked)
-    if stuck(answers):
+    if was_stopped(answers):
         return answers, {}
     process.request(fresh_world(process))
     again = ask(process, dict(reversed(asked.items())))
@@ -263,11 +263,11 @@ def ask_in_two_orders(
     return alone, others
 
 
-BY_CHANCE = ("same centre",)  # where there is no normal, a solver may choose one at random
+BY_CHANCE = ("same centre",)  # without a normal a solver may choose one at random
 
 
 def alike(one: Answer, other: Answer) -> bool:
-    """Whether two answers say the same of the spheres."""
+    """Whether two answers agree about the spheres."""
     if bool(one.failed) != bool(other.failed) or len(one.balls) != len(other.balls):
         return False
     first, second = (
@@ -276,15 +276,15 @@ def alike(one: Answer, other: Answer) -> bool:
     return np.allclose(first, second, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True)
 
 
-def stuck(answers: dict[str, Answer]) -> bool:
-    """Whether a call had to be stopped; if it is made again, it must be stopped again."""
+def was_stopped(answers: dict[str, Answer]) -> bool:
+    """Whether a call had to be stopped; it would have to be stopped again."""
     return any(
         answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
     )
 
 
 def answered(reply: dict[str, Any] | SolverFailed) -> Answer:
-    """An answer from what the worker sent."""
+    """The answer from a reply of the worker."""
     if isinstance(reply, SolverFailed):
         return Answer([], failed=reply)
     failed = None if reply["error"] is None else SolverFailed(**reply["error"])
@@ -315,5 +315,5 @@ def finite(answers: dict[str, Answer], part: str) -> bool:
 
 
 def named(answers: dict[str, Answer], prefix: str) -> Iterator[tuple[Question, Answer]]:
-    """Questions whose name begins so, with their answers."""
+    """The questions whose names start with `prefix`, with their answers."""
     return ((QUESTIONS[name], answers[name]) for name in answers if name.startswith(prefix))

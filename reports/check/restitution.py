@@ -1,4 +1,4 @@
-"""The rows on the restitution of a file: what is written into it, and what its collisions have."""
+"""The rows on the restitution of a file: the number written in it, and that of its collisions."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Restitution:
     """The restitution of a file.
 
     Attributes:
-        read: what its text says, and what a pair has that closes at 2 m/s.
-        absurd: whether that is not from 0 to 1, and the text gives it to a name such as e.
-        slow, fast: what pairs have that close at 2 mm/s and at 200 m/s.
+        read: e in its text, and e of a pair that closes at 2 m/s.
+        absurd: whether that is outside 0 to 1, and the text assigns it to a name such as e.
+        slow, fast: e of pairs that close at 2 mm/s and at 200 m/s.
     """
 
     read: OwnRestitution
@@ -39,33 +39,33 @@ class Restitution:
 
     @property
     def own(self) -> float:
-        """The value that the file states, or the exercise's if it states none: any other number in
-        the file may mean something else."""
+        """The e that the file states, or that of the exercise if it states none, because other
+        numbers in the file may mean something else."""
         return self.read.own if self.read.stated and self.read.own is not None else EXERCISE
 
     @property
     def candidates(self) -> list[float]:
-        """The values of e that are tried to explain collisions: the file's own, then the one that
-        came, unless the file states another."""
+        """The values of e that may explain the collisions: the file's own, then the measured one,
+        unless the file states another."""
         free = 0 <= self.came <= 1 and not self.read.stated
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
     @property
     def played(self) -> float | None:
-        """The value that whole scenes are judged by: what came, if that is right or a free choice,
-        else the one that the file ought to have; None if no number from 0 to 1 makes sense."""
+        """The e for judging whole scenes: the measured one if that is right or a free choice, else
+        the one that the file should have; None if none is from 0 to 1."""
         came = [self.came] if self.meant else []
         return next((e for e in (*came, self.own) if 0 <= e <= 1), None)
 
     @property
     def meant(self) -> bool:
-        """Whether the file's collisions have the restitution that it is written for."""
+        """Whether the file's collisions have the restitution that the file states."""
         right = near(self.came, EXERCISE) or near(self.came, self.own)
         return right or len(self.candidates) > 1
 
     @property
     def mistake(self) -> str:
-        """What is wrong with the number that is written in, "" if nothing is."""
+        """What is wrong with the number in the file; "" if nothing is."""
         return (
             f"e = {shown(self.came)} is written into the file; it must be from 0 to 1"
             if self.absurd
@@ -73,10 +73,10 @@ class Restitution:
         )
 
     def row(self, mistake: str) -> CheckRow:
-        """0.9 is right; another number is a free choice if the file says so, a fault if it says
-        something else.
+        """The row on e: 0.9 is right; another number is a free choice if the file states it, and
+        else a fault.
 
-        `mistake`: what is known to be wrong with the collisions, if anything.
+        `mistake`: the known mistake in the collisions, or "".
         """
         asked = (
             "Two spheres of 1 kg meet head-on at 2 m/s: what is the restitution e, their speed of"
@@ -97,7 +97,7 @@ class Restitution:
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
     def speeds(self, mistake: str) -> CheckRow:
-        """The same at any speed; `mistake` as above."""
+        """The row on e at other speeds; `mistake` as above."""
         return judged(
             "restitution at other speeds",
             "2c",
@@ -110,14 +110,14 @@ class Restitution:
 
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
-    """What the file's text says and what its collisions give."""
+    """The `Restitution` from the file's text and its collisions."""
     came, slow, fast = (restitution_in(answers[name], name) for name in ("even", "slow", "fast"))
     absurd = not 0 <= came <= 1 and any(near(e, came) for e in named_in(text))
     return Restitution(own_restitution(text, came), absurd, slow, fast)
 
 
 def restitution_in(answer: Answer, name: str) -> float:
-    """Of the head-on pair of a question; NaN if the call failed."""
+    """The e of the head-on pair of a question; NaN if the call failed."""
     if answer.failed or not answer.balls:
         return float("nan")
     a, b = QUESTIONS[name].balls

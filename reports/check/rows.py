@@ -1,4 +1,4 @@
-"""A row of the check: what was asked of a solver, what came, what was expected, and the likely
+"""A row of the check: a question to a solver, its answer, the expected answer, and the likely
 cause."""
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 Verdict = Literal["right", "fault", "follows", "free choice", "not asked"]
-# Single precision is allowed: a dozen operations of 6e-8 each. What is wrong is wrong by far more
+# Single precision is allowed: a dozen operations of 6e-8 each. Mistakes are far larger
 # than that.
 TOLERANCE = 1e-6
 FOLLOWS = "it follows from the faults above"
@@ -36,7 +36,7 @@ READ = {
     "loop": "performSimStep and projectObjects as the exercise hands them out",
     "scenes": "scenarios/truth/closed_forms.py, scenarios/truth/exact.py",
 }
-# The formula of the exercise, by the row's name where it has one of its own, else by its task; a
+# The formula of the exercise, by the row's name if it has its own, else by its task; a
 # prime marks the value after the step or the collision.
 FORMULAS = {
     "velocity": "v' = v + (F / mass) dt",
@@ -65,15 +65,15 @@ class CheckRow:
     """One thing that was checked.
 
     Attributes:
-        name: a word for it, the same for every solver.
+        name: its name, the same for every solver.
         task: the key in `TASKS` of the part of the exercise it belongs to.
         asked: the question, one sentence.
         got, expected: the answer and the right one, with units.
         verdict: "right"; "fault"; "follows": another answer, because of a fault in another task
             (consequences.py); "free choice": the exercise leaves it to the author, so that no
             answer is wrong; "not asked": it could not be asked, and `cause` says why.
-        cause: of a fault its likely cause; of a free choice what was chosen.
-        lines: of a fault the lines of the file that it is about: number from 1, text.
+        cause: the likely cause of a fault; the choice, for a free choice.
+        lines: for a fault the lines of the file concerned: number from 1, text.
     """
 
     name: str
@@ -87,7 +87,7 @@ class CheckRow:
 
     @property
     def read(self) -> str:
-        """Where to read how it is meant."""
+        """The source of the expected answer."""
         return READ[self.task]
 
     @property
@@ -119,7 +119,8 @@ def not_asked(name: str, task: str, why: str) -> CheckRow:
 
 
 def near(got: object, expected: object, scale: float = 1.0) -> bool:
-    """Whether all numbers agree to `TOLERANCE` of themselves or of `scale`; NaN never does."""
+    """Whether all numbers agree to `TOLERANCE`, relative to themselves or to `scale`; NaN never
+    does."""
     one, other = np.asarray(got, float), np.asarray(expected, float)
     return bool((np.abs(one - other) <= TOLERANCE * np.maximum(np.abs(other), scale)).all())
 
@@ -130,7 +131,7 @@ Law = Callable[..., object]
 def follows(
     laws: Mapping[str, Law], asked: Sequence[Sequence[object]], came: Sequence[object]
 ) -> str | None:
-    """The first law that gives what came, for everything that was asked; None if there is none."""
+    """The first law that reproduces all answers; None if there is none."""
     with np.errstate(all="ignore"):
         for name, law in laws.items():
             if all(near(answer, law(*question), 0.1) for question, answer in zip(asked, came)):
@@ -139,7 +140,7 @@ def follows(
 
 
 def shown(value: object) -> str:
-    """Numbers for people: four digits, vectors in brackets."""
+    """Numbers as text: four digits, vectors in brackets."""
     array = np.asarray(value, float)
     if array.ndim:
         return "(" + ", ".join(shown(x) for x in array) + ")"

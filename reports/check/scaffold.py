@@ -1,4 +1,5 @@
-"""`crosscheck check --scaffold NAME DIR`: what a system that keeps marks needs to run the check."""
+"""`crosscheck check --scaffold NAME DIR`: the files that a grading system needs to run the
+check."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ KINDS = Path(__file__).parent / "autograder"
 
 
 class Kind(NamedTuple):
-    """What is left to do by hand, and where in the folder the points go."""
+    """A kind of scaffold: the remaining steps by hand, and the path of the points in the folder."""
 
     next: str
     points: str = "tasks.toml"
@@ -32,8 +33,7 @@ SCAFFOLDS = {
 
 
 def write_scaffold(kind: str, folder: Path, points: Path | None, hints: str) -> None:
-    """Write the files of a kind to a folder that is empty or not there; exits 2 if that is not
-    possible."""
+    """Write the files of a kind to a new or empty folder; exits 2 if that fails."""
     if kind not in SCAFFOLDS:
         refuse([f"--scaffold {kind}: is none of {', '.join(SCAFFOLDS)}"])
     try:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def scene_lines(scenario: Scenario) -> list[str]:
-    """A scene in words, a line a sphere."""
+    """A scene in words, a line for each sphere."""
     scene, lines = scenario.scene, []
     for k in range(scene.n):
         lines.append(
@@ -26,11 +26,11 @@ def scene_lines(scenario: Scenario) -> list[str]:
 
 
 def faults_of(one: Smallest) -> str:
-    """Which faults a scene shows: "fault 1", "faults 1 and 2"."""
+    """The faults that a scene shows: "fault 1", "faults 1 and 2"."""
     return f"fault{'s' * (len(one.of) > 1)} {' and '.join(map(str, one.of))}"
 
 
 def together(one: Smallest) -> str:
-    """That several faults act on the same numbers of a scene."""
+    """A sentence if several faults change the same numbers of a scene."""
     numbers = " and ".join(map(str, one.of))
     return f"Faults {numbers} change the same numbers here: the scene shows them together."

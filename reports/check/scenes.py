@@ -1,5 +1,5 @@
-"""Whole scenes: how far a solver's motion is from the exact one, beside what its step size
-explains; and its first wrong collision."""
+"""Whole scenes: the position error of a solver, beside the error that its step size explains; and
+its first wrong collision."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from scenarios.truth.record import TruthRecord
 
 DT = 1e-3  # s, the exercise's
 INTERVAL = 0.02  # s
-SLACK = 2.0  # on a bound of first order in dt: what is left out is smaller by another dt v / r
+SLACK = 2.0  # on a bound of first order in dt: higher orders are smaller by another dt v / r
 LIMIT = 5.0  # s that the steps of a scene may take
-SCENE_LIMIT = 10.0  # s by the clock that all of a scene may take: it needs a tenth of a second
+SCENE_LIMIT = 10.0  # s, wall time that a whole scene may take: it needs a tenth of a second
 
 
 class SceneAnswer(NamedTuple):
@@ -49,9 +49,9 @@ def step_of(process: SolverProcess) -> float:
 def play_scene(
     process: SolverProcess, scenario: Scenario, dt: float, afresh: bool = False
 ) -> SceneAnswer:
-    """Play it by the file's own functions; its forces last as long as it does.
+    """Play a scene with the file's own functions; its forces act all the time.
 
-    afresh: load the file anew before it, as one that keeps state needs. Raises `SolverFailed`.
+    afresh: load the file again first, for a file that keeps state. Raises `SolverFailed`.
     """
     scene, count = scenario.scene, round(scenario.sample_interval / dt)
     forces = np.zeros((scene.n, 3))
@@ -87,8 +87,8 @@ def play_scene(
 
 
 def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None) -> list[CheckRow]:
-    """The rows on whole scenes with restitution `e`, and the one on the first wrong collision in
-    any of them."""
+    """The rows on whole scenes with restitution `e`, and the row on the first wrong collision in
+    them."""
     if any(row.name == "implemented" for row in rows):
         return [not_asked("scenes", "scenes", "a function of the file cannot be used")]
     blamed = any(row.verdict == "fault" for row in rows)
@@ -101,7 +101,7 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
             found.append(scene_row(scenario, record, played, dt, FOLLOWS if blamed else ""))
             wrong = wrong or first_wrong(scenario, played.contacts, dt)
             if not np.isfinite(played.position).all():
-                break  # what is not a number may also be slow, and says no more in the other scenes
+                break  # a scene that is not a number may be slow, and other scenes add nothing
     except SolverFailed as failure:
         return [
             judged(
@@ -131,7 +131,8 @@ def scene_rows(process: SolverProcess, rows: Sequence[CheckRow], e: float | None
 def scene_row(
     scenario: Scenario, record: TruthRecord | None, played: SceneAnswer, dt: float, cause: str
 ) -> CheckRow:
-    """The largest distance from the exact positions, beside what the step size explains."""
+    """The row on a scene: the largest position error, beside the error that the step size
+    explains."""
     truth = truth_of(scenario, record)
     k = len(truth)
     away = np.hypot(*np.moveaxis(played.position[:k] - truth.position, -1, 0))
@@ -161,22 +162,22 @@ def scene_row(
 
 
 def truth_of(scenario: Scenario, record: TruthRecord | None) -> Trajectory:
-    """The exact motion, up to where it is known."""
+    """The exact motion, up to its horizon."""
     if record is None:
         return world_thrusts(scenario.scene, scenario.thrusts, scenario.times)
     return record.sampled(scenario.scene, scenario.thrusts, scenario.times)
 
 
 def rounding(place: Array, rate: Array, t: Array, dt: float) -> Array:
-    """(k,) what single precision may add, in the unit of `place`: every step rounds place and rate
-    by 2^-24."""
+    """(k,) bound on the error of single precision, in the unit of `place`: every step rounds place
+    and rate by 2^-24."""
     room: Array = TOLERANCE + 2.0**-24 * t / dt * (np.abs(place).max() + np.abs(rate).max() * t / 2)
     return room
 
 
 def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
-    """(k,) rad, how far an angle may be off: symplectic Euler is w' dt t / 2 ahead, and a collision
-    turns nothing."""
+    """(k,) rad, bound on the error of an angle: symplectic Euler is w' dt t / 2 ahead, and a
+    collision changes no spin."""
     spin_up = max(
         (abs(p.torque) / scenario.scene.inertia[p.disk] for p in scenario.thrusts), default=0.0
     )
@@ -184,13 +185,13 @@ def turning_bounds(scenario: Scenario, t: Array, dt: float) -> Array:
 
 
 def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) -> Array:
-    """(k,) m, how far a right solver in steps of `dt` s may be off at the times t (k,) s.
+    """(k,) m, bound on the position error of a right solver with steps of `dt` s, at the times t
+    (k,) s.
 
     Free flight under a thrust: symplectic Euler is a dt t / 2 ahead. A collision is found up to dt
-    late, so that each disk goes on for u dt; its normal is turned by that and by what the disks
-    were off before, over (rA + rB) cos, which sends them off by as much of their change of
-    velocity. Errors add up and grow with time, so that after several strikes it is generous: there
-    the row on the first wrong collision is the one that sees.
+    late, so that each disk moves on by u dt. This and the earlier errors, over (rA + rB) cos, turn
+    the normal, and so the change of velocity. Errors add up and grow with time. After several
+    collisions the bound is generous; then the row on the first wrong collision finds the faults.
     """
     scene = scenario.scene
     fastest = max(
@@ -219,8 +220,8 @@ def bounds(scenario: Scenario, record: TruthRecord | None, t: Array, dt: float) 
 
 
 def first_wrong(scenario: Scenario, contacts: Array, dt: float, part: str = "") -> str:
-    """A sentence on the first contact whose outcome is not that of the formula; "" if none is.
-    `part`: looks only for what is wrong in this part of task 2, as in `contact_faults`."""
+    """A sentence on the first contact whose outcome differs from the formula; "" if there is none.
+    `part`: look only for faults in this part of task 2, as in `contact_faults`."""
     scene = scenario.scene
     for row in contacts:
         step, i, j = int(row[0]), int(row[1]), int(row[2])
@@ -231,9 +232,9 @@ def first_wrong(scenario: Scenario, contacts: Array, dt: float, part: str = "") 
 
 
 def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str]:
-    """What is wrong with one call, by the part of task 2 that it shows: "2a", "2b", "2c", which
-    stands for the velocities, and "2c and 2d", where neither sphere gets the right impulse and
-    both together get one; {} if nothing is.
+    """Part of task 2 -> what is wrong with one call: "2a", "2b", "2c" for the velocities, and "2c
+    and 2d" if neither sphere gets the right impulse and the total momentum changes; {} if nothing
+    is wrong.
 
     states: (2, 2, 4) before and after, of i and j, x, y, vx, vy.
     """
@@ -276,7 +277,7 @@ def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str
     return faults
 
 
-# question, s, then a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg
+# question, duration s, a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg
 MET: dict[str, tuple[Any, ...]] = {
     "head_on": (
         "Where are two unequal spheres after they meet head-on?",
@@ -320,8 +321,8 @@ MET: dict[str, tuple[Any, ...]] = {
 
 @lru_cache(maxsize=8)
 def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
-    """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or
-    many digits, which are computed once for each `e` and kept in the cache."""
+    """The scenes of a check with restitution `e`, each with its exact motion: a closed form, or the
+    oracle, computed once for each `e` and cached."""
     forced = Scenario(
         name="forced",
         asks="Where is a sphere after a second of a constant force and torque?",

@@ -1,5 +1,5 @@
-"""The smallest scene that shows a fault: sampled and shrunk by hypothesis, each judged by closed
-forms alone."""
+"""The smallest scene that shows a fault: sampled and shrunk by hypothesis, and judged by closed
+forms only."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed
 
-SECONDS = 1.5  # for drawing and shrinking together
+SECONDS = 1.5  # s for sampling and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s
 EXAMPLES = 400
-# m or rad: every step of single precision may round 4 m that much
+# m or rad: the rounding of 4 m in single precision in every step
 SINGLE = 2.0**-24 * DURATION / DT * 4 / TOLERANCE
 GAP = 0.05  # m, least distance of two surfaces at the start
 
 Sphere = tuple[int, int, int, int, int, int]
 """x, y in half metres, vx, vy in m/s, radius in quarters of a metre, mass in kg."""
 Example = tuple[list[Sphere], tuple[int, int, int]]
-"""The spheres, and the thrust of one that is alone: force x, y in N, torque in tenths of a N m."""
+"""The spheres, and the thrust if there is only one: force x, y in N, torque in tenths of a N m."""
 Play = Callable[[Scenario], SceneAnswer]
 """A scene by the solver's file, in steps of `DT`."""
-# Tried before any is sampled: on a busy machine the time may be up before a pair that collides is.
+# Tried before sampling: on a busy machine the time may end before a colliding pair is sampled.
 FIRST: list[Example] = [
     ([(0, 0, 1, 1, 1, 2)], (1, 2, 1)),
     ([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0)),
@@ -47,8 +47,8 @@ FIRST: list[Example] = [
 ]
 
 
-# Task, or row of a task -> what a scene shows of it: where a flight leads, how it turns, an overlap
-# that is seen or not, a distance, velocities, momentum.
+# Task, or row of a task -> what a scene shows of it: end of a flight, its rotation, an overlap
+# found or missed, a distance, velocities, momentum.
 PARTS = {"1": "1", "2a": "2a", "2b": "2b", "2c": "2c", "2d": "2d", "file": "", "scenes": ""}
 ROWS = {
     "velocity": "place",
@@ -66,15 +66,15 @@ def smallest_scenes(
     process: SolverProcess, e: float, findings: Sequence[CheckRow], afresh: bool = False
 ) -> list[Smallest]:
     """For each fault the smallest scene that shows it, if one is found. A fault in 2c and one in 2d
-    share a scene, in which both can be told. A fault of the loop has none: scenes are played by the
+    share a scene that shows both. A fault of the loop has none, because scenes are played with the
     exercise's own loop."""
     search = partial(smallest_scene, process, e, afresh)
     of = {part: k for k, part in reversed([*enumerate(map(part_of, findings), 1)])}
-    if list(of) == [None]:  # a single fault may show in anything
+    if list(of) == [None]:  # a single fault may show in any part
         of = {"": 1}
     found = []
     if "2c" in of and "2d" in of:
-        # from a collision that shows either nobody could tell which
+        # a collision that shows one of them would not say which
         pair = tuple(sorted((of.pop("2c"), of.pop("2d"))))
         found.append((pair, search(BOTH)))
     found += [((k,), search(part)) for part, k in of.items() if part is not None]
@@ -84,17 +84,17 @@ def smallest_scenes(
 
 
 def part_of(row: CheckRow) -> str | None:
-    """What a scene shows of a fault; None if nothing."""
+    """The part in which a scene shows a fault; None if it does not."""
     return None if row.name in UNSEEN else ROWS.get(row.name, PARTS.get(row.task))
 
 
 def smallest_scene(
     process: SolverProcess, e: float, afresh: bool = False, part: str = ""
 ) -> Smallest | None:
-    """The smallest that is found within `SECONDS`; None if none shows a fault.
+    """The smallest scene found within `SECONDS`; None if none shows a fault.
 
-    afresh: each scene is played by the file loaded anew, as one that keeps state needs.
-    part: what must be wrong: a value of `PARTS` or `ROWS`, or `BOTH`; "" for anything.
+    afresh: load the file again for each scene, for a file that keeps state.
+    part: the required fault: a value of `PARTS` or `ROWS`, or `BOTH`; "" for any.
     """
     play = partial(play_scene, process, dt=DT, afresh=afresh)
     best = next((example for example in FIRST if fault_of(play, *example, e, part)), None)
@@ -119,14 +119,14 @@ def smallest_scene(
         suppress_health_check=list(HealthCheck),
         phases=(Phase.generate, Phase.shrink),
     )
-    # nothing found, or the time was up while it shrank
-    with homeless(), suppress(NoSuchExample, Flaky):
+    # nothing found, or no time left for shrinking
+    with in_temporary_folder(), suppress(NoSuchExample, Flaky):
         find(scene, faulty, settings=rules)
-    return shown_by(play, *without_idlers(play, *best, e, part), e, part) if best else None
+    return shown_by(play, *without_idle_spheres(play, *best, e, part), e, part) if best else None
 
 
 def size(example: Example) -> tuple[int, int]:
-    """How many spheres a scene has, and how large its numbers are."""
+    """The sort key of a scene: number of spheres, and size of its numbers."""
     spheres, thrust = example
     return len(spheres), sum(map(abs, thrust)) + sum(
         abs(number) for sphere in spheres for number in sphere
@@ -134,9 +134,9 @@ def size(example: Example) -> tuple[int, int]:
 
 
 @contextmanager
-def homeless() -> Iterator[None]:
-    """Hypothesis writes into a folder .hypothesis where the user works; within this it writes into
-    a temporary one."""
+def in_temporary_folder() -> Iterator[None]:
+    """Context in which hypothesis writes its .hypothesis folder into a temporary folder, not into
+    the working directory."""
     with TemporaryDirectory() as home:
         set_hypothesis_home_dir(home)
         try:
@@ -145,28 +145,28 @@ def homeless() -> Iterator[None]:
             set_hypothesis_home_dir(None)
 
 
-def without_idlers(
+def without_idle_spheres(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> tuple[list[Sphere], tuple[int, int, int]]:
-    """The scene without the spheres that the fault does not need. Hypothesis removes them, too, but
-    may run out of time."""
+    """The scene without the spheres that the fault does not need. Hypothesis also removes these,
+    but may run out of time."""
     for k in range(len(spheres)):
         fewer = spheres[:k] + spheres[k + 1 :]
         if fewer and fault_of(play, fewer, thrust, e, part):
-            return without_idlers(play, fewer, thrust, e, part)
+            return without_idle_spheres(play, fewer, thrust, e, part)
     return spheres, thrust
 
 
 def ints(most: int) -> st.SearchStrategy[int]:
-    """From -most to most; hypothesis shrinks them to 0."""
+    """Integers from -most to most; hypothesis shrinks them to 0."""
     return st.integers(-most, most)
 
 
 def scenario_of(
     spheres: list[Sphere], thrust: tuple[int, int, int], e: float, interval: float
 ) -> Scenario | None:
-    """The scene of these numbers; None if spheres are too near each other at the start. One alone
-    also has a thrust."""
+    """The scene of these numbers; None if spheres are too close at the start. A single sphere also
+    has a thrust."""
     rows = [(x / 2, y / 2, float(u), float(v)) for x, y, u, v, _, _ in spheres]
     radius, mass = [r / 4 for *_, r, _ in spheres], [float(m) for *_, m in spheres]
     for i in range(len(rows)):
@@ -195,8 +195,8 @@ def scenario_of(
 def fault_of(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> str:
-    """What is wrong with the file's motion in a scene, of this part as in `smallest_scene`; "" if
-    nothing is, or it is no scene."""
+    """What is wrong with the file's motion in a scene, in `part` as in `smallest_scene`; "" if
+    nothing is, or if there is no such scene."""
     scenario = scenario_of(spheres, thrust, e, DURATION)
     if scenario is None:
         return ""
@@ -211,12 +211,12 @@ def fault_of(
 
 
 FLIGHTS = ("1", "place", "turn")
-MEETING = {"2d": "2c"}  # whatever velocity is wrong, where 2d alone is
+MEETING = {"2d": "2c"}  # any wrong velocity, if only 2d has a fault
 
 
 def flight_fault(scenario: Scenario, played: SceneAnswer, part: str) -> str:
-    """Whether a sphere that meets nobody flies as symplectic Euler does: x0 + v0 t + a t (t + dt) /
-    2 after t; `part`: its "place", its "turn", or "1", either."""
+    """What is wrong with the flight of a sphere without collisions; symplectic Euler gives x0 + v0
+    t + a t (t + dt) / 2. `part`: "place", "turn", or "1" for both."""
     scene, t = scenario.scene, scenario.duration
     met = {int(i) for row in played.contacts for i in row[1:3]}
     for k in set(range(scene.n)) - met:
@@ -241,7 +241,7 @@ def flight_fault(scenario: Scenario, played: SceneAnswer, part: str) -> str:
 def shown_by(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> Smallest:
-    """The scene with the file's motion and the exact one."""
+    """The result: the scene with the file's motion and the exact one."""
     scenario = scenario_of(spheres, thrust, e, INTERVAL)
     assert scenario is not None
     fault = fault_of(play, spheres, thrust, e, part)

@@ -1,4 +1,4 @@
-"""What the search of smallest.py finds; apart from it, as hypothesis takes long to import."""
+"""The result of the search in smallest.py; in its own file because importing hypothesis is slow."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 from scenarios.model import Scenario, Trajectory
 
-# s, coarse: a scene is played in milliseconds, and a collision found late is judged by the state it
-# is found in
+# s, coarse, so that a scene takes milliseconds; a collision found late is judged by the state in
+# which it is found
 DT = 1e-2
 
 
 @dataclass(frozen=True)
 class Smallest:
-    """A scene that shows a fault, what is wrong in it, the file's motion and the exact one where
+    """A scene that shows a fault, what is wrong in it, the file's motion, and the exact one if
     there is one.
 
-    of: the numbers, from 1, of the faults that it shows.
+    of: the numbers, from 1, of the faults shown.
     """
 
     scenario: Scenario

@@ -24,23 +24,23 @@ from reports.check.projection import (
     projection_rows,
     reacts,
 )
-from reports.check.questions import QUESTIONS, Answer, ask_in_two_orders, stuck
+from reports.check.questions import QUESTIONS, Answer, ask_in_two_orders, was_stopped
 from reports.check.restitution import Restitution, restitution_of
 from reports.check.rows import CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
 
 
 def check_solver(path: Path | str) -> list[CheckRow]:
-    """What was asked of a solver's file and what came of it, task by task.
+    """The check of a solver's file, task by task.
 
     Raises:
-        NotASolver: the path is no JavaScript or Python text.
+        NotASolver: the path is not JavaScript or Python text.
     """
     return examine(read_solver(Path(path)))[0]
 
 
 def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
-    """The rows of a file, and the restitution that its scenes are judged by."""
+    """The rows of a file, and the restitution for judging its scenes."""
     try:
         process = SolverProcess(solver)
     except SolverFailed as failure:
@@ -67,7 +67,7 @@ LOADS = "Can the file be loaded, and does it leave the built-in functions as the
 def rows_of(
     process: SolverProcess, text: str, with_beside: str
 ) -> tuple[list[CheckRow], float | None]:
-    """The rows of a file that is loaded, and its restitution.
+    """The rows of a loaded file, and its restitution.
 
     text: of the file; with_beside: the same with the modules that it imports from its folder.
     Raises `SolverFailed` if its process is lost.
@@ -83,7 +83,7 @@ def rows_of(
     contact, restitution = task_2(process, answers, others, source, with_beside)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
-    if stuck(answers):
+    if was_stopped(answers):
         rows.append(not_asked("step", "loop", "a call did not return"))
     else:
         rows += loop_rows(process, faulty)
@@ -99,13 +99,13 @@ def with_lines(rows: list[CheckRow], source: Source) -> list[CheckRow]:
         return [
             replace(row, lines=source.of(row)) if row.verdict == "fault" else row for row in rows
         ]
-    except SolverFailed:  # the process is lost; the rows say how the file fails
+    except SolverFailed:  # the process is lost; the rows already say how the file fails
         return rows
 
 
 def hinted(rows: list[CheckRow], text: str) -> list[CheckRow]:
-    """The rows; if a condition of the file has = where == may be meant, the cause of the first
-    fault says so. Python loads no file with such a condition.
+    """The rows; if a condition of the file has = instead of ==, the cause of the first fault
+    mentions it. Python does not load such a file.
     """
     slip, faulty = (
         SET_IN_CONDITION.search(code_of(text)),
@@ -125,7 +125,7 @@ MOTION = ("force", "force, other numbers", "coast", "force twice", *TURNED)
 
 
 def loads(process: SolverProcess) -> CheckRow:
-    """Loaded, and which built-ins it has replaced for everybody."""
+    """The row on loading the file, and on the built-ins that it replaces."""
     replaced = process.functions["replaced"]
     what = ", ".join(replaced)
     return judged(
@@ -142,7 +142,7 @@ def loads(process: SolverProcess) -> CheckRow:
 def task_1(
     process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], text: str
 ) -> list[CheckRow]:
-    """The rows of integrate; `others`: the answers that differ when other questions come first."""
+    """The rows of integrate; `others`: the answers that differ after other questions."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
     rows, usable = implemented("1", process.functions["integrate"], mine, text)
     if not usable:
@@ -157,8 +157,7 @@ def task_2(
     source: Source,
     with_beside: str,
 ) -> tuple[list[CheckRow], Restitution | None]:
-    """The rows of the collision function, and its restitution if one can be read from its
-    collisions."""
+    """The rows of the collision function, and its restitution if its collisions have one."""
     mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
     if failed_calls(mine):
         return with_not_asked(rows_until_failure(process, mine, source), HIDDEN), None
@@ -183,7 +182,7 @@ HIDDEN = "the collision function fails, so that this cannot be seen"
 
 
 def with_not_asked(rows: list[CheckRow], why: str) -> list[CheckRow]:
-    """The rows of task 2, with one for each part that has none: it was not asked."""
+    """The rows of task 2, plus a "not asked" row for each part without one."""
     first = {"2a": "overlap", "2b": "one point", "2c": "impulse", "2d": "velocity of A"}
     judged_parts = {row.task for row in rows}
     added = [not_asked(name, part, why) for part, name in first.items() if part not in judged_parts]

@@ -1,4 +1,4 @@
-"""The checks for people, in a terminal."""
+"""Prints checks in a terminal."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ LEGEND = (
 
 
 def print_file(one: FileCheck) -> None:
-    """The sentences with the lines and the numbers they are about, the verdict of every task, what
-    follows from the faults, and the free choices under a title that says what they are."""
+    """Print the sentences with lines and numbers, the verdict of every task, the consequences of
+    the faults, and the free choices under an explaining title."""
     console = Console()
     if one.passed:
         console.print(one.sentences[0], highlight=False)
@@ -61,7 +61,7 @@ def print_file(one: FileCheck) -> None:
 
 
 def print_fault(console: Console, number: int, row: CheckRow, also: Sequence[CheckRow]) -> None:
-    """A numbered fault; below it the lines of the file, the formula of the exercise, and the
+    """Print a numbered fault; below it the lines of the file, the formula of the exercise, and the
     numbers of each question that shows it."""
     numbered = Table.grid(padding=(0, 1, 0, 0))
     numbered.add_row(f"{number}.", legible(headline(row)))
@@ -79,7 +79,7 @@ def print_fault(console: Console, number: int, row: CheckRow, also: Sequence[Che
 
 
 def print_tasks(console: Console, one: FileCheck) -> None:
-    """The verdict of every task, how many questions were asked and how many answers are wrong."""
+    """Print the verdict of every task, the number of questions asked and of wrong answers."""
     table = Table("task", "verdict", "asked", "wrong", box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
         rows, word = one.of(task), one.tasks[task]
@@ -91,7 +91,8 @@ def print_tasks(console: Console, one: FileCheck) -> None:
 
 
 def print_scene(scenes: Sequence[Smallest], page: Path) -> None:
-    """The smallest scene of the first fault in words, and where its replay and the others are."""
+    """Print the smallest scene of the first fault in words, and where its replay and the other
+    scenes are."""
     console, one = Console(), scenes[0]
     title = f"\nThe smallest scene that shows {faults_of(one)}, played in {page.name}:"
     console.print(title, highlight=False)
@@ -109,7 +110,7 @@ def print_scene(scenes: Sequence[Smallest], page: Path) -> None:
 
 
 def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
-    """A title, and a row a paragraph: its verdict in a word, where it belongs, what is said."""
+    """Print a title, and a paragraph for each row: verdict, task, text."""
     console.print(f"\n{title}", highlight=False)
     grid = Table.grid(padding=(0, 2, 0, 0))
     for row in rows:
@@ -119,13 +120,13 @@ def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
 
 
 def name_in(folder: Path, one: FileCheck) -> str:
-    """A file as its class knows it."""
+    """The name of a file within its class."""
     return printable(str(one.path.relative_to(folder)))
 
 
 def elided(name: str, room: int) -> str:
-    """A name that fits into `room` columns; a longer one loses its middle, as student and file
-    stand at its ends."""
+    """A name that fits into `room` columns; a longer one loses its middle, because its ends name
+    student and file."""
     if len(name) <= room:
         return name
     end = max(room // 2, 1)
@@ -133,14 +134,14 @@ def elided(name: str, room: int) -> str:
 
 
 def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[str] = ()) -> None:
-    """A row a file, a verdict for every task; below, what the signs mean, of each the sentence to
-    begin with, which are copies, and what else lies in the folder."""
+    """Print a row for each file with a verdict for every task; below, the meaning of the signs, the
+    first sentence of each file, the copies, and other entries of the folder."""
     console = Console()
     widest = {
         task: max(len(task), *(len(OUTCOMES[one.tasks[task]].short) for one in checks))
         for task in TASKS
     }
-    # beside all tasks, or on a narrow terminal beside some of them
+    # beside all tasks, or beside some on a narrow terminal
     room = max(console.width // 2, console.width - sum(width + 1 for width in widest.values()))
     rows: list[list[str | Text]] = []
     for one in checks:
@@ -170,12 +171,12 @@ def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[st
 
 
 def sentence_on(not_read: Sequence[str]) -> str:
-    """What lies in the folder of a class and has no row."""
+    """A sentence on the entries of a class folder without a row."""
     return f"Not read, as no .js and no .py file: {named(not_read)}."
 
 
 def total(checks: Sequence[FileCheck]) -> str:
-    """How many there are, and how they fared."""
+    """A sentence with the number of files and of each result."""
     right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
     parts = [f"{right} without a fault", f"{len(checks) - right - refused} with a fault"]
     parts += [f"{refused} not checked, as said above"] * bool(refused)
@@ -183,17 +184,17 @@ def total(checks: Sequence[FileCheck]) -> str:
 
 
 def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
-    """The names of files that hold the same code, a list for each such code."""
+    """Lists of the names of files with the same code."""
     names: dict[str, list[str]] = {}
     for one in checks:
         if one.solver is not None:
             comment = "#" if one.path.suffix.lower() == ".py" else "//"
-            names.setdefault(bare(one.solver.text, comment), []).append(name_in(folder, one))
+            names.setdefault(code_only(one.solver.text, comment), []).append(name_in(folder, one))
     return [alike for alike in names.values() if len(alike) > 1]
 
 
-def bare(text: str, comment: str) -> str:
-    """A text without spaces and without lines that are comments. A comment after code stays: its
-    sign may be inside a string."""
+def code_only(text: str, comment: str) -> str:
+    """A text without spaces and without lines that are comments. A comment after code stays,
+    because its sign may be inside a string."""
     lines = ("".join(line.split()) for line in text.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith(comment))

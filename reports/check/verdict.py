@@ -1,4 +1,4 @@
-"""What the rows of one file come to: a verdict for each task, and the sentences that help most."""
+"""The summary of the rows of one file: a verdict for each task, and the most helpful sentences."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class FileCheck:
         path: of the file.
         rows: what was checked; none of a file that is no solver.
         refused: why it is no solver; "" if it is one.
-        restitution: that its whole scenes are judged by; None where they cannot be.
-        solver: the text that was checked; None if there is none.
-        seconds: that the check took.
+        restitution: used to judge its whole scenes; None if they cannot be judged. solver: the text
+        that was checked; None if there is none.
+        seconds: duration of the check.
     """
 
     path: Path
@@ -47,7 +47,7 @@ class FileCheck:
 
     @property
     def choices(self) -> list[CheckRow]:
-        """The rows on what the exercise leaves free."""
+        """The rows on free choices."""
         return [row for row in self.rows if row.verdict == "free choice"]
 
     @property
@@ -62,7 +62,7 @@ class FileCheck:
 
     @property
     def loaded(self) -> bool:
-        """Whether the file could be loaded, so that its tasks have rows."""
+        """Whether the file was loaded, so that its tasks have rows."""
         return any(row.task != "file" for row in self.rows)
 
     def of(self, task: str) -> list[CheckRow]:
@@ -71,13 +71,13 @@ class FileCheck:
 
     @property
     def tasks(self) -> dict[str, Verdict]:
-        """Of each task its worst verdict."""
+        """Task -> its worst verdict."""
         return {task: worst(self.of(task)) for task in TASKS}
 
     @property
     def sentences(self) -> list[str]:
-        """At most `MOST` sentences, in the order of the tasks. Each cause has one; what follows
-        from a fault has none."""
+        """At most `MOST` sentences, in the order of the tasks. Each cause has one; consequences of
+        a fault have none."""
         if self.refused:
             return [self.refused]
         if not self.faults:
@@ -97,7 +97,7 @@ class FileCheck:
 
     @property
     def findings(self) -> list[CheckRow]:
-        """The faults that the sentences are about, in their order."""
+        """The faults behind the sentences, in their order."""
         return self.causes[:MOST]
 
     @property
@@ -124,26 +124,26 @@ class FileCheck:
 
 
 def sentence(row: CheckRow) -> str:
-    """Where, what is likely wrong, and the question and the numbers that say so."""
+    """A sentence with task, likely cause, question and numbers."""
     return " ".join([headline(row), *numbers_of(row)])
 
 
 def headline(row: CheckRow) -> str:
-    """Where, and what is likely wrong."""
+    """A sentence with task and likely cause."""
     what = f", {row.name}" if row.name in PARTS_OF_A_TASK else ""
     return f"{task_title(row.task)}{what}: {row.cause}."
 
 
-# what a cause of theirs calls "it"
+# the noun for "it" in the causes
 PARTS_OF_A_TASK = ("velocity", "position", "spin", "angle", "turns", "edges", "ufo")
 
 
 def numbers_of(row: CheckRow) -> list[str]:
-    """The question, what came and what was expected, a sentence each; nothing if the cause says
+    """The question, the answer and the expected answer, a sentence each; nothing if the cause says
     it."""
     if row.name in WITHOUT_NUMBERS:
         return []
-    return [row.asked, f"Came: {row.got}.", f"Expected: {row.expected}."]
+    return [row.asked, f"Got: {row.got}.", f"Expected: {row.expected}."]
 
 
 WITHOUT_NUMBERS = ("implemented", "loads", "answers", SAME_AGAIN)
@@ -155,13 +155,13 @@ def task_title(task: str) -> str:
 
 
 def check_file(path: Path) -> FileCheck:
-    """The check of one file, with the time it took; a folder is refused, as it is no file."""
+    """The check of one file, with its duration; a folder is refused."""
     began = perf_counter()
     return replace(check_of(path), seconds=perf_counter() - began)
 
 
 def check_of(path: Path) -> FileCheck:
-    """The check of one file, not timed."""
+    """The check of one file, without its duration."""
     if path.is_dir():
         return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:
@@ -175,12 +175,12 @@ def check_of(path: Path) -> FileCheck:
 
 
 def nothing_in(folder: Path) -> str:
-    """That it holds no solver, and what it holds."""
+    """A sentence that a folder holds no solver, with its contents."""
     others = named(sorted(one.name for one in folder.rglob("*") if one.is_file()))
     return f"{NONE}, only {others}" if others else NONE
 
 
 def named(names: Sequence[str]) -> str:
-    """At most `NAMED` of them, and how many more there are; "" of none."""
+    """At most `NAMED` of the names, and the number of the others; "" if there are none."""
     more = f" and {len(names) - NAMED} more" * (len(names) > NAMED)
     return ", ".join(map(printable, names[:NAMED])) + more

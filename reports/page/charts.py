@@ -1,5 +1,5 @@
-"""The charts of a comparison: what went off, when, and how it shrinks with the step size. A row in
-`CHARTS` each."""
+"""The charts of a comparison: errors over time, and against the step size. Each is a row in
+`CHARTS`."""
 
 from __future__ import annotations
 
@@ -22,21 +22,20 @@ from reports.page.documents import deflated
 from scenarios.model import Array, Trajectory
 
 ZERO = 1e-17
-"""Where 0, and what is smaller than this, is drawn on a log axis: below the rounding of any number
-compared."""
+"""On a log axis 0 and smaller values are drawn here: below the rounding of any number compared."""
 NOISE = 1e-9
-"""What is smaller is drawn below a break of the axis, where there is anything larger: exact answers
-are known to a billionth of a radius, and an engine that is exact has rounding left, which would
-take half of a log axis."""
+"""Smaller values are drawn below a break of the axis, if there are larger ones: exact answers are
+known to a billionth of a radius, and the rounding of an exact engine would take half of a log
+axis."""
 POINTS = 300
 TIME = "time (s)"
-# drawn as the zero line where there is no truth; it is no truth itself
+# drawn as the zero line if there is no truth; it is not a truth
 BASELINE = "reference:exercise"
 
 
 class Drawing(NamedTuple):
-    """A heading, how to read it in a sentence or two, and the figure; None where the caption says
-    why."""
+    """A heading, a caption of a sentence or two, and the figure; None if the caption says why there
+    is none."""
 
     title: str
     caption: str
@@ -61,7 +60,7 @@ class Chart:
 
 
 def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, View]]:
-    """What the middle dt's runs played, each beside `other` and cut to the samples both have."""
+    """The runs at the middle dt, each beside `other` and cut to the common samples."""
     scenario, truth = comparison.scenario, comparison.truth
     jumps = jumps_of(other, scenario) if other is not None and other is truth else None
     return [
@@ -71,22 +70,23 @@ def views(comparison: Comparison, other: Trajectory | None) -> list[tuple[Run, V
     ]
 
 
-def over(played: list[tuple[Run, View]], series: Callable[[View], Array | None]) -> list[ChartLine]:
-    """A line a run of what `series` gives for it, over time."""
+def lines_over_time(
+    played: list[tuple[Run, View]], series: Callable[[View], Array | None]
+) -> list[ChartLine]:
+    """A line for each run: what `series` gives for it, over time."""
     return [
         ChartLine(run, view.played.t, y) for run, view in played if (y := series(view)) is not None
     ]
 
 
 def momentum(comparison: Comparison) -> Drawing:
-    """Momentum that should not be there; where walls take some up, the deviation of the momentum
-    from the truth's."""
+    """The error of momentum; if walls take up momentum, its deviation from the truth."""
     if violations.knows_impulses(comparison.scenario):
         caption = (
             "Distance of the momentum from P(0) and what weight and thrusts have added since, over"
             " the Σ m|v| at hand. Lower is better."
         )
-        lines = over(views(comparison, None), violations.momentum)
+        lines = lines_over_time(views(comparison, None), violations.momentum)
         return Drawing(
             "Momentum error", caption, over_time(comparison, lines, "error / Σ m|v| at hand")
         )
@@ -117,13 +117,17 @@ DELAY = (
 
 
 def energy(comparison: Comparison) -> Drawing:
-    """Energy that should not be there or is missing, relative to the energy at hand."""
+    """The error of energy, relative to the energy at hand."""
     conserved = violations.keeps_energy(comparison.scenario)
     if not conserved and comparison.truth is None:
         return energy_course(comparison)
-    lines = over(views(comparison, None if conserved else comparison.truth), violations.energy)
+    lines = lines_over_time(
+        views(comparison, None if conserved else comparison.truth), violations.energy
+    )
     against = (
-        "its value at the start (at e = 1 no collision takes any)" if conserved else "the truth's"
+        "its value at the start (at e = 1 collisions take no energy)"
+        if conserved
+        else "the truth's"
     )
     caption = (
         f"Distance of the energy from {against}, divided by the energy at hand."
@@ -133,7 +137,7 @@ def energy(comparison: Comparison) -> Drawing:
 
 
 def energy_course(comparison: Comparison) -> Drawing:
-    """The energy itself, where no exact answer says what it should be."""
+    """The energy itself, if there is no exact answer to compare it with."""
     scene = comparison.scenario.scene
     lines = []
     for run, view in views(comparison, None):
@@ -149,7 +153,7 @@ def energy_course(comparison: Comparison) -> Drawing:
 
 
 def deviation(comparison: Comparison) -> Drawing:
-    """How far the disk that is farthest off is from where it should be."""
+    """The largest position error of any disk."""
     scene, truth = comparison.scenario.scene, comparison.truth
     held: Run | None = None
     if truth is None:
@@ -171,8 +175,8 @@ def deviation(comparison: Comparison) -> Drawing:
             "Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)")
         )
     caption = (
-        f"No truth to be off from: how far the disks are from those of {held.name}; neither is the"
-        " right one."
+        f"There is no exact answer. Shown is the distance from the disks of {held.name}, which may"
+        " be wrong as well."
     )
     deviation = f"deviation from {held.name}"
     return Drawing(
@@ -184,7 +188,9 @@ def convergence(comparison: Comparison) -> Drawing:
     """How the position error shrinks with the step size."""
     title = "Error against dt"
     if comparison.truth is None:
-        return Drawing(title, "Without a truth there is no error to set against dt.", None)
+        return Drawing(
+            title, "There is no exact answer, so there is no error to show against dt.", None
+        )
     table = comparison.table
     rows = table[(table.metric == "position_max_radii") & (table.versus == style.TRUTH)]
     lines = []
@@ -207,8 +213,7 @@ def convergence(comparison: Comparison) -> Drawing:
 
 
 def first_order(lines: Sequence[ChartLine], steps: list[float]) -> list[dict[str, Any]]:
-    """A guide with slope 1 through the middle of what is shown; none where there is nothing to
-    guide."""
+    """A guide of slope 1 through the middle of the lines; none if there are no lines."""
     shown = np.concatenate([line.y for line in lines])
     shown = shown[np.isfinite(shown) & (shown > ZERO)]
     if not len(shown) or len(steps) < 2:
@@ -226,7 +231,7 @@ def over_time(
     if not lines:
         return None
     duration, truth = comparison.scenario.duration, comparison.truth
-    if log:  # the start is given to all: its 0 would take up half of the axis and say nothing
+    if log:  # the start is exact for all: its 0 would take up half of the axis
         lines = [ChartLine(run, x[1:], y[1:]) for run, x, y in lines]
     figure = figure_of(
         [thinned(line) for line in lines], {"title": TIME, "range": [0, duration]}, title, log=log
@@ -237,7 +242,8 @@ def over_time(
 
 
 def mark_end(figure: go.Figure, horizon: float, duration: float) -> None:
-    """Draw a line into `figure` where the truth ends, and say so on the side that has more room."""
+    """Draw a line into `figure` where the truth ends, with a label on the side that has more
+    room."""
     ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
     figure.add_shape(x0=horizon, x1=horizon, y0=0, y1=1, yref="paper", line=ink)
     figure.add_annotation(
@@ -262,10 +268,11 @@ def figure_of(
     mode: str = "lines+markers",
     height: int | None = None,
 ) -> go.Figure:
-    """A figure with a trace a line, each in its engine's look, `markers` marks on each, and `guide`
-    behind them.
+    """A figure with a trace for each line, in the look of its engine and with `markers` marks, and
+    `guide` behind them.
 
-    unit: of x; mode: of plotly, of marks alone x is not said; height: px, if not that of all.
+    unit: of x; mode: of plotly, marks alone do not show x on hovering; height: px, default that of
+        all figures.
     """
     traces = list(guide)
     values = np.concatenate([line.y for line in lines])
@@ -304,11 +311,11 @@ def sized(height: int | None) -> dict[str, Any]:
 
 
 def broken_axis(values: Array, bound: float) -> tuple[dict[str, Any], float]:
-    """A log axis for `values` >= 0, and where on it to draw what is smaller than all of it.
+    """A log axis for `values` >= 0, and the position on it of values below its range.
 
-    Where some values are below `bound` and some are not, the axis is broken: it begins a little
-    below the smallest of the latter, and all that is below `bound` is drawn there, with a tick that
-    says so. Else it goes down to `ZERO`.
+    If only some values are below `bound`, the axis is broken: it begins a little below the smallest
+    of the others, and all values below `bound` are drawn there, with a tick that says so. Else it
+    goes down to `ZERO`.
     """
     real = values[np.isfinite(values)]
     upper = real[real >= bound]
@@ -358,8 +365,8 @@ def decades(values: Array) -> dict[str, Any]:
 
 
 def thinned(line: ChartLine) -> ChartLine:
-    """At most `POINTS` points of a line: the smallest and the largest of each stretch stay, so no
-    peak is hidden."""
+    """At most `POINTS` points of a line: the smallest and the largest of each section stay, so that
+    no peak is lost."""
     k = len(line.y)
     if k <= POINTS:
         return line
@@ -373,7 +380,7 @@ def thinned(line: ChartLine) -> ChartLine:
 
 
 def shortened(values: Array | Sequence[float], digits: int = 4) -> list[float | None]:
-    """Numbers to so many significant digits, which is finer than a pixel; None for nan."""
+    """Numbers to `digits` significant digits, finer than a pixel; None for nan."""
     listed = np.asarray(values, float).tolist()
     return [float(f"{v:.{digits}g}") if isfinite(v) else None for v in listed]
 
@@ -387,8 +394,7 @@ CHARTS: dict[str, Chart] = {
 
 
 def packed_charts(drawings: Mapping[str, Drawing]) -> str:
-    """The figures as JSON, deflated, as base64; what they share with every other figure is left to
-    page.js."""
+    """The figures as JSON, deflated, as base64; page.js adds what all figures share."""
     figures = {}
     for key, drawing in drawings.items():
         if drawing.figure is not None:

@@ -1,5 +1,5 @@
-"""Makes a self-contained page: its style, its scripts, and a policy that lets the browser run these
-only."""
+"""Makes a self-contained page: its style, its scripts, and a policy that allows only these
+scripts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
-# replays, and charts that are drawn when they come into view, and printed and saved
+# replays; charts, drawn when they come into view, printed and saved
 CHARTED = (*ENGINE, "page/page.js", "page/paper.js", "page/scrolling.js")
 
 
@@ -40,12 +40,11 @@ def render(
     paths below `reports`.
 
     Args:
-        generator: the command that makes it, by which a file is known as one that may be written
-            over.
+        generator: the command that makes it; it marks the file as one that may be overwritten.
         looks: name -> how it is drawn; `who` and `swatch` of macros.html.j2 show these names.
-        plotly: whether its charts need the library, which then stands in the page, deflated.
-        connects: whether its scripts may talk to the server the page comes from.
-        fields: what else the template names; a name that it lacks raises `jinja2.UndefinedError`.
+        plotly: whether its charts need the library, which is then included, deflated.
+        connects: whether its scripts may connect to the server of the page.
+        fields: the other names of the template; a missing one raises `jinja2.UndefinedError`.
     """
     sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
     library = [plotly_source()] if plotly else []
@@ -70,7 +69,8 @@ def fragment(template: str, **fields: Any) -> str:
 
 
 def plotly_source() -> str:
-    """The whole library; imported only now, as it takes longer than a page that has no chart."""
+    """The whole library; imported here, because importing takes longer than making a page without
+    charts."""
     from plotly.offline import get_plotlyjs
 
     return str(get_plotlyjs())
@@ -78,7 +78,7 @@ def plotly_source() -> str:
 
 @cache
 def environment() -> Environment:
-    """How all templates are read: text is escaped, and a name that nobody has given is an error."""
+    """The environment of all templates: text is escaped, and an undefined name is an error."""
     made = Environment(
         loader=FileSystemLoader(REPORTS),
         autoescape=True,

@@ -1,4 +1,4 @@
-"""The first picture of the page: error against cost of all engines, and what it says in three
+"""The first picture of the page: error against cost of all engines, with a summary of three
 sentences."""
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ KEY = "error-cost"  # of its figures in the page
 TIME, STEPS = "engine time (µs per simulated second)", "steps per simulated second"
 ERROR = "largest error (radii)"
 TALL = 460  # px
-MARGIN = 1 + BUSY  # a difference of costs within the noise that is let pass is none
+MARGIN = 1 + BUSY  # costs closer than the accepted noise count as equal
 GOOD = "#1d8a63"  # the best corner, on a light and on a dark page
 
 
@@ -33,8 +33,8 @@ class Clock(NamedTuple):
 
     Attributes:
         table: timings.csv.
-        noise: of an engine against itself.
-        asked: s that the timing pass might take.
+        noise: the ratios of two timings of one engine.
+        asked: the time limit of the timing pass, s.
     """
 
     table: pd.DataFrame
@@ -63,11 +63,11 @@ class ErrorCost(NamedTuple):
     """What the page shows.
 
     Attributes:
-        drawings: scenario, or `POOLED` -> its picture.
-        sentences: three, on speed and error, or two on error.
+        drawings: scenario, or `POOLED` -> its picture. sentences: three, on speed and error, or two
+        on error.
         fault: why there are no times, or "".
-        caption: what a point is.
-        costs: a row an engine, see `costs_of`; empty without times.
+        caption: what a point shows.
+        costs: a row for each engine, see `costs_of`; empty without times.
     """
 
     drawings: Mapping[str, Drawing]
@@ -78,8 +78,8 @@ class ErrorCost(NamedTuple):
 
 
 def error_cost(scores: pd.DataFrame, clock: Clock, untrusted: Set[str]) -> ErrorCost | None:
-    """Of the scores of a run (columns `pooled.SCORES`) and its times, without who is `untrusted`;
-    None where no scene has an exact answer."""
+    """Error against cost from the scores of a run (columns `pooled.SCORES`) and its times, without
+    the engines in `untrusted`; None if no scene has an exact answer."""
     trusted = scores[~scores.name.isin(untrusted)]
     found = points(trusted, clock) if len(trusted) else trusted
     if found.empty:
@@ -112,12 +112,12 @@ def costs_of(found: pd.DataFrame, table: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def title_of(scene: str, scenes: int) -> str:
-    """What the picker calls it."""
+    """The name of a picture in the picker."""
     return f"all {scenes} scenes" if scene == POOLED else scene
 
 
 def caption(scenes: int, clock: Clock) -> str:
-    """What is drawn."""
+    """The caption."""
     said = "A point is an engine at one step size"
     if scenes > 1:
         said += (
@@ -143,9 +143,9 @@ def caption(scenes: int, clock: Clock) -> str:
 
 
 def points(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
-    """A row a scenario, engine and step size of what was timed, or without times of all that was
-    played: error in radii, and the columns of `with_times`; or in place of the cost the steps per
-    simulated second.
+    """A row for each scenario, engine and step size that was timed, or without times for each that
+    was played: error in radii, and the columns of `with_times`; without times the cost is the
+    number of steps per simulated second.
     """
     found = with_times(scores, clock).assign(failed=(~np.isfinite(scores.error)).to_numpy(int))
     if clock.fault:
@@ -171,16 +171,16 @@ def with_times(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
 
 
 def picture(table: pd.DataFrame, axis: str) -> go.Figure:
-    """Error against cost: a line an engine over its step sizes."""
+    """Error against cost: a line for each engine over its step sizes."""
     drawn = table[table.cost.notna() & np.isfinite(table.error)]
     costs, errors = (drawn[column].to_numpy(float) for column in ("cost", "error"))
     x_axis: dict[str, Any] = {"title": axis} | decades(np.append(costs, 1.0))
-    x_axis["range"] = ends(np.append(costs, bare(drawn)))
+    x_axis["range"] = cost_range(np.append(costs, bare(drawn)))
     broken, floor = (
         broken_axis(errors, FINEST) if (errors >= FINEST).any() else (decades(errors), 0)
     )
     y_axis = {"title": ERROR} | broken
-    top = edge(y_axis) if not np.isfinite(table.error).all() else np.nan
+    top = room_above(y_axis) if not np.isfinite(table.error).all() else np.nan
     traces: list[dict[str, Any]] = []
     for engine, profile, group in by_engine(table):
         traces += traces_of(engine, profile, group, floor, top, x_axis["range"])
@@ -200,15 +200,15 @@ def picture(table: pd.DataFrame, axis: str) -> go.Figure:
     )
 
 
-def ends(costs: Array) -> list[float]:
+def cost_range(costs: Array) -> list[float]:
     """The range of a log axis for costs."""
     if not len(costs):
         return [0.0, 1.0]
     return [float(np.log10(costs.min())) - 0.25, float(np.log10(costs.max())) + 0.35]
 
 
-def edge(axis: dict[str, Any]) -> float:
-    """Make room above a log axis for what has no result, and return the value there."""
+def room_above(axis: dict[str, Any]) -> float:
+    """Make room above a log axis for points without a result, and return the value there."""
     level = axis["range"][1] + 0.3
     axis["range"] = [axis["range"][0], level + 0.3]
     axis["tickvals"] = [*axis["tickvals"], 10**level]
@@ -243,7 +243,7 @@ def best_corner(shapes: Sequence[Any], says: str) -> dict[str, Any]:
 def traces_of(
     engine: str, profile: str, group: pd.DataFrame, floor: float, top: float, x_range: list[float]
 ) -> Iterator[dict[str, Any]]:
-    """One engine: its light marks, its line, what it does not reach, and where it failed."""
+    """The traces of one engine: light marks, line, errors that it does not reach, failures."""
     look = style.look(engine, profile)
     name = f"{engine}:{profile}"
     fine = group[group.cost.notna() & np.isfinite(group.error)].sort_values("step_size")
@@ -295,8 +295,8 @@ def traces_of(
 def light_marks(
     engine: str, profile: str, cost: Array, left: Array, height: Array
 ) -> dict[str, Any]:
-    """A trace: where points would be if the way from Python to the engine cost nothing, each with
-    a thin line to the point."""
+    """A trace of marks where the points would be without the cost of calls from Python, each with a
+    thin line to its point."""
     look = style.look(engine, profile)
     return {
         "type": "scatter",
@@ -336,12 +336,12 @@ def by_engine(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
 
 
 def said_of(row: Mapping[Any, Any]) -> str:
-    """What hovering over a point says."""
+    """The text shown on hovering over a point."""
     name = f"{row['engine']}:{row['profile']}"
     step = f", dt {style.number(row['dt_s'])} s" if np.isfinite(row["dt_s"]) else ""
     lines = [f"{name}{step}", f"error {style.number(row['error'])} radii"]
     if row["scenario"] == POOLED:
-        lines[0] += f", over {counted(int(row['of']), 'scene')}"  # fewer, if it was not asked all
+        lines[0] += f", over {counted(int(row['of']), 'scene')}"  # fewer, if it refused some
     part = row["cost"] - row.get("bare", np.nan) if row["scenario"] == POOLED else row["idle"]
     if part > 0:
         lines.append(
@@ -353,15 +353,15 @@ def said_of(row: Mapping[Any, Any]) -> str:
 
 
 def no_nearer(fine: pd.DataFrame) -> bool:
-    """Whether from the coarsest to the finest of its steps the error of an engine falls by less
-    than a tenth, and is not yet as good as exact."""
+    """Whether the error of an engine falls by less than a tenth from the coarsest to the finest
+    step, and is not yet below `FINEST`."""
     error = fine.error.to_numpy(float)
     return len(error) > 1 and error[-1] > max(FINEST, NEARER * error[0])
 
 
 def sentences(found: pd.DataFrame, table: pd.DataFrame, fault: str) -> list[str]:
-    """Three, on error and cost: who is not beaten in both, who is cheapest for an error of
-    `NEAR` radii, what half the step brings; two on errors alone where there are no times.
+    """Three sentences on error and cost: the engines that no other beats in both, the cheapest for
+    an error of `NEAR` radii, the effect of halving the step. Without times two, on errors.
 
     table: the points of the first picture; `found` has those scene by scene.
     """
@@ -371,7 +371,7 @@ def sentences(found: pd.DataFrame, table: pd.DataFrame, fault: str) -> list[str]
 
 
 def unbeaten(table: pd.DataFrame) -> str:
-    """The engines of which no other is both nearer and cheaper; and who would be one of them
+    """The engines for which no other is both nearer and cheaper; and those that would join them
     without the binding's part."""
     rows = table[table.cost.notna() & np.isfinite(table.error)]
     rows = rows.assign(name=rows.engine + ":" + rows.profile, bare=bare(rows))
@@ -392,8 +392,8 @@ def unbeaten(table: pd.DataFrame) -> str:
 
 
 def front_of(rows: pd.DataFrame) -> tuple[list[str], list[str]]:
-    """The engines that no other of them beats, each with error and cost of its cheapest such step;
-    and the names of those that only the binding's part keeps from it."""
+    """The engines on the Pareto front, each with error and cost of its cheapest point there; and
+    the names of those that only the binding's part keeps off it."""
     error = np.maximum(rows.error.to_numpy(float), FINEST)
     cost, names = rows.cost.to_numpy(float), rows.name.tolist()
     best: dict[str, str] = {}
@@ -406,8 +406,8 @@ def front_of(rows: pd.DataFrame) -> tuple[list[str], list[str]]:
 
 
 def cheapest(found: pd.DataFrame) -> str:
-    """Who costs least for an error of `NEAR` radii, scene by scene, at its cheapest step size; not
-    where only the binding decides it."""
+    """The engine of least cost for an error of `NEAR` radii, scene by scene, each at its cheapest
+    step size; none where only the binding decides."""
     wins: dict[str, list[float]] = {}
     even = 0
     scenes = list(dict.fromkeys(found.scenario))
@@ -415,7 +415,7 @@ def cheapest(found: pd.DataFrame) -> str:
         ways = [
             way
             for _, _, group in by_engine(found[found.scenario == scene])
-            for way in way_of(group)
+            for way in cheapest_step(group)
         ]
         if not ways:
             continue
@@ -436,7 +436,7 @@ def cheapest(found: pd.DataFrame) -> str:
     ]
     parts += [f"none clearly in {even}"] if even else []
     nowhere = len(scenes) - even - sum(map(len, wins.values()))
-    parts += [f"none is that near in {nowhere}"] if nowhere else []
+    parts += [f"none reaches that in {nowhere}"] if nowhere else []
     return (
         f"{of}, the cheapest engine with an error of at most {NEAR:g} radii is {', '.join(parts)}."
         " Without the cost of calls from Python these are the same."
@@ -444,15 +444,15 @@ def cheapest(found: pd.DataFrame) -> str:
 
 
 def surely_less(mine: tuple[float, float], theirs: tuple[float, float]) -> bool:
-    """Whether a cost is less than another with the binding's part and, (cost, cost without it),
-    without: by more than the noise of both."""
+    """Whether one (cost, cost without the binding's part) is less than another in both numbers, by
+    more than their noise."""
     (cost, left), (other, other_left) = mine, theirs
     return MARGIN * cost < other and left + UNSURE * cost < other_left - UNSURE * other
 
 
-def way_of(group: pd.DataFrame) -> Iterator[tuple[str, float, float]]:
-    """(name, cost, cost without the binding's part) of the cheapest step size from which on an
-    engine keeps within `NEAR`; none if it never does."""
+def cheapest_step(group: pd.DataFrame) -> Iterator[tuple[str, float, float]]:
+    """(name, cost, cost without the binding's part) of the cheapest step size from which on the
+    error is at most `NEAR`; empty if there is none."""
     group = group.sort_values("step_size")
     held = group[kept_from(group.error.to_numpy(float), NEAR) & group.cost.notna().to_numpy()]
     if len(held):
@@ -462,7 +462,7 @@ def way_of(group: pd.DataFrame) -> Iterator[tuple[str, float, float]]:
 
 
 def nearest(table: pd.DataFrame) -> str:
-    """Who is nearest at its finest step size, and who is farthest."""
+    """The engines nearest to the exact answer at the finest step size, and the farthest."""
     finest = table[table.step_size == table.step_size.max()].sort_values("error", kind="stable")
     finest = finest[np.isfinite(finest.error)]
     if finest.empty:
@@ -478,9 +478,9 @@ def nearest(table: pd.DataFrame) -> str:
 
 
 def halving(table: pd.DataFrame, timed: bool) -> str:
-    """What half the step does, on average from the coarsest to the finest, to the time and to the
-    error of those who take steps, and whom it brings no nearer. (A single halving may do more, or
-    make the error larger.)"""
+    """The mean effect of halving the step on time and error, from the coarsest to the finest step,
+    and the engines whose error it does not reduce. (A single halving may do more, or increase the
+    error.)"""
     dearer, nearer, stuck = [], [], []
     for engine, profile, group in by_engine(table):
         fine = group[group.cost.notna() & np.isfinite(group.error)].sort_values("step_size")
@@ -507,6 +507,6 @@ def halving(table: pd.DataFrame, timed: bool) -> str:
 
 
 def span(ratios: Sequence[float]) -> str:
-    """From the least to the largest, as a text."""
+    """The range of the ratios as text."""
     low, high = f"{min(ratios):.1f}", f"{max(ratios):.1f}"
     return low if low == high else f"{low} to {high}"

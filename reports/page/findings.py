@@ -1,4 +1,4 @@
-"""The findings, computed from the scores: nothing here is written by hand but the grammar."""
+"""The findings: sentences computed from the scores."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from reports.terminal.counts import counted
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
-    """Who is closest, what settings are worth, where each fails; before them the reader's own
-    solver, after them what orders collisions by time; last of all who is closest where there is
-    friction, if other scenes have none. None who is `untrusted`."""
+    """The closest engines, the effect of settings, the failures. Before them come the reader's own
+    solvers, after them the solvers with time-of-impact ordering, and last the closest engines in
+    scenes with friction, if there are others. Engines in `untrusted` are left out."""
     smooth, rough = by_friction(comparisons)
     sentences = findings_alike(smooth, untrusted)
     if not rough:
@@ -28,7 +28,7 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     groups = grouped(dict.fromkeys(scores.name))
     off = ranked(position_errors(scores, rough), groups)
     played = [name for name in off.columns if np.isfinite(off[name]).any()]
-    said = closest(off[played or list(off.columns)])  # who refuses friction is not called the last
+    said = closest(off[played or list(off.columns)])  # one that refuses friction is not the last
     return [*sentences, f"Scenes with friction, which are not counted above. {said}"]
 
 
@@ -49,21 +49,24 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
         if comparison.scenario.name not in refused.get(run.name, {})
     ]
     sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
-    own = [how_right(name, off, FAR_OFF, refused.get(name, {})) for name in groups.get(YOURS, [])]
-    exact = [how_right(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
+    own = [
+        unranked_sentence(name, off, FAR_OFF, refused.get(name, {}))
+        for name in groups.get(YOURS, [])
+    ]
+    exact = [unranked_sentence(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
     return sentences if engines is off else [*own, *sentences, *exact]
 
 
 def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFrame:
-    """The columns of `position_errors` of who is ranked: all but the reader's own solver and what
-    orders collisions by time; where nothing else was played, these."""
+    """The columns of `position_errors` of the ranked engines: all but the reader's own solver and
+    solvers with time-of-impact ordering. If nothing else was played, these."""
     apart = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
     return off if len(apart) == off.shape[1] else off.drop(columns=apart)
 
 
 def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
-    """A solver's own file -> the scenes that it refuses, and why: what the exercise does not ask
-    for is not missing in it."""
+    """A solver's own file -> the scenes that it refuses, and why. The exercise does not ask for
+    these."""
     found: dict[str, dict[str, str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
@@ -73,8 +76,8 @@ def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]
 
 
 def not_counted(broken: Mapping[str, str]) -> list[str]:
-    """A sentence for each engine that broke the protocol: name -> the probe that it missed, and
-    how."""
+    """A sentence for each engine that broke the protocol; `broken`: name -> the probe that failed,
+    and how."""
     return [
         f"Not counted: {name} breaks the protocol of the harness. {how}"
         for name, how in sorted(broken.items())
@@ -82,12 +85,12 @@ def not_counted(broken: Mapping[str, str]) -> list[str]:
 
 
 def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row a scenario with an exact
-    answer, a column an `engine:profile`.
+    """Largest deviation from the truth in radii at the middle dt: a row for each scenario with an
+    exact answer, a column for each `engine:profile`.
 
-    `inf` for who was asked and has no result, so that to refuse a hard scene does not help.
+    `inf` for an engine without a result, so that refusing a hard scene is no advantage.
     """
-    # A truth that is lost before its second sample has only the start, which is given to all.
+    # A truth with its horizon before the second sample has only the start, which is exact for all.
     scored = [
         comparison.scenario.name
         for comparison in comparisons
@@ -98,10 +101,12 @@ def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> 
     return table.reindex(index=scored, columns=names)
 
 
-def how_right(name: str, off: pd.DataFrame, within: float, refused: Mapping[str, str]) -> str:
-    """Of an engine that is not ranked: in how many scenes it is so near, radii; in which it is more
-    than a radius off, the worst first; in which it has no result; which it was not asked, and
-    why."""
+def unranked_sentence(
+    name: str, off: pd.DataFrame, within: float, refused: Mapping[str, str]
+) -> str:
+    """A sentence on an engine that is not ranked: the number of scenes with an error of at most
+    `within` radii; those with an error above a radius, the worst first; those without a result;
+    those not played by design, and why."""
     errors = off[name].dropna()
     far = errors[(errors > FAR_OFF) & np.isfinite(errors)].sort_values(ascending=False)
     lost = list(errors.index[np.isinf(errors)])
@@ -124,7 +129,7 @@ def how_right(name: str, off: pd.DataFrame, within: float, refused: Mapping[str,
 
 
 def closest(off: pd.DataFrame) -> str:
-    """Who comes closest to the exact answers."""
+    """The engines closest to the exact answers."""
     if off.columns.empty and len(off):
         return (
             "No engine that counts was played to its end in a scene with an exact answer, so none"
@@ -156,12 +161,12 @@ def closest(off: pd.DataFrame) -> str:
 
 
 def over_scenes(count: int) -> str:
-    """What a number is of: a median, where there is more than one scene."""
+    """The scenes behind a number, in words: a median if there is more than one."""
     return f"median of {counted(count, 'scene')}" if count != 1 else "in 1 scene"
 
 
 def worth_of_settings(off: pd.DataFrame) -> str:
-    """How much of an engine's deviation is its settings."""
+    """How much matched settings reduce the deviation of an engine."""
     if off.empty:
         return "What settings are worth cannot be said without an exact answer."
     parts = []
@@ -183,7 +188,7 @@ def worth_of_settings(off: pd.DataFrame) -> str:
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     """Scenes in which an engine ends up more than a radius away, and cells without a result."""
     cells = played_to_the_end(statuses)
-    lost = off > FAR_OFF  # what was not asked for is nan
+    lost = off > FAR_OFF  # scenes that were not requested are nan
     if off.empty or not lost.any(axis=None):
         return (
             f"No engine that is ranked is off by more than a radius; {cells}"
@@ -201,7 +206,7 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
 
 
 def played_to_the_end(statuses: Sequence[str]) -> str:
-    """How many cells were not, as the end of a sentence."""
+    """The number of cells not played to the end, as the end of a sentence."""
     failed = sum(status != "ok" for status in statuses)
     if not failed:
         return "every cell was played to its end."

@@ -1,4 +1,4 @@
-"""What the report opens with: the first pictures, which engine for what, and the findings."""
+"""The first screen of the report: the first pictures, which engine for what, and the findings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from reports.page.charts import Drawing, packed_charts
 
 @dataclass(frozen=True)
 class Pictures:
-    """Charts under one key, by which the script of the page finds their data."""
+    """Charts under one key, with which the script of the page finds their data."""
 
     key: str
     drawings: Mapping[str, Drawing]
@@ -33,11 +33,11 @@ class FirstScreen:
         said: a solver's file -> what `crosscheck check` says of it.
         error_cost: error against cost, its sentences and its times; None without exact answers.
         error_cost_charts: the pictures of `error_cost`.
-        no_times: why no time is shown, or "".
+        no_times: why no times are shown, or "".
         timed: the scenes that were timed, if times are shown.
-        answers: the engines ranked, a row a situation.
+        answers: the engines ranked, a row for each situation.
         whole: the row of all situations together.
-        far_off: radii beyond which a disk is not where it should be.
+        far_off: position error, radii, above which a disk is visibly off.
         pooled: the pictures of all scenes at once.
         charted: the engines with a mark in one of `pooled`.
         findings: the sentences below.
@@ -67,7 +67,7 @@ def first_screen(
     findings: Sequence[str],
     said: Mapping[str, Sequence[str]],
 ) -> FirstScreen:
-    """What the report of `comparisons` opens with; an engine in `untrusted` is not ranked.
+    """The first screen for `comparisons`; an engine in `untrusted` is not ranked.
 
     Scenes with friction are ranked in a row of their own, and are not in the first picture.
     """
@@ -102,7 +102,7 @@ def pictures(key: str, drawings: Mapping[str, Drawing]) -> Pictures:
 
 
 def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:
-    """Scene -> what `situations.situations_of` says of it."""
+    """Scene -> its `situations.situations_of`."""
     return {
         each.scenario.name: situations.situations_of(each.scenario, each.truth)
         for each in comparisons
@@ -110,7 +110,7 @@ def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:
 
 
 def versions_of(comparisons: Sequence[Comparison]) -> dict[str, str]:
-    """engine -> its libraries and their versions, as its runs say."""
+    """engine -> its libraries and their versions, from its runs."""
     found: dict[str, dict[str, str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:

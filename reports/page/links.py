@@ -1,4 +1,4 @@
-"""Where the other pages are, seen from the folder of one: only those that are there."""
+"""Links from one page to the other pages that exist."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 
 class Neighbour(NamedTuple):
-    """Another page: what it answers, the command that makes it, and its address from the folder of
-    this one, "" if it is not there.
+    """Another page: its question, the command that makes it, and its address relative to this page,
+    "" if it does not exist.
     """
 
     title: str
@@ -18,8 +18,8 @@ class Neighbour(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A page by default: title, what it says, the command that makes it, and where that puts it,
-    from the folder of all results."""
+    """The defaults of a page: title, content, the command that makes it, and its path below the
+    folder of all results."""
 
     title: str
     says: str
@@ -53,8 +53,8 @@ PAGES = {
 def neighbours(page: Path, own: str) -> list[Neighbour]:
     """The pages of `PAGES` besides `own`, as seen from the file `page`.
 
-    A page is looked for where its command puts it by default, beside the folder of `page`. While a
-    folder is written it stands beside the one that it will be, so what is found from it is right.
+    A page is looked for at its default path, beside the folder of `page`. A folder that is being
+    written is beside its final place, so links found from it are right.
     """
     beside = page.absolute().parent.parent
     return [

@@ -1,5 +1,5 @@
-"""Reads the numbers that the page shows out of the comparisons' tables: the summary, the map, a
-scenario's table."""
+"""Reads the numbers of the page from the tables of the comparisons: the summary, the map, the table
+of a scenario."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ OUTCOMES = {
     "timeout": "time-out",
 }
 MAPPED = "position_max_radii"
-NO_FRICTION = "no friction"  # what a table says of an engine that models none
+NO_FRICTION = "no friction"  # text for an engine without a model of friction
 
 
 class OverviewCell(NamedTuple):
-    """What a table shows at one place: text, a longer remark, a step of the heat ramp (-1: none),
-    failed, the best; and of a median its value, the worst value as text and its scene."""
+    """A cell of a table: text, a longer remark, a step of the heat ramp (-1: none), failed, the
+    best; for a median also its value, the worst value as text and its scene."""
 
     text: str
     remark: str = ""
@@ -43,8 +43,8 @@ class OverviewCell(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """A number of the tables: value, a remark on it, and whether enough carries it; else the remark
-    says why not."""
+    """A number of the tables: value, remark, and whether it is judged; if not, the remark says
+    why."""
 
     value: float
     remark: str
@@ -52,7 +52,7 @@ class Measured(NamedTuple):
 
     @property
     def text(self) -> str:
-        """As a table shows it."""
+        """The text in a table."""
         return number(self.value) if self.judged else NOT_JUDGED
 
 
@@ -70,7 +70,7 @@ class Column(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """Runs of one engine that did not play a scenario to its end, for one reason."""
+    """The runs of one engine that did not play a scenario to its end, for one reason."""
 
     name: str
     outcome: str
@@ -83,10 +83,13 @@ SUMMARY: dict[str, Column] = {
         "Position", "radii", "largest distance of any disk from where it truly is", "radii"
     ),
     "momentum_error": Column(
-        "Momentum", "of Σ m|v|", "largest momentum that came or went unasked", "of Σ m|v|"
+        "Momentum", "of Σ m|v|", "largest difference from the expected momentum", "of Σ m|v|"
     ),
     "energy_error": Column(
-        "Energy", "of the energy at hand", "largest energy that came or went unasked", "of energy"
+        "Energy",
+        "of the energy at hand",
+        "largest difference from the expected energy",
+        "of energy",
     ),
     "restitution_error": Column(
         "Restitution",
@@ -105,7 +108,7 @@ SUMMARY: dict[str, Column] = {
 
 
 def names_of(comparisons: Iterable[Comparison]) -> list[str]:
-    """Every `engine:profile` that was to play, in the order of appearance."""
+    """Every requested `engine:profile`, in the order of appearance."""
     return list(dict.fromkeys(run.name for comparison in comparisons for run in comparison.runs))
 
 
@@ -114,7 +117,7 @@ def values(comparison: Comparison) -> Found:
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
     found: Found = {}
-    for versus in (ITSELF, TRUTH):  # the truth comes last and wins
+    for versus in (ITSELF, TRUTH):  # the truth comes last and replaces the laws
         rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
         for row in rows.to_dict("records"):
             where = (
@@ -156,12 +159,11 @@ def summary(
     comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
 ) -> dict[str, list[OverviewCell]]:
     """`engine:profile` -> a cell for each of `SUMMARY`: the median over the scenarios and the worst
-    of them; of the last, in how many it was not played.
+    of them; the last cell counts the scenarios not played.
 
-    A scene that a solver's own file refuses, as it is written for another restitution, was not
-    asked of it. The best is the lowest of its group (`situations.grouped`), and whoever shows the
-    same number.
-    Who is `untrusted` broke the protocol of the harness and is not scored.
+    A scene that a solver's own file refuses, because the file is written for another restitution,
+    does not count. The best is the lowest of its group (`situations.grouped`), and all that show
+    the same number. Engines in `untrusted` broke the protocol of the harness and are not scored.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
@@ -172,7 +174,9 @@ def summary(
         lost = [
             comparison.scenario.name
             for comparison, each in zip(comparisons, failed)
-            if name in each and comparison.scenario.name in scored and not unasked(name, each)
+            if name in each
+            and comparison.scenario.name in scored
+            and not refused_by_file(name, each)
         ]
         cells = [
             pool(metric, name, comparisons, found, lost if metric == MAPPED else ())
@@ -182,7 +186,7 @@ def summary(
         if name in untrusted:
             broken = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
             cells = [broken] * len(cells)
-        asked = [each for each in failed if not unasked(name, each)]
+        asked = [each for each in failed if not refused_by_file(name, each)]
         count = sum(name in each for each in asked)
         cells.append(OverviewCell(f"{count} of {len(asked)}", failed=count > 0, value=count))
         if asked and all(not_modelled(each.get(name)) for each in asked):
@@ -210,14 +214,14 @@ def with_numbers(
 
 
 def not_modelled(outcome: tuple[str, str] | None) -> bool:
-    """Whether an engine refused a scene because it models no friction, which is no failure of
-    it."""
+    """Whether an engine refused a scene because it does not model friction, which is not a
+    failure."""
     return outcome is not None and REFUSAL in outcome[1]
 
 
-def unasked(name: str, outcomes: Mapping[str, tuple[str, str]]) -> bool:
-    """Whether somebody's own file refused a scene; `outcomes`: of the engines that did not play
-    it."""
+def refused_by_file(name: str, outcomes: Mapping[str, tuple[str, str]]) -> bool:
+    """Whether a solver's own file refused a scene; `outcomes`: those of the engines that did not
+    play it."""
     return name.endswith(OWN) and outcomes.get(name, ("", ""))[0] == OUTCOMES["unsupported"]
 
 
@@ -239,7 +243,7 @@ def mark_best(
 
 
 def by_value(cell: OverviewCell) -> float:
-    """What a cell of the summary is ordered by; what has no number comes last."""
+    """The sort key of a cell of the summary; cells without a number come last."""
     return np.inf if np.isnan(cell.value) else cell.value
 
 
@@ -250,12 +254,12 @@ def pool(
     found: Sequence[Found],
     lost: Iterable[str] = (),
 ) -> OverviewCell:
-    """Median and worst of a metric over the scenarios in which it is judged, and in how many it is.
+    """Median and worst of a metric over the scenarios in which it is judged, and their number.
 
-    In those that are `lost` the engine has no result, which counts as infinitely far off.
+    In the scenarios `lost` the engine has no result, which counts as an infinite error.
 
-    Wrong collisions are the missed and the spurious of a scene together; where nobody can miss one,
-    as there is none, those that are spurious count alone.
+    Wrong collisions are the missed and the spurious ones of a scene together; if the truth has no
+    collision, only the spurious ones.
     """
     kinds = (
         ("collisions_missed", "collisions_spurious") if metric == "wrong_collisions" else (metric,)
@@ -315,8 +319,8 @@ def outcome_cell(outcome: tuple[str, str]) -> OverviewCell:
 def scenario_table(
     comparison: Comparison, names: Sequence[str]
 ) -> list[tuple[str, str, str, list[OverviewCell]]]:
-    """(metric, unit, which way is better, a cell for each name) of every metric that this scenario
-    has."""
+    """(metric, unit, which value is better, a cell for each name) of every metric of this
+    scenario."""
     found, failed = values(comparison), outcome_at_middle_dt(comparison)
     rows = []
     for key, metric in METRICS.items():
@@ -335,8 +339,8 @@ def scenario_table(
 
 
 def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[OverviewCell]]:
-    """name -> the deviation of its trajectory from each other name's, at most, in radii; {} if
-    there is no pair."""
+    """name -> the largest deviation, in radii, of its trajectory from that of each other name; {}
+    if there is no pair."""
     table = comparison.table
     near = table.dt_s == comparison.middle_dt
     deviations: dict[frozenset[str], float] = {}
@@ -362,8 +366,8 @@ Settings = dict[tuple[str, str], tuple[str, str]]
 
 
 def settings(comparison: Comparison) -> Settings:
-    """(`engine:profile`, setting) -> (asked, used) at the middle dt; asked "–" where it is the
-    engine's own."""
+    """(`engine:profile`, setting) -> (asked, used) at the middle dt; asked "–" for the engine's
+    default."""
     return {
         (run.name, setting): (number(asked, 6), number(used, 6))
         for run in comparison.middle_runs
@@ -372,7 +376,7 @@ def settings(comparison: Comparison) -> Settings:
 
 
 def common_settings(comparisons: Sequence[Comparison]) -> Settings:
-    """Those settings that no scenario has otherwise, so that a scenario need only show its own."""
+    """The settings that are equal in all scenarios, so that a scenario need only show its own."""
     common: Settings = {}
     otherwise: set[tuple[str, str]] = set()
     for comparison in comparisons:

@@ -1,4 +1,4 @@
-"""Writes report.html: one file that holds everything it shows and asks nothing of anywhere."""
+"""Writes report.html: one self-contained file that fetches nothing."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def write_page(
     Args:
         findings: the sentences of the first screen.
         untrusted: the engines that are not scored, as they break the protocol.
-        conformance: a row a question of a probe.
-        known_answers: a row a published number that was made again.
+        conformance: a row for each question of a probe.
+        known_answers: a row for each reproduced published number.
         about: command, seed, machine, versions, started, seconds.
-        lessons: name -> what has its number, title and question.
-        clock: what a step of each engine costs.
+        lessons: name -> an object with its number, title and question.
+        clock: the times of the run.
         said: a solver's file -> what `crosscheck check` says of it.
-        on_paper: the scenarios that have half a page each where the page is printed.
+        on_paper: the scenarios that get half a page each in print.
     """
     names = overview.names_of(comparisons)
     tables = page_tables(comparisons, untrusted, conformance, known_answers)

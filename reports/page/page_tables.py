@@ -1,4 +1,4 @@
-"""The tables of the report that are of all scenarios: medians, errors, probes, settings."""
+"""The tables of the report over all scenarios: medians, errors, probes, settings."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ VERDICTS = ("keeps", "not asked", "departs", "breaks")
 
 @dataclass(frozen=True)
 class PageTables:
-    """What the tables between the first screen and the scenarios show, in their order.
+    """The tables between the first screen and the scenarios, in their order.
 
     Attributes:
-        columns: of the table of medians.
-        summaries: the tables of medians: without friction, and with it where there are both.
-        heat_map: scenario -> a cell an engine: its largest position error.
+        columns: of the table of medians. summaries: the tables of medians: without friction, and
+        with friction if there are both.
+        heat_map: scenario -> a cell for each engine: its largest position error.
         heat_bounds: the errors at which the colour of a cell changes, radii.
         trust: heading -> how far to trust it.
-        known_answers, known_answers_text: published numbers that were made again, and what they
-            are.
-        probes: whether any engine was asked any.
+        known_answers, known_answers_text: reproduced published numbers, and what they are.
+        probes: whether any probe was run.
         conformance: probe -> engine -> the worst verdict, and how often.
-        departures: engine -> the probes that it does not keep.
+        departures: engine -> the probes that it does not pass.
         settings: engine -> its (setting, asked, used) that are the same in every scenario.
         searched: engine -> the settings that were searched for its matched profile.
         metrics: name -> metric.
@@ -78,8 +77,8 @@ def page_tables(
 
 
 class Summary(NamedTuple):
-    """A table of medians: its heading, "" for the first; how many scenes it is of; its columns; the
-    rows of `overview.summary` with these; and the groups that they stand in."""
+    """A table of medians: heading, "" for the first; number of scenes; columns; the rows of
+    `overview.summary` with these columns; and their groups."""
 
     title: str
     scenes: int
@@ -91,7 +90,8 @@ class Summary(NamedTuple):
 def summaries(
     smooth: Sequence[Comparison], rough: Sequence[Comparison], untrusted: Set[str]
 ) -> list[Summary]:
-    """The table of medians, and where there are scenes with friction beside others one of these."""
+    """The table of medians, and a second one for the scenes with friction if there are both
+    kinds."""
     found = []
     for comparisons, title in ((smooth, ""), (rough, "Summary of the scenes with friction")):
         names = overview.names_of(comparisons)
@@ -106,7 +106,7 @@ def summaries(
 
 
 def by_engine(rows: Sequence[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
-    """Engine -> its rows of the table of what was searched."""
+    """Engine -> its rows of the table of searched settings."""
     return {
         engine: [row for row in rows if row["engine"] == engine]
         for engine in dict.fromkeys(r["engine"] for r in rows)
@@ -142,7 +142,7 @@ def conformance_matrix(table: pd.DataFrame) -> dict[str, dict[str, tuple[str, in
 
 
 def departures(table: pd.DataFrame) -> dict[str, list[dict[str, Any]]]:
-    """`engine:profile` -> the rows of what it does not keep."""
+    """`engine:profile` -> the rows of the probes that it does not pass."""
     found: dict[str, list[dict[str, Any]]] = {}
     for row in records(table):
         if row["verdict"] != "keeps":

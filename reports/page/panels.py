@@ -1,5 +1,5 @@
-"""The same scene in every engine: what a panel shows of it beside the exact answer, with the error
-and the cost of the engine."""
+"""The same scene in every engine: each panel shows one engine beside the exact answer, with its
+error and its cost."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from reports.page.style import number
 from scenarios.catalogue import family_of
 from scenarios.model import Array, Scenario, Trajectory
 
-FEW = 5  # disks that move, at most, for all of them to be drawn: more paths hide each other
-NARROW = 0.2  # of the longer side of a path: what is narrower is drawn over time
-ROOM = 0.5  # of what the exact answer takes up, for engines that go beyond it
-LEAST = 0.1  # radii, that an axis of lengths spans: else rounding would fill a panel
-VISIBLE = 0.03  # of what a panel shows: a smaller error cannot be seen in it
+FEW = 5  # moving disks at most to draw all of them: more paths hide each other
+NARROW = 0.2  # of the longer side of a path: a narrower path is drawn over time
+ROOM = 0.5  # of the extent of the exact answer: margin for engines that go beyond it
+LEAST = 0.1  # radii, least range of an axis of lengths: else rounding would fill a panel
+VISIBLE = 0.03  # of the extent of a panel: a smaller error is not visible
 MARKED = 6  # instants in a panel
 TIMED = "Scenes with costs"
-EMPTY = {"no truth": "no exact answer"}  # what the map says in a word
+EMPTY = {"no truth": "no exact answer"}  # short texts for the map
 
 
 class Panels(NamedTuple):
-    """What the section holds.
+    """The section of panels.
 
     Attributes:
         groups: heading -> scenes, for the picker.
-        first: the scene that it opens with.
+        first: the scene shown first.
         packed: scene -> `to_json` of what its panels show, deflated.
         timed: whether any scene has costs.
         javascript: whether to name the engines that play with the extra `js`.
@@ -54,15 +54,15 @@ class Panels(NamedTuple):
 
 @dataclass(frozen=True)
 class Drawn:
-    """What is drawn of one scene, the same in every panel; the positions are those of its replay.
+    """What is drawn of one scene, the same in every panel; the positions come from its replay.
 
     Attributes:
-        disks: whose centres.
+        disks: the disks whose centres are drawn.
         axes: "path": y over x; "x", "y": that over time.
         titles: of the two axes, with units.
         box: left, bottom, right, top of the axes, in these units.
         until: s, where the exact answer ends.
-        apart: engine -> how far it is off, as a share of what the panel shows.
+        apart: engine -> its largest error as a fraction of the extent of the panel.
     """
 
     disks: Sequence[int]
@@ -79,7 +79,7 @@ def panels(
     errors: Mapping[str, Sequence[OverviewCell]],
     clock: Clock,
 ) -> Panels | None:
-    """Of the scenes that any engine played; None if there is none, or a single engine.
+    """The panels of all scenes that were played; None if there is no scene, or a single engine.
 
     errors: scene -> a cell of `overview.heat_map` for each of `names`.
     """
@@ -101,7 +101,7 @@ def panels(
     return Panels(
         groups=grouped(list(drawn), timed),
         first=max(
-            shown, key=lambda each: merit(each, drawn[each.scenario.name], costs)
+            shown, key=lambda each: priority(each, drawn[each.scenario.name], costs)
         ).scenario.name,
         packed=deflated(json.dumps(packed, separators=(",", ":"))),
         timed=bool(timed),
@@ -110,7 +110,7 @@ def panels(
 
 
 def grouped(scenes: Sequence[str], timed: Sequence[str]) -> dict[str, list[str]]:
-    """The scenes under the headings of the report, and before them those that were timed."""
+    """The scenes under the headings of the report, after a first group of the timed scenes."""
     groups: dict[str, list[str]] = {TIMED: list(timed)} if timed else {}
     for name in scenes:
         if name not in timed:
@@ -118,12 +118,12 @@ def grouped(scenes: Sequence[str], timed: Sequence[str]) -> dict[str, list[str]]
     return groups
 
 
-def merit(
+def priority(
     comparison: Comparison, drawn: Drawn, costs: Mapping[str, Any]
 ) -> tuple[bool, int, bool, int]:
-    """What makes a scene the first to be shown, the most important first: an exact answer, engines
-    that play it, costs, and engines that can be told apart in it: of those that are visibly off and
-    those that are not, the fewer."""
+    """The sort key of the scene to show first: it has an exact answer, the number of engines that
+    play it, it has costs, and how well it separates engines: the smaller of the numbers visibly off
+    and not."""
     off = sum(share > VISIBLE for share in drawn.apart.values())
     played_by = len(drawn.apart)
     exact, timed = comparison.truth is not None, comparison.scenario.name in costs
@@ -140,17 +140,21 @@ def costs_of(clock: Clock) -> dict[str, dict[tuple[str, float], float]]:
 
 
 def drawn_of(comparison: Comparison) -> Drawn:
-    """Which disks, over which axes, up to when."""
+    """Chooses disks, axes and end time of a scene."""
     scenario, truth = comparison.scenario, comparison.truth
     runs = [run for run in comparison.middle_runs if run.trajectory is not None]
-    # Without an exact answer the engines are beside each other all the same.
+    # Without an exact answer the first run takes its place.
     centre = truth if truth is not None and len(truth) > 1 else runs[0].trajectory
     assert centre is not None
     disks = disks_of(scenario, runs, centre)
     axes = axes_of(centre, disks)
-    lines = [seen(axes, run.trajectory, disks, len(centre)) for run in runs if run.trajectory]
-    box = box_of(seen(axes, centre, disks, len(centre)), lines, scenario.scene.radius[disks].max())
-    # Where nothing was played but the start, an axis of time has a length all the same.
+    lines = [
+        drawn_points(axes, run.trajectory, disks, len(centre)) for run in runs if run.trajectory
+    ]
+    box = box_of(
+        drawn_points(axes, centre, disks, len(centre)), lines, scenario.scene.radius[disks].max()
+    )
+    # If only the start was played, the time axis still has a length.
     until = float(centre.t[-1]) or scenario.sample_interval
     if axes != "path":
         box[2] = until
@@ -170,8 +174,8 @@ def drawn_of(comparison: Comparison) -> Drawn:
 
 
 def disks_of(scenario: Scenario, runs: Sequence[Run], centre: Trajectory) -> NDArray[np.int64]:
-    """All that can move; of more than `FEW` the one that most engines put farthest from its
-    place, in radii."""
+    """All moving disks; if there are more than `FEW`, the one that is farthest off, in radii, in
+    most engines."""
     moving = np.flatnonzero(~scenario.scene.static)
     if len(moving) <= FEW:
         return moving if len(moving) else np.array([0])
@@ -185,7 +189,7 @@ def disks_of(scenario: Scenario, runs: Sequence[Run], centre: Trajectory) -> NDA
 
 
 def axes_of(centre: Trajectory, disks: NDArray[np.int64]) -> str:
-    """A path in the plane, or where the disks keep to a line the coordinate along it."""
+    """ "path", or if the disks stay on a line, the coordinate along it."""
     across, up = np.ptp(centre.position[:, disks], axis=0).max(axis=0)
     if up < NARROW * across:
         return "x"
@@ -193,7 +197,7 @@ def axes_of(centre: Trajectory, disks: NDArray[np.int64]) -> str:
 
 
 def titles_of(axes: str, scenario: Scenario) -> tuple[str, str]:
-    """Of the two axes."""
+    """The titles of the two axes."""
     if axes == "path":
         return "x (m)", "y (m)"
     gravity = scenario.scene.gravity
@@ -201,8 +205,10 @@ def titles_of(axes: str, scenario: Scenario) -> tuple[str, str]:
     return "time (s)", "x (m)" if axes == "x" else "height (m)" if falls else "y (m)"
 
 
-def seen(axes: str, trajectory: Trajectory, disks: NDArray[np.int64], samples: int) -> Array:
-    """(k, 2) the points that are drawn of the first samples, in the units of the axes."""
+def drawn_points(
+    axes: str, trajectory: Trajectory, disks: NDArray[np.int64], samples: int
+) -> Array:
+    """(k, 2) the points to draw from the first samples, in the units of the axes."""
     position = trajectory.position[:samples, disks]
     if axes == "path":
         return position.reshape(-1, 2)
@@ -212,7 +218,7 @@ def seen(axes: str, trajectory: Trajectory, disks: NDArray[np.int64], samples: i
 
 
 def box_of(centre: Array, lines: Sequence[Array], radius: float) -> Array:
-    """(4,) what the axes span: all of the centre, and of the others what is not far beyond it."""
+    """(4,) the range of the axes: all of `centre`, and the parts of the other lines near it."""
     low, high = centre.min(axis=0), centre.max(axis=0)
     room = ROOM * np.maximum(high - low, radius)
     every = np.concatenate([line[np.isfinite(line).all(axis=1)] for line in lines])
@@ -229,7 +235,7 @@ def to_json(
     errors: Mapping[str, OverviewCell],
     costs: Mapping[tuple[str, float], float],
 ) -> dict[str, Any]:
-    """For JSON: what is drawn, what is said of it, and engine -> [outcome, reason, error, cost]."""
+    """For JSON: what is drawn, its caption, and engine -> [outcome, reason, error, cost]."""
     return {
         "disks": drawn.disks,
         "axes": drawn.axes,
@@ -240,14 +246,14 @@ def to_json(
         "engines": {
             name: numbers_of(cell, costs.get((name, comparison.middle_dt), np.nan))
             for name, cell in errors.items()
-            if cell.text != "–"  # it was not asked
+            if cell.text != "–"  # not requested of this engine
         },
     }
 
 
 def numbers_of(cell: OverviewCell, cost: float) -> tuple[str, str, str, str]:
-    """What stands below a panel: what happened and why, where the engine did not play to the end;
-    else its error and its cost, "" where it was not timed."""
+    """The text below a panel: outcome and reason if the engine did not play to the end; else its
+    error and its cost, "" if it was not timed."""
     if cell.failed or cell.text == NO_FRICTION:
         return cell.text, cell.remark, "", ""
     error = f"{cell.text} radii" if cell.heat >= 0 else EMPTY.get(cell.text, cell.text)
@@ -255,7 +261,7 @@ def numbers_of(cell: OverviewCell, cost: float) -> tuple[str, str, str, str]:
 
 
 def said_of(comparison: Comparison, drawn: Drawn) -> str:
-    """What the panels of a scene show, as a sentence."""
+    """A caption for the panels of a scene."""
     scenario = comparison.scenario
     moving = int((~scenario.scene.static).sum())
     named = drawn.titles[1].partition(" ")[0]

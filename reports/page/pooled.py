@@ -21,16 +21,15 @@ SCORES = ["scenario", "name", "error", "angle", "dt_s", "step_size", "middle"]
 
 
 def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """A row a run of a scene with an exact answer: columns `SCORES`.
+    """A row for each run of a scene with an exact answer: columns `SCORES`.
 
     error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
-    step_size counts from the coarsest, dt_s is its length, middle says whether it is the one in the
-    middle of the ladder. A scene that a solver's own file refuses was not asked of it, and has no
-    row of it.
+    step_size counts from the coarsest, dt_s is its length, middle: whether it is the middle step
+    size. A scene that a solver's own file refuses has no row for that file.
     """
     rows = []
     for comparison in comparisons:
-        # a truth that is lost before its second sample has only the start, which is given to all
+        # a truth with its horizon before the second sample has only the start, exact for all
         if comparison.truth is None or len(comparison.truth) < 2:
             continue
         table, scenario = comparison.table, comparison.scenario.name
@@ -54,7 +53,7 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 def drawings(
     found: pd.DataFrame, answers: Sequence[situations.Answer], untrusted: Set[str]
 ) -> dict[str, Drawing]:
-    """The chart of `scores`, without who is `untrusted`; {} if there is nothing to draw."""
+    """The chart of `scores` without the engines in `untrusted`; {} if there is nothing to draw."""
     trusted = found[~found.name.isin(untrusted)]
     return {"situations": by_situation(trusted, answers)} if answers else {}
 
@@ -66,7 +65,7 @@ def with_marks(drawings: Mapping[str, Drawing]) -> list[str]:
 
 
 def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> Drawing:
-    """A place a situation, a mark an engine at the median of its errors."""
+    """A column for each situation, with a mark for each engine at the median of its errors."""
     names = list(dict.fromkeys(found.name))
     middle = found[found.middle]
     lines = []
@@ -100,11 +99,11 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
 
 
 def column_of(answer: situations.Answer) -> str:
-    """Which column of `SCORES` its errors are."""
+    """The column of `SCORES` with the errors of a situation."""
     return "angle" if answer.unit == "rad" else "error"
 
 
 def named(name: str) -> Run:
-    """A run that carries an engine's name, which decides how it is drawn."""
+    """A run with the name of an engine, which determines its look."""
     engine, profile = name.split(":", 1)
     return Run(engine, profile, "", 0.0)

@@ -1,4 +1,4 @@
-"""Packs the trajectories of a comparison into the few kilobytes that the page's player draws from.
+"""Packs the trajectories of a comparison into a few kilobytes for the page's player.
 
 A pack is, deflated: uint32 length of a JSON head, the head, then for every layer the numbers the
 head announces, all little-endian uint16: positions on a grid over the layer's bounding box (second
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from reports.compare.comparison import Comparison
 
 FRAMES = 240
-# positions of disks a layer, so that a crowd of 100 takes no more room than the page has
+# positions in a layer, so that a crowd of 100 disks fits into the page
 NUMBERS = 10_000
-COLLISIONS = 300  # more marks than this a layer hide the disks
+COLLISIONS = 300  # collision marks in a layer at most: more hide the disks
 STEPS = 65535  # of the position grid
 
 
@@ -43,12 +43,11 @@ def pack_layers(
     shown: NDArray[np.int64] | None = None,
     more: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
-    """The layers at the samples `shown` (all that are worth it), packed, as base64; "" if there are
+    """The layers at the samples `shown` (default: `frames`), packed, as base64; "" if there are
     none.
 
-    more: goes into the head: `opens` s, where the engine starts; `pace`, seconds in one at speed 1;
-        `event`, what to
-    mark: t s, disk.
+    more: further keys of the head: `opens` s, where the player starts; `pace`, simulated seconds
+        per second at speed 1; `event`, what to mark: t s, disk.
     """
     if not layers:
         return ""
@@ -79,8 +78,8 @@ def name_of(run: Run | None) -> str:
 
 
 def frames(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> NDArray[np.int64]:
-    """The samples that are drawn: spread evenly, and those nearest to the last layer's collisions,
-    if these are few."""
+    """The samples to draw: evenly spaced ones, and those nearest to the last layer's collisions if
+    these are few."""
     count = int(min(FRAMES, max(60, NUMBERS // scenario.scene.n), scenario.intervals + 1))
     collisions = np.unique(
         np.rint(layers[-1][1].collisions.t / scenario.sample_interval).astype(int)
@@ -108,8 +107,8 @@ def head_of(
 
 
 def view_of(scenario: Scenario, trajectories: list[Trajectory]) -> Array:
-    """(4,) m, left, bottom, right, top: all of the last trajectory, and of the others what is not
-    thrown far away."""
+    """(4,) m, left, bottom, right, top: all of the last trajectory, and those parts of the others
+    that are not far away."""
     scene = scenario.scene
     r = scene.radius[:, None]
     boxes = np.array(
@@ -137,8 +136,7 @@ def view_of(scenario: Scenario, trajectories: list[Trajectory]) -> Array:
 
 
 def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) -> float:
-    """Height over width of what is shown, so that the page keeps room for it before it is
-    unpacked."""
+    """Height over width of the view, so that the page reserves its space before unpacking."""
     left, bottom, right, top = view_of(scenario, [trajectory for _, trajectory in layers])
     return float(round((top - bottom) / (right - left), 4))
 
@@ -146,8 +144,7 @@ def ratio_of(scenario: Scenario, layers: list[tuple[Run | None, Trajectory]]) ->
 def layer(
     run: Run | None, trajectory: Trajectory, shown: NDArray[np.int64], scenario: Scenario
 ) -> tuple[dict[str, Any], bytes]:
-    """The head and the numbers of one layer; it ends where its trajectory ends, of which it may be
-    a part."""
+    """The head and the numbers of one layer, which ends with its trajectory."""
     first = round(trajectory.t[0] / scenario.sample_interval)
     mine = shown[shown < first + len(trajectory)] - first
     position = trajectory.position[mine].reshape(len(mine), -1, 2)
@@ -184,7 +181,7 @@ def layer(
 
 
 def smoothed(values: NDArray[np.uint16]) -> bytes:
-    """(k, m) numbers as bytes that deflate well; undone by `smooth` in player.js."""
+    """(k, m) numbers as bytes that deflate well; inverse of `smooth` in player.js."""
     twice = np.diff(values, n=1, axis=0, prepend=np.uint16(0))
     twice = np.diff(twice, n=1, axis=0, prepend=np.uint16(0)).astype(np.int16)
     zigzag = ((twice << 1) ^ (twice >> 15)).astype(np.uint16)

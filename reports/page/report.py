@@ -1,4 +1,4 @@
-"""Page and findings of a run, from its tables; nothing is played."""
+"""Page and findings of a run, made from its tables; nothing is played."""
 
 from __future__ import annotations
 
@@ -23,17 +23,16 @@ PAGE = "report.html"
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What came out of a run.
+    """The results of a run.
 
     Attributes:
-        archive: what it was made from.
-        comparisons: one a scenario, in reading order.
+        archive: what it was made from. comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
-        untrusted: the engines that broke the protocol: their rows are kept, but nothing is
-            concluded from them.
-        unjudged: name of a scene -> why it is not held to its answer, or not compared at all,
-            though it should be.
+        untrusted: the engines that broke the protocol: their rows stay in the tables, but they are
+            not scored.
+        unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
+            it should be.
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
     """
 
@@ -53,13 +52,13 @@ def make_report(
     on_paper: Sequence[str] = (),
 ) -> Report:
     """From the journal of `folder` write deviations.csv, runs.csv, timings.csv and report.html;
-    `say` hears what is being done.
+    `say` is called with what is being done.
 
-    `lessons`: name -> a lesson, for the page's list of them; `on_paper`: scenarios that are printed
-    with the page.
+    `lessons`: name -> a lesson, for the page's list of them; `on_paper`: scenarios to print with
+    the page.
 
     Raises:
-        FolderTaken: one of these is there and is not this program's.
+        FolderTaken: one of these exists and is not this program's.
         ValueError: the journal cannot be used, or a scene is not the one that was played.
     """
     with writing(folder, (*TABLES, PAGE)):
@@ -72,13 +71,13 @@ def made_report(
     lessons: Mapping[str, Any],
     on_paper: Sequence[str] = (),
 ) -> Report:
-    """As `make_report`, over whatever is there."""
+    """As `make_report`, but overwrites existing files."""
     archive = Archive.read(folder)
     header = archive.header
     tables = make_tables(archive, say)
     say("writing the page")
     comparisons = comparisons_of(archive, tables)
-    # an interrupt may come before
+    # an interrupt may come first
     began = {run.name for comparison in comparisons for run in comparison.runs}
     engines = [name for name in header["engines"] if name in began and name in archive.conformance]
     asked = [archive.conformance[name]["conformance"] for name in engines]
@@ -90,7 +89,7 @@ def made_report(
     broken = {
         f"{row['engine']}:{row['profile']}": how_broken(row)
         for rows in asked
-        for row in reversed(rows)  # so that the first of them is said
+        for row in reversed(rows)  # so that the first fault is reported
         if row["verdict"] == "breaks"
     }
     untrusted = set(broken)
@@ -117,6 +116,6 @@ def made_report(
 
 
 def how_broken(row: Mapping[str, Any]) -> str:
-    """The probe of the protocol that an engine missed: the question, and what came."""
+    """The probe of the protocol that an engine failed: question and answer."""
     note = f" ({row['note']})" if row["note"] else ""
     return f"{row['asked']} {str(row['got']).capitalize()}{note}; expected: {row['expected']}."

@@ -19,14 +19,14 @@ OWN = "Scenes of your own"
 
 @dataclass(frozen=True)
 class ScenarioSection:
-    """One scenario as the page shows it.
+    """One scenario on the page.
 
     Attributes:
-        comparison: the runs of the scenario, and what was measured of them.
-        family: the heading that the section stands under.
-        truth: what is known of the right answer, in a sentence.
+        comparison: the runs of the scenario and their metrics.
+        family: the heading of the section.
+        truth: a sentence on the exact answer.
         dt: s, the step size of `table`.
-        off_grid: at which step sizes a thrust starts or stops inside a step, or "".
+        off_grid: the step sizes at which a thrust starts or stops inside a step, or "".
         failures: the engines that did not play it to its end.
         layers: what the replay shows: name, and its run; None for the exact answer.
         replay: the frames of `layers`, packed.
@@ -34,7 +34,7 @@ class ScenarioSection:
         ratio: width of the replay over its height.
         drawings: key -> chart.
         charts: the data of the drawings, packed.
-        table: metric, unit, which is better, a cell an engine.
+        table: metric, unit, which value is better, a cell for each engine.
         pairs: engine -> its largest deviation from each engine before it.
         settings: engine -> its (setting, asked, used) that differ from scenario to scenario.
     """
@@ -66,7 +66,7 @@ def sections_of(comparisons: Sequence[Comparison]) -> list[ScenarioSection]:
 def section_of(
     comparison: Comparison, names: Sequence[str], common: overview.Settings
 ) -> ScenarioSection:
-    """The section of one scenario; of its settings those that are not `common`."""
+    """The section of one scenario, with those settings that are not `common`."""
     scenario = comparison.scenario
     own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
     drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
@@ -99,7 +99,7 @@ def by_family(sections: Sequence[ScenarioSection]) -> dict[str, list[ScenarioSec
 
 
 def truth_of(comparison: Comparison) -> str:
-    """What is known of the right answer, in a sentence."""
+    """A sentence on the exact answer."""
     scenario, truth = comparison.scenario, comparison.truth
     if truth is None:
         return f"none: {scenario.without_truth or 'the scene comes without an exact answer'}"

@@ -1,4 +1,4 @@
-"""Serves pages to browsers on this machine, and to nobody else."""
+"""Serves pages to browsers on this machine only."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from reports.terminal.exits import TERMINATED, Stopped, refuse
 
 T = TypeVar("T")
 HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
-PORTS = 20  # tried in a row
+PORTS = 20  # ports tried in a row
 MOST_TABS = 16
-MOST_BYTES = 4096  # of a message that a page sends
-# one a tab, and some for the pages; not the loop's, for which it waits
+MOST_BYTES = 4096  # bytes of a message from a page
+# one per tab, and some for pages; not those of the loop, which waits for its threads
 THREADS = ThreadPoolExecutor(MOST_TABS + 8)
 
 
 async def in_thread(do: Callable[..., T], *arguments: Any) -> T:
-    """What `do` gives, in a thread; a server that stops does not wait for it."""
+    """The result of `do`, run in a thread; a stopping server does not wait for it."""
     return await get_running_loop().run_in_executor(THREADS, partial(do, *arguments))
 
 
@@ -44,7 +44,7 @@ def taken_socket(port: int) -> socket.socket:
     """A socket on the loopback address at the first free port from `port` on.
 
     Raises:
-        OSError: if none of the next few is free, or one may not be had.
+        OSError: none of the next few is free, or access is denied.
     """
     for each in range(port, min(port + PORTS, 65536)):
         try:
@@ -63,7 +63,7 @@ def taken_socket(port: int) -> socket.socket:
 
 
 def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
-    """Serve until Ctrl-C; say where, and open a browser there if asked; exits 2 if there is no
+    """Serve until Ctrl-C; print the address, and open a browser if `opens`; exits 2 if there is no
     port, 143 on SIGTERM."""
     try:
         listening = taken_socket(port)
@@ -77,21 +77,20 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
     if opens and not webbrowser.open(url):
         print(f"--open: no browser was found here; open {url} yourself.", file=sys.stderr)
     server = uvicorn.Server(config_of(app))
-    logging.getLogger("uvicorn.error").addFilter(is_news)
+    logging.getLogger("uvicorn.error").addFilter(is_unexpected)
     try:
         server.run(sockets=[listening])
     except (
         KeyboardInterrupt
-    ) as stopped:  # which the server hands on when it has ended; Ctrl-C is how it ought to end
+    ) as stopped:  # the server raises it again when it has ended; Ctrl-C is its normal end
         if isinstance(stopped, Stopped) and stopped.status == TERMINATED:
             raise
     finally:
         print("Stopped.")
 
 
-def is_news(record: logging.LogRecord) -> bool:
-    """Whether the server's complaint is about more than work that was cut off because the server
-    stops."""
+def is_unexpected(record: logging.LogRecord) -> bool:
+    """Whether a message of the server is about more than work cut off because the server stops."""
     cut_off = record.exc_info and isinstance(record.exc_info[1], CancelledError)
     return not (cut_off or record.getMessage().startswith("Cancel "))
 

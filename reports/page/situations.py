@@ -1,5 +1,5 @@
-"""Which engine for what: a scene belongs to a situation, and in each the engines are ranked apart
-from the reader's own solver and from this project's solvers."""
+"""Which engine for what: each scene belongs to a situation, and in each situation engines, the
+reader's own solvers and this project's solvers are ranked separately."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ SITUATIONS = {
 }
 YOURS, ENGINE = "Your solver", "Engines"
 OWN, EXACT = "Solvers of this project", "Solvers of this project that order collisions by time"
-RIGHT = 1e-6  # radii: what is closer is right
-FAR_OFF = 1.0  # radii: beyond it a disk is not where it should be, to the eye
+RIGHT = 1e-6  # radii: a smaller error is right
+FAR_OFF = 1.0  # radii: a larger error is visible
 COLUMNS = ["scenario", "name", "error", "angle", "cost", "dt_s"]
 
 
@@ -45,7 +45,7 @@ def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
     """The situation of a scene, of the first five of `SITUATIONS`, and `SPIN` if a disk turns;
     `FRICTION` alone of a scene with friction.
 
-    truth: whose collisions say who meets whom; without one all disks may meet.
+    truth: its collisions say which disks meet; without it all disks may meet.
     """
     scene = scenario.scene
     if scene.friction:
@@ -67,15 +67,15 @@ def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
 
 
 def by_friction(comparisons: Sequence[Comparison]) -> tuple[list[Comparison], list[Comparison]]:
-    """The scenes without friction, of which medians, findings and pictures are, and those with
-    friction, which are summed up by themselves; where all have friction, these are the first."""
+    """The scenes without friction, which medians, findings and pictures use, and those with
+    friction, which have their own summary. If all have friction, they are the first."""
     smooth = [each for each in comparisons if not each.scenario.scene.friction]
     rough = [each for each in comparisons if each.scenario.scene.friction]
     return (smooth, rough) if smooth else (rough, [])
 
 
 def partners(truth: Trajectory) -> dict[int, set[int]]:
-    """Disk -> which other disks it collides with, none for one that meets walls only."""
+    """Disk -> the other disks with which it collides; empty if it meets walls only."""
     met: dict[int, set[int]] = {}
     for i, j in zip(truth.collisions.i.tolist(), truth.collisions.j.tolist()):
         for one, other in ((i, j), (j, i)):
@@ -85,7 +85,7 @@ def partners(truth: Trajectory) -> dict[int, set[int]]:
 
 
 def on_one_line(scenario: Scenario) -> bool:
-    """Whether all centres lie on one line, and all velocities and the weight along it."""
+    """Whether all centres lie on one line, with all velocities and gravity along it."""
     scene = scenario.scene
     spread = scene.position - scene.position[0]
     along = [spread, scene.velocity, scene.gravity[None]]
@@ -100,10 +100,10 @@ class Ranked(NamedTuple):
         name: `engine:profile`.
         median, worst: error over the scenes, radii (rad of an angle); inf: no result.
         worst_in: the scene of the worst.
-        right: in how many scenes it is off by less than `RIGHT`.
-        fails: scene -> error, of those where it is off by more than `FAR_OFF`, the worst first.
-        cost: µs of engine time per simulated second, median of the scenes that were timed; nan
-            where none was.
+        right: number of scenes with an error below `RIGHT`. fails: scene -> error, if above
+        `FAR_OFF`, the worst first.
+        cost: µs of engine time per simulated second, median of the timed scenes; nan if there are
+            none.
     """
 
     name: str
@@ -116,16 +116,16 @@ class Ranked(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A row of the table: the best engine of a situation, and the other engines.
+    """A row of the table: the best engine for a situation, and the other engines.
 
     Attributes:
         title, meaning, unit: of the situation.
         scenes: which belong to it.
         steps: s, the smallest and the largest step size of these scores.
-        best, others: of what takes part as an engine, the nearest to the exact answers; and the
-            best profile of each other engine, the nearest first.
+        best, others: the engine nearest to the exact answers; and the best profile of each other
+            engine, the nearest first.
         yours: the reader's own solvers, the best first.
-        own: the best of `OWN` beside it, if it is not `best` itself.
+        own: the best of `OWN`, if it is not `best` itself.
         exact: those of `EXACT`.
     """
 
@@ -142,11 +142,11 @@ class Answer(NamedTuple):
 
 
 def grouped(names: Iterable[str]) -> dict[str, list[str]]:
-    """`YOURS`, `ENGINE`, `OWN`, `EXACT` -> their names in the order given; groups without a name
-    are left out.
+    """`YOURS`, `ENGINE`, `OWN`, `EXACT` -> their names in the given order; empty groups are left
+    out.
 
-    Yours is a solver's file; an engine is a library. Of this project's solvers those belong to
-    `EXACT` that say so in their row, whatever scenes were played.
+    `YOURS` are solvers' files; `ENGINE` are libraries. This project's solvers belong to `EXACT` if
+    their row says so, whatever scenes were played.
     """
     groups: dict[str, list[str]] = {YOURS: [], ENGINE: [], OWN: [], EXACT: []}
     for name in names:
@@ -163,12 +163,12 @@ def grouped(names: Iterable[str]) -> dict[str, list[str]]:
 def answers(
     scores: pd.DataFrame, situations: Mapping[str, Sequence[str]], untrusted: Set[str]
 ) -> list[Answer]:
-    """A row a situation that has a scene with an exact answer, and one for all without friction if
-    there are more.
+    """A row for each situation that has a scene with an exact answer, and one for all scenes
+    without friction if there are more.
 
-    scores: columns `COLUMNS`: errors in radii and in rad, inf without a result, angle nan where it
-        was not read; cost in µs per simulated second; dt in s.
-    situations: scene -> what `situations_of` says. Who is `untrusted` is left out.
+    scores: columns `COLUMNS`: errors in radii and in rad, inf without a result, angle nan if not
+        known; cost in µs per simulated second; dt in s.
+    situations: scene -> its `situations_of`. Engines in `untrusted` are left out.
     """
     scores = scores[~scores.name.isin(untrusted)]
     rough = scores.scenario.map(lambda scene: FRICTION in situations[scene]).astype(bool)
@@ -190,7 +190,7 @@ def answers(
 
 
 def whole(rows: Sequence[Answer]) -> Answer | None:
-    """Of the rows of `answers` that of all scenes without friction, or the last that there is."""
+    """The row of `answers` for all scenes without friction, or the last row."""
     smooth = [row for row in rows if row.title != FRICTION]
     return next(reversed(smooth or rows), None)
 
@@ -231,7 +231,7 @@ def answer(
 
 
 def rank(name: str, mine: pd.DataFrame) -> Ranked:
-    """What its scores in some scenes come to."""
+    """An engine ranked by its scores in some scenes."""
     errors = mine.set_index("scenario").error.sort_values(ascending=False, kind="stable")
     costs = mine.cost.dropna()
     return Ranked(

@@ -1,5 +1,5 @@
-"""How things look: one colour an engine, one dash and fill a profile, one ramp for size, one way to
-write a number."""
+"""How things look: a colour for each engine, a dash and fill for each profile, one ramp for sizes,
+one format for numbers."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from zlib import crc32
 
 from adapters.engine_row import Mark
 from adapters.engines import ENGINES, FETCHED, OWN
-from reports.compare.against import TRUTH as TRUTH  # its curve is drawn, as an engine's is
+from reports.compare.against import TRUTH as TRUTH  # its curve is drawn like that of an engine
 from reports.terminal.foreign_text import encoded
 
 
 class Look(NamedTuple):
     """How an engine and profile are drawn.
 
-    Without colour the mark (shape, filled or not) tells all of `ENGINES` apart, and the dash tells
-    the profiles of an engine apart.
+    Without colour the mark (shape, filled or not) distinguishes all of `ENGINES`, and the dash
+    distinguishes the profiles of an engine.
 
     Attributes:
         light, dark: hex colour on a light and on a dark page.
@@ -86,8 +86,8 @@ DASHED = {
     "coulomb": (12, 3),
 }
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
-# Of an engine with more than two profiles: filled and open tell two of them apart where there is
-# no colour and no line, the others have a shape of their own.
+# For an engine with more than two profiles: filled and open marks distinguish two where there is
+# no colour and no line; the others have their own shapes.
 SHAPED = {"ordered": "hourglass", "neighbours": "x", "coulomb": "triangle-left"}
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep
@@ -128,7 +128,7 @@ def look(engine: str, profile: str = "") -> Look:
 
 def looks_of(names: Iterable[str]) -> dict[str, Look]:
     """How each `engine:profile` of a page is drawn, or the truth. Solvers' files on one page differ
-    in colour and shape, as long as there are no more of them than `PALETTE` has marks."""
+    in colour and shape if there are at most as many as marks in `PALETTE`."""
     names = list(names)
     _files.clear()
     for name in sorted(names):
@@ -140,11 +140,10 @@ _files: dict[str, Mark] = {}  # of the solvers' files that are drawn beside each
 
 
 def mark_of(engine: str) -> Mark:
-    """What its row says; of those whose rows say nothing the first has the first of
-    `PALETTE`, and so on.
+    """The mark in the row of an engine; rows without one get the marks of `PALETTE` in order.
 
-    A solver's file has one of `PALETTE` by the name of the file, in the game and in every report
-    the same, unless a file that is drawn beside it has that one already: then the next.
+    The name of a solver's file selects its mark from `PALETTE`, the same in the game and in every
+    report. If a file on the same page already has that mark, it gets the next.
     """
     marks: dict[str, Mark | None] = {}
     for name, row in {**FETCHED, **ENGINES}.items():
@@ -157,7 +156,7 @@ def mark_of(engine: str) -> Mark:
 
 
 def mark_of_file(path: str) -> Mark:
-    """The first that is free, from the one on that the name of the file stands for."""
+    """The first free mark, starting with the one that the name of the file selects."""
     first = crc32(encoded(PurePath(path).name)) % len(PALETTE)
     marks = PALETTE[first:] + PALETTE[:first]
     return next((mark for mark in marks if mark not in _files.values()), marks[0])
@@ -187,7 +186,7 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """`value` to so many significant digits: 0.0123, 1.23×10⁻⁵, 0, ∞, – for nan; text as it is."""
+    """`value` to `digits` significant digits: 0.0123, 1.23×10⁻⁵, 0, ∞, – for nan; text as it is."""
     if isinstance(value, bool | str) or value is None:
         return {True: "yes", False: "no", None: "–", "": "–"}.get(value, str(value))
     try:

@@ -1,5 +1,5 @@
-"""How far to trust a report: what is proven, what is measured, what others can repeat, where we
-judge our own."""
+"""How far to trust a report: what is proven, measured, checked independently, and where the project
+judges its own engines."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scenarios.truth.oracle.numbers import has_balls
 
 
 def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
-    """Heading -> what it says, of this run."""
+    """Heading -> its text for this run."""
     return {
         "Exact answers": exact_answers(comparisons),
         "How far they hold": how_far_they_hold(comparisons),
@@ -70,7 +70,7 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
 
 
 def how_far_they_hold(comparisons: Sequence[Comparison]) -> str:
-    """Up to when engines are held to the exact answers of these scenes."""
+    """The times up to which engines are compared with the exact answers of these scenes."""
     ends = {
         each.scenario.name: (each.truth.horizon, each.scenario.duration)
         for each in comparisons

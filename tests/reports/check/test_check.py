@@ -148,7 +148,7 @@ def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):
     sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
 
     assert "unknown" in sentences[0]
-    assert "Came:" in sentences[0]
+    assert "Got:" in sentences[0]
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from reports.check import command
-from reports.check.terminal import bare, same_code
+from reports.check.terminal import code_only, same_code
 from reports.check.verdict import check_file, named
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
@@ -88,7 +88,7 @@ def test_copies_in_a_class_are_named_and_others_are_not(folder: Path):
     wrong = check_file(folder / "ben" / "Exercise.js")
 
     assert same_code(folder, [*checks, wrong]) == [["anna/Exercise.js", "eve.js"]]
-    assert bare("x = a // b\n", "#") != bare("x = a // c\n", "#")
+    assert code_only("x = a // b\n", "#") != code_only("x = a // c\n", "#")
 
 
 def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):

@@ -66,7 +66,7 @@ def test_a_class_is_sorted_filtered_and_opens_offline(browser: Browser, tmp_path
     assert everybody == len(group) + len(copies)
     assert totals == sorted(totals)
     assert filtered == ["zoe"]
-    assert "Came: 1 m. Expected: 2 m." in opened_text
+    assert "Got: 1 m. Expected: 2 m." in opened_text
     assert same == ["kim/Exercise.js, lou/Exercise.js"]
     assert (wide <= 0, narrow <= 0) == (True, True)
     assert "<script>alert" not in (tmp_path / "class.html").read_text()

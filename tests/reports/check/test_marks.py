@@ -366,8 +366,8 @@ def test_low_hints_tell_the_question_and_the_numbers_and_no_cause():
     fault = row("2c", "impulse", "fault", "the factor (1 + e) is missing")
     full, low = ("\n".join(marked(fault, low=low).feedback("2c")) for low in (False, True))
 
-    assert "What? Came: 1 m. Expected: 2 m." in full
-    assert low == "impulse: wrong answer. What? Came: 1 m. Expected: 2 m."
+    assert "What? Got: 1 m. Expected: 2 m." in full
+    assert low == "impulse: wrong answer. What? Got: 1 m. Expected: 2 m."
     assert "the factor (1 + e) is missing" in full
     assert "line 3: x = 1" in full
     assert "exercise: J = -(1 + e)" in full

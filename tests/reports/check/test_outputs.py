@@ -88,7 +88,7 @@ def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_lin
     assert "exercise J = -(1 + e) (vA - vB).n / (n.n (1/mA + 1/mB)), e = 0.9" in said
     assert wrong.index("1. Task 2c") < wrong.index("Free choices. The exercise leaves them open")
     assert said.count("it divides by (mA + mB)") == 1, "a fault is named once"
-    assert "seen in What impulse does A get from B, for masses of 1.3 and 5.1 kg? Came:" in said
+    assert "seen in What impulse does A get from B, for masses of 1.3 and 5.1 kg? Got:" in said
     assert "These follow from the faults above: whole scenes (head_on" in said
     assert "  free choice  2a  just touching: the comparison is the one with <" in right
     assert "expected" not in right

@@ -7,7 +7,7 @@ import pandas as pd
 
 from adapters.run import Run
 from reports.page.charts import ChartLine, Drawing, figure_of
-from reports.page.findings import how_right, not_counted
+from reports.page.findings import not_counted, unranked_sentence
 from reports.page.page_tables import conformance_matrix
 from reports.page.pooled import with_marks
 from reports.page.report import how_broken
@@ -44,7 +44,7 @@ def test_a_file_is_not_asked_where_the_exercise_does_not_ask():
     """Its number is of the scenes that it plays; the others are counted, with why."""
     off = pd.DataFrame({"a.js:own": {"head_on": 0.25, "oblique": 1.75, "wall": np.nan}})
 
-    assert how_right("a.js:own", off, 1.0, {"wall": "the exercise has no walls"}) == (
+    assert unranked_sentence("a.js:own", off, 1.0, {"wall": "the exercise has no walls"}) == (
         "a.js is within 1 radius of the exact answer in 1 of 2 scenes, off by 1.8 radii in oblique,"
         " not asked in 1 scene (the exercise has no walls). It is not ranked among the engines."
     )

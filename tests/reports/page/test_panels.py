@@ -170,14 +170,14 @@ def test_the_section_opens_with_a_scene_that_tells_engines_apart():
     one = simply("free_fall", "reference:exercise")
     drawn = drawn_of(one)
 
-    def merit(*shares: float, truth: bool = True) -> tuple[bool, int, bool, int]:
+    def priority(*shares: float, truth: bool = True) -> tuple[bool, int, bool, int]:
         apart = {str(k): share for k, share in enumerate(shares)}
         scene = one if truth else replace(one, truth=None)
-        return panels.merit(scene, replace(drawn, apart=apart), {})
+        return panels.priority(scene, replace(drawn, apart=apart), {})
 
-    assert merit(0.0, 0.5, 0.0) > merit(0.0, 0.001, 0.0) == merit(0.5, 0.5, 0.5)
-    assert merit(0.0, 0.0) > merit(0.5)
-    assert merit(0.5) > merit(0.0, 0.5, truth=False)
+    assert priority(0.0, 0.5, 0.0) > priority(0.0, 0.001, 0.0) == priority(0.5, 0.5, 0.5)
+    assert priority(0.0, 0.0) > priority(0.5)
+    assert priority(0.5) > priority(0.0, 0.5, truth=False)
 
 
 def test_a_single_engine_and_a_run_of_nothing_have_no_panels():

@@ -200,13 +200,13 @@ def test_findings_rank_engines_and_say_in_how_many_scenes_the_others_are_right()
     errors = score(ERRORS | {"mine.py:own": [1e-3, 2.0, 1e-9]})
     off = errors.pivot(index="scenario", columns="name", values="error")
 
-    assert findings.how_right("reference:ordered", off, situations.RIGHT, {}) == (
+    assert findings.unranked_sentence("reference:ordered", off, situations.RIGHT, {}) == (
         "reference:ordered is within 10⁻⁶ radii of the exact answer in 2 of 3 scenes, off by 1000"
         " radii in c. It is not ranked among the engines."
     )
-    mine = findings.how_right("mine.py:own", off, situations.FAR_OFF, {})
+    mine = findings.unranked_sentence("mine.py:own", off, situations.FAR_OFF, {})
     assert "mine.py is within 1 radius of the exact answer in 2 of 3 scenes, off by 2" in mine
-    box2d = findings.how_right("box2d:matched", off, situations.FAR_OFF, {})
+    box2d = findings.unranked_sentence("box2d:matched", off, situations.FAR_OFF, {})
     assert "in 2 of 3 scenes, without a result in c." in box2d
 
 
@@ -618,6 +618,6 @@ def test_a_scene_that_a_file_refuses_is_not_counted_as_not_played(comparisons: l
 
     assert asked[name][-1].text == "0 of 1"
     assert crashed[name][-1].text == "2 of 2"
-    assert not overview.unasked("pymunk:matched", {"pymunk:matched": ("refused", "")})
+    assert not overview.refused_by_file("pymunk:matched", {"pymunk:matched": ("refused", "")})
     assert name not in set(scores(refusals("unsupported")).name)
     assert set(scores(refusals("crashed")).error[lambda e: np.isinf(e)]) == {np.inf}
