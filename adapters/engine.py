@@ -37,11 +37,10 @@ class ContactImpulse(NamedTuple):
 class Engine(Protocol):
     """The protocol: `load` once, then `step` and `read` any number of times, then `close`."""
 
-    # Whether collisions are recorded; set before `load`. Off for timings, because recording may
-    # cost more than a step.
+    # Whether collisions are recorded; set before `load`. Off for timings: it may outlast a step.
     listening: bool = True
-    # s of `step` that the adapter spent on `Scene.wrap` because the engine has no
-    # such edges. Measurements set it to 0 first.
+    # s of `step` that the adapter spent on `Scene.wrap`, because the engine itself has no such
+    # edges. Measurements set it to 0 first.
     wrapping: float = 0.0
 
     def load(self, scene: Scene, dt: float) -> None:
