@@ -14,12 +14,12 @@ from scenarios.model import Array, Scenario, Thrust
 
 
 def advanced(engine: Engine, scenario: Scenario, substeps: int, dt: float) -> Iterator[float]:
-    """Advance an engine that has just been loaded by a sample interval whenever the next is asked
-    for; yields the seconds inside `step`.
+    """A generator that advances a freshly loaded engine by one sample interval at a time; yields
+    the seconds inside `step`.
 
-    To an engine for which a call is expensive it is said beforehand what comes, if it has the
-    method `expect(count, times, thrusts)`: `step(count)` so many times, a `read` after each, and no
-    `apply_force`: it applies the `thrusts`, rows of `Foreseen`, by itself.
+    If calls of the engine are expensive, it may have a method `expect(count, times, thrusts)`,
+    which is called first: `step(count)` will be called `times` times, with a `read` after each and
+    without `apply_force`. The engine then applies the `thrusts`, rows of `Foreseen`, itself.
     """
     expect = getattr(engine, "expect", None)
     if expect is not None:
@@ -33,7 +33,7 @@ def advanced(engine: Engine, scenario: Scenario, substeps: int, dt: float) -> It
 
 
 def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: float) -> float:
-    """Advance `count` steps from step number `first`, applying the thrusts that are on; the seconds
+    """Advance `count` steps from step number `first` with the active thrusts; returns the seconds
     inside `step`."""
     seconds = 0.0
     for step, acting in thrust_steps(scenario.thrusts, first, count, dt):
@@ -45,24 +45,24 @@ def advance(engine: Engine, scenario: Scenario, first: int, count: int, dt: floa
 
 
 def timed(engine: Engine, count: int) -> float:
-    """Advance `count` steps; the seconds inside `step`."""
+    """Advance `count` steps; returns the seconds inside `step`."""
     started = perf_counter()
     engine.step(count)
     return perf_counter() - started
 
 
 class Foreseen(NamedTuple):
-    """What a thrust does during one step, whoever applies it."""
+    """The effect of a thrust during one step."""
 
     step: int  # from 0
     disk: int
     force: list[float]  # N, in `frame`
     torque: float  # N m
-    frame: str  # world, or body: turned by the angle of the disk at the start of the step
+    frame: str  # "world", or "body": turned by the angle of the disk at the start of the step
 
 
 def thrusts_by_step(thrusts: Sequence[Thrust], count: int, dt: float) -> list[Foreseen]:
-    """All that acts during `count` steps from the start."""
+    """The forces and torques of all thrusts during the first `count` steps."""
     found, first = list[Foreseen](), 0
     for step, acting in thrust_steps(thrusts, 0, count, dt):
         found += [
@@ -76,11 +76,11 @@ def thrusts_by_step(thrusts: Sequence[Thrust], count: int, dt: float) -> list[Fo
 def thrust_steps(
     thrusts: Sequence[Thrust], first: int, count: int, dt: float
 ) -> Iterator[tuple[int, list[tuple[Thrust, float]]]]:
-    """Cut steps first .. first + count into (how many, acting): one by one where a thrust is on,
-    else in one go.
+    """Split steps first .. first + count into (number of steps, active thrusts): single steps while
+    a thrust is on, else one block.
 
-    A thrust carries the share of the step during which its thrust is on, so that its impulse is
-    exact. It acts over all of the step: what that displaces a disk by is reported by
+    A force is scaled by the fraction of the step during which its thrust is on, so that its impulse
+    is exact. It acts over all of the step: what that displaces a disk by is reported by
     thrust_grid.py.
     """
     if not thrusts:
@@ -89,7 +89,7 @@ def thrust_steps(
     free = 0
     for step in range(first, first + count):
         shares = [(t, min(t.stop / dt, step + 1) - max(t.start / dt, step)) for t in thrusts]
-        # less is rounding of start / dt
+        # smaller fractions are rounding of start / dt
         if acting := [(t, share) for t, share in shares if share > 1e-9]:
             if free:
                 yield free, []

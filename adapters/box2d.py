@@ -105,17 +105,17 @@ SEARCHED = Searched(
 
 
 class Box2DEngine:
-    """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default;
-    so is the friction of a scene that has none.
+    """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default,
+    also the friction of a scene that states none.
 
     `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of
     time as inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The
     length unit is a quarter of the smallest radius, which shrinks slop and the tolerance of
-    continuous collision; or twice what the fastest disk moves in a step where that is more, because
-    nothing moves by more than 2 units a step; a scene that comes there all the same is refused.
-    Continuous collision, between disks, too, puts collisions at their own time within a step;
-    without gravity at e = 1 there is none, because it creates energy in a gas. No sleep or
-    wall skin; at e = 1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
+    continuous collision; or twice the step displacement of the fastest disk if that is more,
+    because Box2D cuts motion at 2 units per step; a scene that still reaches this cap is refused.
+    Continuous collision, also between disks, puts collisions at their own time within a step; it is
+    off without gravity at e = 1, because it creates energy in a gas. No sleep or wall skin; at e =
+    1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -144,7 +144,7 @@ class Box2DEngine:
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = self._friction()
         chosen = self.chosen
-        # s in one unit of the engine's time, units of its length in one m
+        # s per engine unit of time, engine units of length per m
         self.time, self.length = 1.0, 1.0
         if self.matched:
             self.time = chosen["time_unit"]
@@ -168,7 +168,7 @@ class Box2DEngine:
         gravity = scene.gravity * self.speed * self.time
         heard = {"contactListener": self.listener} if self.listening else {}
         self.world = Box2D.b2World(gravity=vector(gravity), **heard)
-        # Continuous collision creates energy where the scene keeps it.
+        # Continuous collision creates energy where the scene conserves it.
         elastic = "elastic_" if scene.restitution == 1 and not scene.gravity.any() else ""
         self.continuous, self.bullet = chosen[elastic + "continuous"], chosen[elastic + "bullet"]
         self.world.continuousPhysics = self.continuous
@@ -184,8 +184,8 @@ class Box2DEngine:
         self.walls = [self._wall(w) for w in range(len(scene.walls))]
 
     def _friction(self) -> float | None:
-        """Of every shape, whose root of the product is that of a pair; None: the engine's own
-        default, as somebody leaves it who wants no friction and does not think of it."""
+        """The friction of every shape (that of a pair is the root of the product); None: the
+        engine's default, as a user without friction in mind leaves it."""
         if self.asked_friction is not None:
             return self.asked_friction
         stated = self.matched or self.scene.friction > 0
@@ -235,8 +235,8 @@ class Box2DEngine:
         self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `Step`; where the scene wraps, disks that leave are set onto the
-        opposite edge."""
+        """`count` calls of `Step`; if the scene wraps, disks that leave are set onto the opposite
+        edge."""
         dt = self.dt / self.time
         for _ in range(count):
             self.world.Step(dt, self.velocity_iterations, self.position_iterations)
@@ -275,7 +275,7 @@ class Box2DEngine:
         return State(position, velocity, angle, angular_velocity)
 
     def collisions(self) -> list[ContactImpulse]:
-        """From `PostSolve`, impulses back in N s."""
+        """From `PostSolve`, with impulses converted to N s."""
         return [
             ContactImpulse(step, i, j, impulse / self.speed)
             for step, i, j, impulse in self.listener.log
@@ -309,11 +309,11 @@ class Box2DEngine:
         }
 
     def _skin(self) -> float | str:
-        """m, of the first wall."""
+        """m, the skin of the first wall."""
         return self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
 
     def _bullets(self) -> bool:
-        """Whether what moves is a bullet."""
+        """Whether the moving disks are bullets."""
         return any(body.bullet for body in self.bodies)
 
     def versions(self) -> dict[str, str]:
@@ -326,7 +326,7 @@ class Box2DEngine:
 
 
 def fastest(scene: Scene) -> float:
-    """m/s, of the fastest disk if it falls through the whole height of the scene."""
+    """m/s, upper bound: the fastest disk after a fall through the whole height of the scene."""
     points = np.concatenate([scene.position, scene.walls.reshape(-1, 2)])
     fall = np.ptp(points @ scene.gravity)
     return float(np.sqrt((scene.velocity**2).sum(axis=1).max() + 2 * fall))
@@ -341,7 +341,7 @@ class Listener(Box2D.b2ContactListener):  # type: ignore[misc]
         self.log: list[tuple[int, int, int, float]] = []
 
     def PostSolve(self, contact: Any, impulse: Any) -> None:
-        """Called once a step for every touching pair, with an impulse or not."""
+        """Called once per step for every touching pair, with or without an impulse."""
         J = impulse.normalImpulses[0]
         if J > 0.0:
             i, j = contact.fixtureA.body.userData, contact.fixtureB.body.userData

@@ -85,12 +85,12 @@ SEARCHED = Searched(
     },
 )
 
-# it is global to the process: threads take turns, or worlds would be made in another's unit
+# it is global to the process: threads take turns, so that each world gets its own unit
 LENGTH_UNIT = Lock()
 
 
 def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
-    """A method that sets the length unit and needs it until it returns."""
+    """Decorator for a method that sets the length unit and needs it until it returns."""
 
     @wraps(method)
     def alone(*arguments: Any, **named: Any) -> None:
@@ -101,15 +101,15 @@ def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
 
 
 class Box2DV3:
-    """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default;
-    so is the friction of a scene that has none.
+    """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default,
+    also the friction of a scene that states none.
 
     `matched`: no sleep, continuous collision, restitution threshold or speed cap. The
-    length unit is half of the smallest radius: slop and speculative margin are shares of it, and a
-    larger margin foresees more collisions, but this is the largest without a spurious collision
-    where two disks pass at 1 % of a radius. Contacts are as stiff as the engine lets them be, an
-    eighth of the substeps a second. The values are `MATCHED`, by `crosscheck tune`. The cap on
-    spins cannot be lifted: a scene that reaches it is refused.
+    length unit is half of the smallest radius: slop and speculative margin are fractions of it. A
+    larger margin predicts more collisions, but this is the largest without a spurious collision if
+    two disks pass at 1 % of a radius. Contacts have the largest stiffness that the engine allows,
+    an eighth of the substep rate. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
+    cannot be lifted: a scene that reaches it is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -185,8 +185,8 @@ class Box2DV3:
         return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
 
     def _friction(self) -> float | None:
-        """Of every shape, whose root of the product is that of a pair; None: the engine's own
-        default, as somebody leaves it who wants no friction and does not think of it."""
+        """The friction of every shape (that of a pair is the root of the product); None: the
+        engine's default, as a user without friction in mind leaves it."""
         if self.asked_friction is not None:
             return self.asked_friction
         stated = self.matched or self.scene.friction > 0
@@ -237,7 +237,7 @@ class Box2DV3:
     def step(self, count: int = 1) -> None:
         """`count` calls of `step`; collision events live for one step, so they are collected after
         each."""
-        pyb2d3.set_length_units_per_meter(self.unit)  # another world may have set its own since
+        pyb2d3.set_length_units_per_meter(self.unit)  # another world may have changed it since
         for _ in range(count):
             self.world.step(self.dt, self.substeps)
             if self.listening:
@@ -265,7 +265,7 @@ class Box2DV3:
             self.bodies[i].set_transform(vector(over), self.bodies[i].rotation)
 
     def read(self) -> State:
-        """All bodies at once, as float32; the engine keeps (cos, sin), so the angle is unwound from
+        """All bodies at once, as float32. The engine keeps (cos, sin), so the angle is unwound from
         read to read."""
         n, every = self.scene.n, self.every
         position = every.get_positions(np.empty((n, 2), np.float32)).astype(float)
@@ -276,7 +276,7 @@ class Box2DV3:
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:
-        """The angles nearest to where the mean spin since the last read would have brought them."""
+        """The angles nearest to the prediction from the mean spin since the last read."""
         turn = self.every.get_rotations(np.empty((self.scene.n, 2), np.float32)).tolist()
         raw = np.array([atan2(s, c) for c, s in turn])
         expected = self.angle + (self.spin + spin) / 2 * (self.steps - self.seen) * self.dt
@@ -285,11 +285,11 @@ class Box2DV3:
         return self.angle.copy()
 
     def collisions(self) -> list[ContactImpulse]:
-        """From the collision events, which tell the approach speed but no impulse."""
+        """From the collision events, which report the approach speed but no impulse."""
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Resolved values are read back where the binding lets one read them."""
+        """Resolved values are read back if the binding allows it."""
         matched, world, options = self.matched, self.world, self.options
         return {
             "length unit in m": (self.unit if matched else None, self.unit_found),

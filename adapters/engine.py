@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-if TYPE_CHECKING:  # numpy loads for 0.2 s, and the process of an Exercise.js does without
+if TYPE_CHECKING:  # importing numpy takes 0.2 s, and the process of an Exercise.js does not need it
     from scenarios.model import Array, Scene, State
 
 # In `settings`, in place of the resolved value, where the engine does not report it:
@@ -15,7 +15,7 @@ NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
 
 
 class Unsupported(Exception):
-    """An engine cannot model this scene; str() is the reason. It must not approximate the scene."""
+    """An engine cannot model this scene and must not approximate it; str() is the reason."""
 
 
 class NotStarted(Exception):
@@ -37,10 +37,10 @@ class ContactImpulse(NamedTuple):
 class Engine(Protocol):
     """The protocol: `load` once, then `step` and `read` any number of times, then `close`."""
 
-    # Whether collisions are logged; set before `load`. Off for timings: it may outlast a step.
+    # Whether collisions are recorded; set before `load`. Off for timings: it may outlast a step.
     listening: bool = True
-    # s of the time of `step` that the adapter spent on `Scene.wrap`, where the engine itself has no
-    # such edges. A measurement sets it to 0 first.
+    # s of `step` that the adapter spent on `Scene.wrap`, because the engine itself has no such
+    # edges. Measurements set it to 0 first.
     wrapping: float = 0.0
 
     def load(self, scene: Scene, dt: float) -> None:
@@ -54,7 +54,7 @@ class Engine(Protocol):
         """Advance `count` steps; the only call that is timed."""
 
     def read(self) -> State:
-        """Float64 copies, all of the same instant, in the scene's order, static disks included."""
+        """Float64 copies, all at the same instant, in the scene's order, including static disks."""
 
     def collisions(self) -> list[ContactImpulse]:
         """Every impulse of a contact since `load`, in order of steps."""

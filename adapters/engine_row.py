@@ -1,5 +1,5 @@
-"""What an engine's row says of it: how to make it, and all that the rest of the program needs to
-know."""
+"""The row of an engine: how to make it, and everything else that the program needs to know about
+it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class Mark(NamedTuple):
     """How an engine is drawn: hex colour on a light and on a dark page, a shape of `PATHS` of
     reports/page/style.py.
 
-    Against the page each colour has more than 3 : 1, which WCAG 2 asks of graphics, and any two
-    engines' colours are 0.06 or more apart in OKLab, also as seen with protan-, deuteran- and
-    tritanopia (matrices of Machado et al., IEEE TVCG 15, 1291, 2009). Where colour is not seen at
-    all, the shape tells them apart.
+    Each colour has a contrast above 3 : 1 to the page, as WCAG 2 requires for graphics. Any two
+    colours differ by at least 0.06 in OKLab, also with protan-, deuteran- and tritanopia (matrices
+    of Machado et al., IEEE TVCG 15, 1291, 2009). Without colour the shape distinguishes the
+    engines.
     """
 
     light: str
@@ -29,12 +29,12 @@ class Mark(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What an engine lets one spend time on instead of smaller steps.
+    """A parameter with which an engine spends time on accuracy instead of smaller steps.
 
     Attributes:
         what: iterations or substeps.
-        setting: the parameter of `EngineRow.make` that holds their number.
-        values: those that are measured, from cheap to dear.
+        setting: the parameter of `EngineRow.make` with their number.
+        values: the measured values, from cheap to expensive.
     """
 
     what: str
@@ -43,10 +43,10 @@ class Work(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """An engine with something changed, to test a reason by: parameters of `EngineRow.make`, what
-    that is, in a few words.
+    """A changed engine, with which a cause is tested: parameters of `EngineRow.make`, and the
+    change in a few words.
 
-    loaded: changes the engine once a scene is in it.
+    loaded: changes the engine after `load`.
     """
 
     settings: Mapping[str, Any]
@@ -56,40 +56,40 @@ class Variant(NamedTuple):
 
 @dataclass(frozen=True)
 class EngineRow:
-    """How to make an engine and all that the rest of the program needs to know of it.
+    """How to make an engine, and everything else that the program needs to know about it.
 
     Attributes:
-        make: a new engine; imports its library only now. Takes the parameters that `options`,
-            `work` and `variants` name.
+        make: makes a new engine; imports its library when called. Takes the parameters that
+            `options`, `work` and `variants` name.
         summary: one line for `crosscheck list`.
         alpha: free flight advances by v dt + alpha a dt2 a step: 1/2 is exact, the offset after t
-            is (alpha - 1/2) a dt t. A property of the order of updates, not an error of the
-            adapter. NaN: of an engine's own file, in which any order of updates is right.
-        rounding: the relative rounding of the numbers the engine keeps.
-        leaves_state: what it played before changes what it plays next, so that each cell needs a
-            process of its own; true of none in `ENGINES` (a test plays each after others, bit for
-            bit).
-        distributions: the installed packages, as pip names them, whose versions decide its numbers.
-        mark: how it is drawn; None: a colour and a shape that no other engine has.
-        work: what it lets one spend time on; None: nothing.
-        options: one thing more or less than the engine has, in a few words -> parameters of `make`;
-            what each costs and breaks is measured by `crosscheck speed`.
-        variants: name, which goes behind a "+" -> what `crosscheck stability` plays besides to test
-            a reason.
-        searched: reads what `crosscheck tune` searches; None: nothing.
-        bits_of: the engine whose numbers it gives to the last bit, at another cost, in every scene
-            without friction; where only the numbers count, it does not play beside that one unless
-            asked for. "": of none.
+            is (alpha - 1/2) a dt t. This follows from the order of updates; it is not an error of
+            the adapter. NaN for a user's engine file, in which any order is right.
+        rounding: the relative rounding of the engine's numbers.
+        leaves_state: whether an earlier scene changes the next results, so that each cell needs a
+            new process; False for all of `ENGINES` (a test plays each after others, bit for bit).
+        distributions: the installed packages, by their names in pip, whose versions affect its
+            numbers.
+        mark: how it is drawn; None: a colour and a shape are chosen that no other engine has.
+        work: its `Work`; None if it has none.
+        options: a change of one feature, in a few words -> parameters of `make`; `crosscheck speed`
+            measures what it costs and breaks.
+        variants: name, used after a "+" -> a changed engine with which `crosscheck stability` tests
+            a cause.
+        searched: returns the settings that `crosscheck tune` searches; None: there are none.
+        bits_of: another engine whose numbers it reproduces to the last bit, at another cost, in
+            every scene without friction; if only the numbers count, it plays beside that engine
+            only on request. "": there is none.
         adds_friction: it plays scenes with friction, which that engine refuses; without friction it
-            is never played beside that one.
-        orders_collisions: it takes each collision at its own time, not at the end of a step; it is
-            ranked apart from the engines.
-        departs: a probe of the protocol that it misses by its own physics, not by its adapter ->
+            never plays beside it.
+        orders_collisions: it uses time-of-impact ordering instead of end-of-step detection; it is
+            ranked separately.
+        departs: a probe of the protocol that it fails because of its physics, not its adapter ->
             the cause.
-        package: the npm package, pinned in adapters/javascript/package.json, that it plays by and
-            that is fetched once; "": it needs none.
-        source: what distinguishes a solver's file that was saved from its earlier text; "" for an
-            engine of this program.
+        package: the npm package, pinned in adapters/javascript/package.json, that it uses and that
+            is fetched once; "": it needs none.
+        source: a hash of a solver's file, which changes when the file is saved with another text;
+            "" for an engine of this program.
         exercise: it is a solver's file with the functions of the exercise, which `crosscheck check`
             judges.
     """

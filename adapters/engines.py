@@ -106,12 +106,12 @@ def _javascript(name: str, profile: str, **settings: Any) -> Engine:
 
 
 def _what_moves_is_a_bullet(engine: Any) -> None:
-    """Of both Box2Ds: of the disks that move; a bullet sees no other bullet in 3.1."""
+    """For both Box2Ds: make the moving disks bullets; in 3.1 bullets do not detect each other."""
     for body, velocity in zip(engine.bodies, engine.scene.velocity):
         body.bullet = bool(velocity.any())
 
 
-# What all profiles of an engine have in common.
+# The fields that all profiles of an engine share.
 _Reference = partial(EngineRow, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
 _Pymunk = partial(
     EngineRow,
@@ -276,15 +276,15 @@ ENGINES: dict[str, EngineRow] = {
     ),
 }
 
-# whose numbers differ from each other's in scenes without friction
+# engines whose numbers differ from each other in scenes without friction
 DISTINCT = {name: row for name, row in ENGINES.items() if not row.bits_of}
-# who plays where no engine is asked for: those, and who differs from them where there is friction
+# the engines that play by default: those, and the ones that differ from them with friction
 UNASKED = {name: row for name, row in ENGINES.items() if name in DISTINCT or row.adds_friction}
 
-# Of the velocities of matter, which it keeps as the difference of two positions: 5 m hold it to
+# Rounding of matter's velocities, which are differences of two positions: at 5 m they are known to
 # 1e-15 m, of a path in a step of some 1e-4 m.
 VERLET = 2.0**-36
-# Engines of npm packages, which the extra `js` fetches once: they play where they are asked for.
+# Engines in npm packages, which the extra `js` fetches once; they play on request.
 FETCHED: dict[str, EngineRow] = {
     "planck:shipped": _Planck(
         partial(_javascript, "planck", "shipped"),
@@ -328,15 +328,15 @@ FETCHED: dict[str, EngineRow] = {
     ),
 }
 
-OWN = ":own"  # the profile of a solver's file, whose path is its engine
+OWN = ":own"  # the profile of a solver's file; its engine is the path
 
 
 _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were when the command began
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: of `ENGINES`, of `FETCHED`, or of a solver's file as `PATH:own`, which
-    is read once.
+    """The row of an engine: from `ENGINES`, from `FETCHED`, or for a solver's file `PATH:own`,
+    which is read once.
 
     Raises:
         KeyError: it is neither.
@@ -350,8 +350,8 @@ def row_of(name: str) -> EngineRow:
 
 
 def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
-    """The engines of `rows` but, in a scene without friction, those that only add friction to
-    another of them."""
+    """The engines of `rows`; in a scene without friction without those that only add friction to
+    another one."""
     return [
         name
         for name, row in rows.items()
@@ -360,7 +360,7 @@ def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
 
 
 def read_row(name: str) -> EngineRow:
-    """The row of a solver's file, `PATH:own`, as it is now; `row_of` gives it from now on. Raises
+    """The row of a solver's file, `PATH:own`, read again; later calls of `row_of` return it. Raises
     `NotASolver`."""
     from adapters.own_engine.engine import row_of_file
 
@@ -369,5 +369,5 @@ def read_row(name: str) -> EngineRow:
 
 
 def changed(name: str, **settings: Any) -> Engine:
-    """The engine of a row of `ENGINES` with these parameters, as its row or its file names them."""
+    """The engine of a row of `ENGINES` with these parameters of its `make`."""
     return ENGINES[name].make(**settings)

@@ -1,4 +1,4 @@
-"""The collisions of an engine: where each contact begins, of one that reports an impulse in every
+"""The collisions of an engine: the starts of its contacts, if it reports an impulse in every
 step."""
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from scenarios.model import NO_COLLISIONS, Collisions, Scene, frozen
 
 
 def collisions_of(engine: Engine, scene: Scene, dt: float) -> Collisions:
-    """Those of an engine that may have failed: none if it cannot say any more."""
+    """The collisions of an engine; none if it has failed and cannot report them."""
     try:
         impulses = engine.collisions()
-    except Exception:  # the run already carries the reason
+    except Exception:  # the run already has the reason
         return NO_COLLISIONS
     return first_collisions(impulses, dt, weight_impulse(scene, dt))
 
 
 def weight_impulse(scene: Scene, dt: float) -> float:
-    """N s, the largest impulse that the weight of everything can give a contact during one step."""
+    """N s, the largest impulse of a contact in one step by the weight of all disks."""
     moving = scene.mass[~scene.static].sum()
     return float(2 * moving * np.linalg.norm(scene.gravity) * dt)
 
@@ -29,12 +29,12 @@ def weight_impulse(scene: Scene, dt: float) -> float:
 def first_collisions(
     collisions: Sequence[ContactImpulse], dt: float, weight: float = 0.0
 ) -> Collisions:
-    """One collision where the impulses of a pair begin; its time is the end of the step.
+    """One collision for each start of a pair's impulses; its time is the end of the step.
 
-    An impulse in the step after another of the same pair continues it if it is no larger than
-    `weight` N s, or if the engine does not report how large it is: else it is a collision of its
-    own. Impulses of less than a millionth of the pair's strongest are rounding, and left out; their
-    size counts, as the impulses of a faulty solver may have the wrong sign.
+    An impulse in the step after another of the same pair continues it if it is at most `weight` N
+    s, or if the engine does not report its size; else it is a new collision. Impulses of less than
+    a millionth of the pair's strongest are rounding, and left out; their magnitude counts, because
+    the impulses of a faulty solver may have the wrong sign.
     """
     if not collisions:
         return NO_COLLISIONS

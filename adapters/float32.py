@@ -1,4 +1,4 @@
-"""What the two Box2Ds need because they compute in float32."""
+"""Checks for both Box2Ds, which compute in float32."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def must_fit(**quantities: Array) -> None:
 
 
 def must_not_be_cut(what: str, values: Array, cap: float, unit: str) -> None:
-    """Raise `Unsupported` where the engine has cut `values` to its cap: a scene is played as it is
-    or not at all."""
-    # float32 leaves what was cut a little below the cap
+    """Raise `Unsupported` if the engine has cut `values` to its cap: a scene is played as it is or
+    not at all."""
+    # in float32 a cut value is a little below the cap
     if np.abs(values).max() > cap * (1 - 1e-5):
         raise Unsupported(
             f"a disk reaches a {what} of {cap:g} {unit}, the most that Box2D allows at this dt"

@@ -1,4 +1,4 @@
-"""The one refusal of all engines that know no friction."""
+"""The refusal of all engines that do not model friction."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ REFUSAL = "does not model friction"
 
 
 class Frictionless(Unsupported):
-    """The engine knows no friction, which no engine need know."""
+    """The engine does not model friction, and need not."""
 
 
 def must_be_frictionless(scene: Scene, who: str) -> None:

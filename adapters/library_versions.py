@@ -1,4 +1,4 @@
-"""The version of an installed library, read from the disk once: every run asks for it."""
+"""The version of an installed library, read from the disk once because every run needs it."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ BOX2D = "box2d-py" if sys.platform == "linux" else "box2d"
 
 @cache
 def version(library: str) -> str:
-    """Of a distribution by its name; raises `PackageNotFoundError` if it is not installed."""
+    """The version of a distribution; raises `PackageNotFoundError` if it is not installed."""
     return metadata.version(library)

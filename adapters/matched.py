@@ -1,4 +1,4 @@
-"""What is searched for a matched profile by `crosscheck tune`, and the table of what came of it."""
+"""The settings of matched profiles that `crosscheck tune` searches, and the table of results."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ GEOMETRY = (
 
 @dataclass(frozen=True)
 class Searched:
-    """The public settings of an engine, of which `crosscheck tune` searches those of the matched
-    profile.
+    """The public settings of an engine that `crosscheck tune` searches for its matched profile.
 
     Attributes:
-        chosen: setting -> its value in the matched profile now; a test holds it to the table.
-        settings: setting -> (the values that are tried beside the chosen one, what it does and in
-            which unit it is).
-        pairs: two settings that act on the same thing, tried together: names, values of the first,
-            of the second.
-        left_alone: a setting that is not chosen by a search -> why.
+        chosen: setting -> its present value in the matched profile; a test compares it with the
+            table.
+        settings: setting -> (the values tried besides the chosen one, meaning and unit).
+        pairs: two settings with related effects, tried together: names, values of the first, of the
+            second.
+        left_alone: a setting that is not searched -> why.
     """
 
     chosen: Mapping[str, Any]
@@ -42,7 +41,7 @@ def searched(path: Path = TABLE) -> list[dict[str, str]]:
 
 
 def chosen(engine: str, path: Path = TABLE) -> dict[str, str]:
-    """Setting -> its value as the table has it, of what was searched for an engine."""
+    """Setting -> its value in the table, for the searched settings of an engine."""
     return {
         row["setting"]: row["value"]
         for row in searched(path)

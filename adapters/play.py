@@ -13,17 +13,17 @@ from adapters.run import Run, gather, run_of, substeps_of
 from adapters.runaway import RUNAWAY, fault_of, reach
 from scenarios.model import Scenario, State
 
-Watch = Callable[[State], None]  # called with every sample that is no fault
+Watch = Callable[[State], None]  # called with every valid sample
 
 
 def unwatched(state: State) -> None:
-    """The `Watch` of a run that nobody watches: do nothing."""
+    """The default `Watch`: do nothing."""
 
 
 def play_once(
     make: Callable[[], Engine], name: str, scenario: Scenario, dt: float, watch: Watch = unwatched
 ) -> Run:
-    """`play` on a new engine from `make`, which is closed at the end, also after an exception.
+    """Run `play` on a new engine from `make`, which is always closed at the end.
 
     If its library cannot be imported, the run is `unsupported`. Raises what `play` raises.
     """
@@ -39,9 +39,9 @@ def play_once(
 def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch = unwatched) -> Run:
     """Play `scenario` in steps of `dt` s; `name` is `engine:profile`.
 
-    A refusal, an exception or a disk that runs away becomes the status of the run, and its
-    trajectory holds the samples before it. Raises `ValueError` if dt does not divide the sample
-    interval, and `MemoryError` and `NotStarted`, which are no fault of the engine.
+    A refusal, an exception or a runaway disk becomes the status of the run; its trajectory has the
+    samples before that. Raises `ValueError` if dt does not divide the sample interval, and lets
+    `MemoryError` and `NotStarted` pass, which are not the engine's fault.
     """
     substeps = substeps_of(scenario, dt)
     run, states, seconds = run_of(name, scenario, dt), list[State](), 0.0
@@ -64,7 +64,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
         run = replace(run, status="unsupported", reason=str(refusal))
     except (MemoryError, NotStarted):
         raise
-    except Exception as error:  # an engine may raise anything; the run says what
+    except Exception as error:  # an engine may raise anything; the run records it
         status, reason = getattr(error, "status", "error"), f"{type(error).__name__}: {error}"
         run = replace(run, status=status, reason=reason)
     if states:

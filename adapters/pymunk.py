@@ -21,7 +21,7 @@ FIELDS = (
     | batch.BodyFields.ANGULAR_VELOCITY
 )
 
-OF_SHAPES = ("elasticity", "friction")  # the engine multiplies those of a pair
+OF_SHAPES = ("elasticity", "friction")  # the engine multiplies the two of a pair
 DEFAULT_BIAS = (1 - 0.1) ** 60
 MATCHED: dict[str, Any] = {
     "iterations": 10,
@@ -71,16 +71,16 @@ class Pymunk:
     """`shipped`: restitution and friction go into every shape, all else is pymunk's default.
 
     `matched`: the roots of both, because pymunk multiplies the two of a pair; and `MATCHED`, by
-    `crosscheck tune`: ten iterations, because more cost time and are no nearer; hardly any slop,
-    because the default 0.1 is a length in the scene's units; contacts are forgotten as soon as they
-    part, because one that touches again within three steps inherits an impulse that it is not given
-    again, but that is reported, and may be taken back; at e = 1 no position correction, because it
-    adds energy.
+    `crosscheck tune`: ten iterations, because more cost time and are not more accurate; nearly no
+    slop, because the default 0.1 is a length in the scene's units; contacts are forgotten when they
+    separate, because one that touches again within three steps inherits an impulse that is not
+    applied again, but is reported and may be taken back; at e = 1 no position correction, because
+    it adds energy.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives
     every disk an infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad
-    phase; a key of `MATCHED` is the matched profile's choice, any other of `settings` an attribute
-    of the space.
+    phase; a key of `MATCHED` replaces the value of the matched profile, any other of `settings` is
+    an attribute of the space.
     """
 
     listening, wrapping = True, 0.0
@@ -179,7 +179,7 @@ class Pymunk:
             body.torque += torque
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `space.step`; where the scene wraps, disks that leave are set onto the
+        """`count` calls of `space.step`; if the scene wraps, disks that leave are set onto the
         opposite edge."""
         for _ in range(count):
             self.space.step(self.dt)
@@ -207,7 +207,7 @@ class Pymunk:
         return np.frombuffer(self.buffer.float_buf()).reshape(-1, 6)[: len(self.moving)]
 
     def read(self) -> State:
-        """One bulk read into a copy of the start, where what is static stays."""
+        """One bulk read into a copy of the start state; static disks keep theirs."""
         rows = self.start.copy()
         rows[self.moving] = self._rows()
         return State(rows[:, :2], rows[:, 3:5], rows[:, 2], rows[:, 5])

@@ -17,7 +17,7 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_
 from scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
-METHODS = {  # of the variants by their module
+METHODS = {  # variant -> its module
     "exercise": {"integrator": "symplectic Euler"},
     "neighbours": {"integrator": "symplectic Euler"},
     "coulomb": {"integrator": "symplectic Euler"},
@@ -35,8 +35,7 @@ class Reference:
     """Plays one variant of `reference_impl`, or any module with the `advance` of `exercise`.
 
     `options` are fields of `World` that the exercise leaves free: split, approaching_only.
-    `precision` is what the disks are kept in: with numpy's float32 the same kernel is compiled once
-    more.
+    `precision` is the dtype of the disks: for numpy's float32 the kernel is compiled again.
     """
 
     listening, wrapping = True, 0.0  # its own step wraps
@@ -77,11 +76,11 @@ class Reference:
         self.disks, self.world = disks_of(kept), world_of(laws)
         self.advance = self._entered(kept, laws)
         self.forced = False
-        self.advance(0)  # compiles, if nobody has yet
+        self.advance(0)  # compiles, unless it is compiled already
 
     def _entered(self, disks: Array, world: Array) -> Callable[[int], Iterable[Any]]:
-        """What takes so many steps and returns the collisions, by the two blocks; what somebody
-        else has written may have no such quick way in."""
+        """A function that takes the number of steps and returns the collisions; a user's module may
+        lack the fast entry point."""
         if self.variant.__name__ in ADVANCE:
             return partial(ADVANCE[self.variant.__name__], disks, world)
         return partial(self.variant.advance, self.disks, self.world, self.dt)
@@ -121,7 +120,7 @@ class Reference:
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The variant's method, and what it leaves free; the rest is the scene."""
+        """The variant's method and its options; everything else is in the scene."""
         method = {setting: (None, value) for setting, value in METHODS.get(self.name, {}).items()}
         if self.name == "ordered":
             return method
@@ -134,8 +133,8 @@ class Reference:
         }
 
     def versions(self) -> dict[str, str]:
-        """The compiler decides the last bit."""
+        """Versions of the compiler, which affects the last bit."""
         return {"numba": version("numba"), "numpy": version("numpy")}
 
     def close(self) -> None:
-        """Nothing is held outside Python."""
+        """Does nothing: no resources are held outside Python."""

@@ -23,8 +23,8 @@ class Run:
     dt: float  # s
     status: str = "ok"  # one of `STATUSES`
     reason: str = ""  # why the status is not "ok"
-    trajectory: Trajectory | None = None  # up to where it failed; None if nothing was played
-    seconds: float = 0.0  # wall time inside `step`, with the collision log on; no benchmark
+    trajectory: Trajectory | None = None  # up to a failure; None if nothing was played
+    seconds: float = 0.0  # wall time inside `step` while collisions are recorded; not a benchmark
     settings: dict[str, tuple[Any, Any]] = field(default_factory=dict)  # (asked for, resolved)
     versions: dict[str, str] = field(default_factory=dict)  # library -> version
 
@@ -35,7 +35,7 @@ class Run:
 
     @property
     def silent(self) -> bool:
-        """Whether the engine reports no collisions, as its settings say."""
+        """Whether the engine reports no collisions, according to its settings."""
         return bool(self.settings.get("collisions", (None, None))[1] == SILENT)
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a state that no engine can be played on from."""
+"""Finds states from which an engine cannot go on."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from scenarios.model import Scenario, State
 
-# times as far as anything can fly in a scene: a disk beyond that has been thrown by the engine
+# times the largest distance of free flight: a disk farther out was thrown by the engine
 RUNAWAY = 1e3
 
 
 def reach(scenario: Scenario) -> float:
-    """m from the origin, no less than any disk can get in free flight under gravity and thrust."""
+    """m from the origin, upper bound for free flight under gravity and thrust."""
     scene, t = scenario.scene, scenario.duration
     thrust = sum(float(np.linalg.norm(one.force)) for one in scenario.thrusts) / scene.mass.min()
     start = max(
@@ -25,9 +25,8 @@ def reach(scenario: Scenario) -> float:
 
 
 def fault_of(state: State, farthest: float) -> str:
-    """What is wrong with a state that cannot be gone on from, or ""; `farthest` in m from the
-    origin."""
-    # Asked after every sample, so sums of squares are asked first: they are finite only if every
+    """Why a run cannot continue from a state, or ""; `farthest` in m from the origin."""
+    # Called after every sample, so sums of squares are tested first: they are finite only if every
     # number is.
     others = state.velocity, state.angle, state.angular_velocity
     if (

@@ -1,11 +1,9 @@
-"""Keeps modules that only lie about from being imported: of the current folder, and of the one that
-this program is in.
+"""Prevents the import of stray modules from the current folder and from the folder of this program.
 
-What lies where a command is started is no part of it: a student's random.py would be run in the
-place of Python's own. Nor is a scipy.py beside README.md, where people are reported to stand: an
-installation that can be edited puts that folder on the path, for the sake of four packages. Those
-alone are found there. A sitecustomize.py there is run all the
-same: Python does that by itself, before anything of this program.
+A student's random.py in the current folder would replace Python's own. A scipy.py beside README.md
+would be found, too, because an editable installation puts that folder on the path for the sake of
+four packages. Only these four are found there. A sitecustomize.py is still run: Python imports it
+before this program starts.
 """
 
 # and nothing else than what Python has imported before such a folder was on its path, not even
@@ -19,37 +17,37 @@ if TYPE_CHECKING:
 
 PROGRAM = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PACKAGES = ("adapters", "reference_impl", "reports", "scenarios")
-TESTS = "tests"  # of which a worker takes engines, where those who start it are tests
+TESTS = "tests"  # workers load engines from it if tests start them
 
 
 class OwnPackages:
-    """Finds the packages of this program where it lies, and nothing else that lies there."""
+    """Finds the packages of this program in its folder, and nothing else there."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        from importlib.machinery import PathFinder  # now, as it would be asked for itself
+        from importlib.machinery import PathFinder  # now: later this finder would be asked
 
         self.names, self.finder = names, PathFinder
 
     def find_spec(
         self, name: str, _path: object = None, _target: object = None
     ) -> "ModuleSpec | None":
-        """As `sys.meta_path` asks for it."""
+        """Called through `sys.meta_path`."""
         return self.finder.find_spec(name, [PROGRAM]) if name in self.names else None
 
 
 def keep_path_safe(names: tuple[str, ...] = PACKAGES) -> None:
-    """Take the current folder and that of the program off `sys.path`; the packages of these names
-    are still found.
+    """Remove the current folder and that of the program from `sys.path`; the packages `names` are
+    still found.
 
-    Python has put the current one there for `python -m`, and for an empty entry of PYTHONPATH, as
-    in `$PYTHONPATH:/else` where nothing was set before. A folder of installed packages, or of
-    Python's own, stays where it was last.
+    Python adds the current folder for `python -m`, and for an empty entry of PYTHONPATH, as in
+    `$PYTHONPATH:/else` if PYTHONPATH was not set. A folder of installed packages, or of Python's
+    own, stays at its last position.
     """
     unsafe = {os.path.realpath(PROGRAM)}
     try:  # noqa: SIM105 - a foreign `contextlib` might be found
         unsafe.add(os.path.realpath(os.getcwd()))
     except OSError:
-        pass  # nothing lies in a folder that is gone
+        pass  # a deleted folder contains nothing
     installed, path = installed_folders(), sys.path[:]
     real = [os.path.realpath(folder) for folder in path]
     sys.path[:] = [
@@ -71,13 +69,12 @@ def installed_folders() -> set[str]:
         name.startswith("crosscheck2d-") and name.endswith(".dist-info")
         for name in os.listdir(PROGRAM)
     ):
-        folders.append(PROGRAM)  # by `pip install --target`, say
+        folders.append(PROGRAM)  # for example by `pip install --target`
     return {os.path.realpath(folder) for folder in folders}
 
 
 def python(statements: str) -> list[str]:
-    """The words that start this Python with as safe a path, which does these statements of this
-    program."""
+    """The command line that runs these statements in a new Python with an equally safe path."""
     names = (*PACKAGES, TESTS) if TESTS in sys.modules else PACKAGES
     begin = (
         f"import sys; sys.path.insert(0, {PROGRAM!r}); from adapters.safe_path import"
@@ -87,7 +84,7 @@ def python(statements: str) -> list[str]:
 
 
 def path_of_this() -> str:
-    """PYTHONPATH of a process that is to find what this one finds."""
+    """PYTHONPATH for a process that finds the same modules as this one."""
     program = os.path.realpath(PROGRAM)
     return os.pathsep.join(
         folder for folder in sys.path if folder and os.path.realpath(folder) != program

@@ -1,8 +1,7 @@
-"""What operating systems do differently: limits of a process, its end, a lock, timers.
+"""Functions that differ between operating systems: limits and end of a process, locks, timers.
 
-On Linux the kernel does it; on macOS and Windows a thread of the limited process does. `KERNEL`
-says which of the two it is. With CROSSCHECK_SYSTEM=portable the second way is taken on Linux, too,
-so that the tests can play it.
+On Linux the kernel implements them; on macOS and Windows a thread of the process does. `KERNEL`
+says which. CROSSCHECK_SYSTEM=portable selects the second way on Linux, too, for tests.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ KILLED, ABORTED, TRAPPED, TERMINATED = (
     -getattr(signal, name, 0) or None for name in ("SIGKILL", "SIGABRT", "SIGTRAP", "SIGTERM")
 )
 """The exit statuses of processes that these signals ended; None where there is no such signal."""
-OUT_OF_MEMORY = 77  # the exit status of a process that its thread ended
+OUT_OF_MEMORY = 77  # the exit status of a process ended by its own thread
 PIECE = 1 << 20  # bytes
 BINARY: int = getattr(os, "O_BINARY", 0)  # without it Windows writes \r\n for \n
-LOOK = 0.1  # s between two looks of a thread that watches
+LOOK = 0.1  # s between two checks of a watching thread
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
-# comes again until a command has ended; on Windows, which has no alarm, as Ctrl-C does
+# repeated until a command has ended; on Windows, which has no alarm, sent as Ctrl-C
 REPEATED = signal.SIGALRM if ALARMS else signal.SIGINT
-# where in a file Windows locks a byte: behind all that is written, so that others may read
+# the byte that Windows locks: beyond the end of the file, so that others may read
 LOCKED = 2**40
 
 _repeating = threading.Event()
@@ -44,13 +43,13 @@ if KERNEL:
 
 
 def limit_memory(most: int) -> None:
-    """From now on this process has at most `most` bytes of data.
+    """Limit this process to `most` bytes of data.
 
     The kernel refuses more (RLIMIT_DATA; Linux counts private mappings), so that Python raises
-    `MemoryError`. Else the process ends with `OUT_OF_MEMORY` once more than that is resident.
+    `MemoryError`. On other systems the process ends with `OUT_OF_MEMORY` when more is resident.
     """
     if KERNEL:
-        _, allowed = resource.getrlimit(resource.RLIMIT_DATA)  # which nobody but root may raise
+        _, allowed = resource.getrlimit(resource.RLIMIT_DATA)  # only root may raise it
         most = most if allowed == resource.RLIM_INFINITY else min(most, allowed)
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     else:
@@ -65,13 +64,13 @@ def limit_memory(most: int) -> None:
 
 
 def write_no_core() -> None:
-    """A crash of this process leaves no image of its memory."""
+    """Switch off core dumps of this process."""
     if KERNEL:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def end_with_parent() -> None:
-    """This process ends when the one that started it has ended."""
+    """Make this process end when its parent has ended."""
     if KERNEL:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     else:
@@ -82,7 +81,7 @@ def end_with_parent() -> None:
 
 
 def watch(is_time: Callable[[], bool], status: int) -> None:
-    """A thread that ends this process, with an exit status, when `is_time`."""
+    """Start a thread that ends this process with an exit status when `is_time()`."""
 
     def look() -> None:
         while not is_time():
@@ -93,12 +92,12 @@ def watch(is_time: Callable[[], bool], status: int) -> None:
 
 
 def own_group() -> dict[str, Any]:
-    """What `subprocess.Popen` must be told of a process that `end_all` will end."""
+    """Arguments of `subprocess.Popen` for a process that `end_all` will end."""
     return {"start_new_session": True} if KERNEL else {}
 
 
 def end_all(pid: int) -> None:
-    """End a process and all that it has started; nothing if it has ended."""
+    """End a process and all its children; does nothing if it has ended."""
     if KERNEL:
         with suppress(ProcessLookupError):
             os.killpg(pid, signal.SIGKILL)
@@ -133,16 +132,16 @@ def lock(file: int) -> None:
 
 
 class Pieces:
-    """What comes out of a pipe, piece by piece."""
+    """The output of a pipe, piece by piece."""
 
     def __init__(self, pipe: IO[bytes]) -> None:
         self.pipe = pipe
-        self.read: queue.Queue[bytes] = queue.Queue(maxsize=1)  # so that the writer waits, too
+        self.read: queue.Queue[bytes] = queue.Queue(maxsize=1)  # so that the writer blocks, too
         if not KERNEL:
             threading.Thread(target=self.fetch, daemon=True).start()
 
     def next(self, seconds: float) -> bytes | None:
-        """The next piece, b"" at the end; None if there is none within so many s."""
+        """The next piece, b"" at the end; None if there is none within `seconds`."""
         if KERNEL:
             ready, _, _ = select.select([self.pipe], [], [], max(0.0, seconds))
             return os.read(self.pipe.fileno(), PIECE) if ready else None
@@ -152,7 +151,7 @@ class Pieces:
             return None
 
     def fetch(self) -> None:
-        """In a thread, for Windows has no `select` of pipes: read all there is."""
+        """In a thread, because Windows has no `select` for pipes: read everything."""
         with suppress(OSError, ValueError):  # closed
             while piece := os.read(self.pipe.fileno(), PIECE):
                 self.read.put(piece)
@@ -160,7 +159,7 @@ class Pieces:
 
 
 def most_files() -> int:
-    """How many files a process may have open, as far as is known."""
+    """The limit of open files of a process, as far as it is known."""
     return resource.getrlimit(resource.RLIMIT_NOFILE)[0] if KERNEL else sys.maxsize
 
 
@@ -168,10 +167,10 @@ def most_files() -> int:
 def stopped_after(
     seconds: float, waiting: float, stop: Callable[[], BaseException]
 ) -> Iterator[None]:
-    """Within it the main thread gets the exception that `stop` makes, after `seconds` of processor
-    time, or `waiting` s by the clock.
+    """Context in which the main thread gets the exception from `stop` after `seconds` of processor
+    time, or `waiting` s of wall time.
 
-    By signals; else from a thread, which a call into C is not stopped by.
+    By signals; on other systems by a thread, which cannot stop a call into C.
     """
     if KERNEL:
         with _timers(seconds, waiting, stop):
@@ -199,7 +198,7 @@ def stopped_after(
 
 
 def every(seconds: float) -> None:
-    """From now on the main thread gets the signal `REPEATED` every so many s; 0: no more."""
+    """Send the signal `REPEATED` to the main thread every `seconds`; 0 stops it."""
     if ALARMS:
         signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
         return
@@ -218,7 +217,8 @@ def _repeat(seconds: float, over: threading.Event) -> None:
 
 @contextmanager
 def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
-    """Within it none of these signals is handled in the main thread; one that came is, after it."""
+    """Context in which the main thread does not handle these signals; one that arrives is handled
+    after it."""
     if ALARMS:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
         try:
@@ -228,7 +228,7 @@ def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
         return
     came: list[int] = []
     if threading.current_thread() is not threading.main_thread():
-        yield  # which no signal is handled in
+        yield  # no signal is handled in a thread
         return
     handlers = {n: signal.signal(n, lambda came_in, _: came.append(came_in)) for n in numbers}
     try:
@@ -241,7 +241,7 @@ def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
 
 
 class _TimeIsUp(BaseException):
-    """What the thread raises in the main one."""
+    """Raised by the thread in the main thread."""
 
 
 @contextmanager
@@ -253,7 +253,7 @@ def _timers(seconds: float, waiting: float, stop: Callable[[], BaseException]) -
 
     timers = {
         signal.ITIMER_PROF: (signal.SIGPROF, seconds),
-        signal.ITIMER_REAL: (signal.SIGALRM, waiting),  # the clock stops what only waits
+        signal.ITIMER_REAL: (signal.SIGALRM, waiting),  # wall time stops a call that only waits
     }
     for timer, (number, after) in timers.items():
         signal.signal(number, ring)

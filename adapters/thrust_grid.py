@@ -1,5 +1,5 @@
-"""What it costs every engine that a force acts for whole steps, where a thrust starts or stops
-inside one."""
+"""The displacement, in every engine, of a thrust that starts or stops inside a step, because a
+force acts for whole steps."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import numpy as np
 
 from scenarios.model import Scenario, Thrust
 
-ROUNDING = 1e-9  # of a step: of start / dt, as in `play`
+ROUNDING = 1e-9  # of a step: rounding of start / dt, as in `advance`
 
 
 def off_grid(scenario: Scenario, dt: float) -> float:
-    """Radii by which the thrusts that start or stop inside a step of `dt` s displace a disk at
-    most; 0: none does.
+    """Radii, the largest displacement of a disk by thrusts that start or stop inside a step of `dt`
+    s; 0 if none does.
 
-    The force of such a step is lessened so that its impulse is exact, and acts over all of it. A
-    thrust F that is on for a share p of the step moves a disk of mass m by F dt2 p2 / 2m from its
-    start on, and by F dt2 (p - p2 / 2) / m up to its stop; spread over the step by F dt2 p / 2m.
-    The difference is F dt2 p (1 - p) / 2m either way, up to F dt2 / 8m. It stays, grows with every
-    later collision, and is no engine's fault. A torque turns a rim likewise. The displacements of a
-    disk are added up without regard to direction.
+    The force in such a step is reduced so that its impulse is exact, and acts during the whole
+    step. A thrust F that is on for a fraction p of the step moves a disk of mass m by F dt2 p2 / 2m
+    from its start on, and by F dt2 (p - p2 / 2) / m up to its stop; spread over the step by F dt2 p
+    / 2m. The difference is F dt2 p (1 - p) / 2m either way, up to F dt2 / 8m. It remains, grows
+    with every later collision, and is not the engine's fault. A torque displaces the rim likewise.
+    The magnitudes of a disk's displacements are added up.
     """
     shift = np.zeros(scenario.scene.n)
     for thrust in scenario.thrusts:
@@ -40,7 +40,8 @@ def spread(thrust: Thrust, duration: float, dt: float) -> float:
 
 
 def off_grid_note(scenario: Scenario) -> str:
-    """A sentence on the step sizes at which thrusts start or stop inside a step; "" if at none."""
+    """A sentence on the step sizes at which thrusts start or stop inside a step; "" if there are
+    none."""
     off = {dt: off_grid(scenario, dt) for dt in map(scenario.dt, scenario.substeps)}
     found = ", ".join(f"{radii:.2g} radii at dt = {dt:.4g} s" for dt, radii in off.items() if radii)
     if not found:

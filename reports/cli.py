@@ -56,17 +56,17 @@ Out = Annotated[
     Path,
     typer.Option(
         metavar="DIR",
-        help="Folder for the results. An earlier run there is replaced once this one is done.",
+        help="Folder for the results. An earlier run there is replaced when this one is complete.",
     ),
 ]
 Results = Annotated[
     Path,
     typer.Option(
         metavar="DIR",
-        help="Folder for the results. Earlier ones there are replaced once these are done.",
+        help="Folder for the results. Earlier results there are replaced when these are complete.",
     ),
 ]
-GoOn = Annotated[bool, typer.Option("--resume", help="Go on with an interrupted run into --out.")]
+GoOn = Annotated[bool, typer.Option("--resume", help="Continue an interrupted run into --out.")]
 OneScene = Annotated[
     str,
     typer.Argument(
@@ -83,8 +83,8 @@ Timeout = Annotated[
         max=1e6,
         metavar="S",
         help=(
-            "Time limit of each cell, which is stopped then, also inside an engine's C code; and of"
-            " each exact answer, which is cut where it has got to."
+            "Time limit of each cell, also inside an engine's C code; and of each exact answer,"
+            " which then ends earlier."
         ),
     ),
 ]
@@ -94,7 +94,7 @@ Memory = Annotated[
         min=0,
         max=10**9,
         metavar="MB",
-        help="Memory limit of a process; 0: the machine's memory shared among all.",
+        help="Memory limit of a process; 0: an equal share of the machine's memory.",
     ),
 ]
 Scheduler = Annotated[
@@ -106,8 +106,8 @@ Timings = Annotated[
         min=0,
         max=3600,
         metavar="SECONDS",
-        help="How long the timing of the engines after the run may take, twice as long with"
-        " JavaScript engines; 0: none.",
+        help="Time limit of the timing pass after the run, doubled with JavaScript engines;"
+        " 0: no timing pass.",
     ),
 ]
 Resume = Annotated[
@@ -184,7 +184,7 @@ def report(
     ] = None,
     printed: Annotated[
         bool,
-        typer.Option("--print", help="Where the page is printed, half a page for each SCENE."),
+        typer.Option("--print", help="When the page is printed, add half a page for each SCENE."),
     ] = False,
 ) -> None:
     """Write the tables and the page of a run again.
@@ -331,7 +331,7 @@ def check(
         typer.Option(
             metavar="REGEX",
             help=(
-                "What of the path is the student's id: the match, or its first group."
+                "Pattern of the student's id in the path: the match, or its first group."
                 "  [default: name of the folder or file]"
             ),
         ),

@@ -1,4 +1,4 @@
-"""All scenarios by name, in reading order, and the families under whose headings they stand."""
+"""All scenarios by name, in reading order, and their families with headings."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ RANDOM = {"falling_box", "asteroids", "gas_of_100", "frictional_box"}
 
 
 def scenario(name: str, seed: int = 0) -> Scenario:
-    """The scenario of that name, random (seed `seed`) if it is random at all.
+    """The scenario with this name; if it is random, sampled with `seed`.
 
     Raises:
         KeyError: no scenario has that name.
@@ -43,5 +43,5 @@ def scenario(name: str, seed: int = 0) -> Scenario:
 
 
 def family_of(name: str) -> str:
-    """The heading under which a scenario stands; "" if it is not of the catalogue."""
+    """The heading of a scenario; "" if it is not in the catalogue."""
     return next((heading for heading, family in FAMILIES.items() if name in family), "")

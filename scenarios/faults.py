@@ -1,7 +1,7 @@
-"""What is wrong with a scene, a thrust or a scenario: a `ValueError` that names the field, its
-value and what it must be.
+"""Checks a scene, a thrust or a scenario: a `ValueError` names the field, its value and what it
+must be.
 
-Each function takes the noun of `model.py` itself, which is not imported here: it imports this file.
+Each function takes a type of `model.py`, which is not imported here because it imports this file.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ FINITE = ("position", "velocity", "angle", "angular_velocity", "walls", "gravity
 
 
 def check_scene(scene: Any) -> None:
-    """Raise `ValueError` naming every fault: of the shapes, or if they are right, of the values."""
+    """Raise `ValueError` with every fault of the shapes, or if these are right, of the values."""
     if faults := shape_faults(scene) or [
         *size_faults(scene),
         *disk_faults(scene),
@@ -25,7 +25,7 @@ def check_scene(scene: Any) -> None:
 
 
 def shape_faults(scene: Any) -> list[str]:
-    """A line for every array that has not the shape it must have."""
+    """A line for every array with a wrong shape."""
     n = len(np.atleast_1d(scene.radius))
     shapes = {
         **dict.fromkeys(("position", "velocity"), (n, 2)),
@@ -44,7 +44,7 @@ def shape_faults(scene: Any) -> list[str]:
 
 
 def size_faults(scene: Any) -> list[str]:
-    """No disk, or a number that is not finite."""
+    """A line if there is no disk, and for every array with a number that is not finite."""
     faults = [] if scene.n else ["radius is empty, must have at least one disk"]
     return faults + [
         f"{name} holds a value that is not finite"
@@ -54,8 +54,7 @@ def size_faults(scene: Any) -> list[str]:
 
 
 def disk_faults(scene: Any) -> list[str]:
-    """A line for every radius, mass and inertia that no disk has, and every static disk that
-    moves."""
+    """A line for every invalid radius, mass and inertia, and every static disk that moves."""
     faults = []
     for i in range(scene.n):
         if not (0 < scene.radius[i] < np.inf):
@@ -70,7 +69,7 @@ def disk_faults(scene: Any) -> list[str]:
 
 
 def surrounding_faults(scene: Any) -> list[str]:
-    """A line for what is wrong with restitution, friction, walls and the wrap box."""
+    """A line for every fault of restitution, friction, walls and the wrap box."""
     faults = []
     for name, most, must in (
         ("restitution", 1.0, "from 0 to 1"),
@@ -87,7 +86,8 @@ def surrounding_faults(scene: Any) -> list[str]:
 
 
 def wrap_faults(scene: Any) -> list[str]:
-    """A line if the corners of the wrap box are not in order, else for every disk outside of it."""
+    """A line if the corners of the wrap box are not in order, else one for every disk outside of
+    it."""
     low, high = scene.wrap
     if not (low < high).all():
         corners = [low.tolist(), high.tolist()]

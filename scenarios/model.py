@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scenarios.faults import check_scenario, check_scene, check_thrust
 
 Array = NDArray[np.float64]
-DEFAULT: Any = None  # stands for the default value that the comment of the field names
+DEFAULT: Any = None  # stands for the default value in the comment of the field
 
 
 def frozen(value: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
@@ -29,7 +29,7 @@ def frozen(value: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """Disks and walls at t = 0 and the physics they obey."""
+    """Disks and walls at t = 0, and their physics."""
 
     position: Array  # (n, 2) m
     velocity: Array  # (n, 2) m/s
@@ -94,7 +94,7 @@ class Thrust:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene, how long it runs, and its exact answer where there is one."""
+    """A scene, its duration, and its exact answer if there is one."""
 
     name: str  # lower-case words, digits, `_` and `-`; says what the scene shows
     asks: str  # the question, in one sentence; the caption of its charts
@@ -147,7 +147,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """Collisions in order of time, one where a contact begins, however long it lasts."""
+    """Collisions in order of time, one for the start of each contact, however long it lasts."""
 
     t: Array  # (h,) s; for a stepping engine the end of the step that resolved the collision
     i: NDArray[np.int64]  # (h,) index of the first disk

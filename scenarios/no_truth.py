@@ -1,4 +1,4 @@
-"""The one refusal of everything that answers exactly, and the verbs that ask for an answer."""
+"""The exception for scenes without an exact answer, and the functions that request an answer."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class NoTruth(ValueError):
 
 
 def truth_at(scenario: Scenario, t: Array) -> Trajectory:
-    """The exact `Trajectory` at all the times t (k,) s, increasing; `scenario.truth(t)` gives as
-    many as are known.
+    """The exact `Trajectory` at all the times t (k,) s, increasing; `scenario.truth(t)` stops at
+    the horizon.
 
     Raises:
-        NoTruth: there is none, or none at a time beyond its horizon; says where that is and why.
+        NoTruth: there is none, or a time is beyond its horizon; gives the horizon and the reason.
     """
     if scenario.truth is None:
         raise NoTruth(scenario.without_truth)
@@ -37,7 +37,7 @@ def truth_at(scenario: Scenario, t: Array) -> Trajectory:
 
 
 def answered(scenario: Scenario) -> tuple[Scenario, Trajectory | None]:
-    """The scenario and its truth at its samples; where there is none, the scenario says why."""
+    """The scenario and its truth at its samples; if there is none, the scenario has the reason."""
     if scenario.truth is None:
         return scenario, None
     try:

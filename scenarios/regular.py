@@ -1,5 +1,4 @@
-"""Opens a file that ends: a pipe that nobody writes to would be waited for, a device may give bytes
-for ever."""
+"""Opens regular files only: reading a pipe may block, and a device may have no end."""
 
 from __future__ import annotations
 
@@ -11,7 +10,8 @@ from typing import BinaryIO
 
 
 def opened(path: str | Path) -> BinaryIO:
-    """The file, to be read as bytes; raises `OSError` if it cannot be, or is a pipe or a device."""
+    """The file, opened for reading bytes; raises `OSError` if that fails, or if it is a pipe or a
+    device."""
     file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115 - which the caller closes
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         return file
@@ -20,11 +20,11 @@ def opened(path: str | Path) -> BinaryIO:
 
 
 def all_of(path: str | Path) -> bytes:
-    """Its bytes; raises as `opened`."""
+    """All bytes of the file; raises as `opened`."""
     with opened(path) as file:
         return file.read()
 
 
 def _without_waiting(path: str, flags: int) -> int:
-    """Opens as `open` does, but does not wait for somebody to write into a pipe."""
+    """Opens as `open` does, but does not wait for a writer of a pipe."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))  # Windows has no such pipes

@@ -1,1 +1,1 @@
-"""The probes: what an engine promises, asked of it in scenes with one answer each."""
+"""The probes: small scenes, each of which tests one property that an engine must have."""

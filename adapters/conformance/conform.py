@@ -1,4 +1,4 @@
-"""The conformance suite: what is asked of every engine before a number of it is shown."""
+"""The conformance suite: probes of every engine before its numbers are shown."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ PROBES: dict[str, Probe] = CONTRACT | PHYSICS
 
 @dataclass(frozen=True)
 class Finding:
-    """What one probe found in one engine.
+    """The result of one probe of one engine.
 
     Attributes:
         engine, profile: the row of `ENGINES`, `engine:profile`.
         probe: a key of `PROBES`, or "make" for an engine that cannot be made.
         asked: the question, one plain sentence.
         got: the answer, a number in the unit of the question, or words.
-        expected: the answer of an engine that keeps to protocol and scene.
+        expected: the answer of an engine that follows protocol and scene.
         bound: how far a number may be from it.
         verdict: "keeps"; "not asked": it refuses the scene of the question, and `note` says why;
-            "departs": plays by the protocol, but other physics than the scene states; "breaks": no
+            "departs": it follows the protocol, but its physics differs from the scene; "breaks": no
             number of this engine may be trusted.
-        note: what was raised or refused, or what limits the reading.
+        note: the exception or refusal, or what limits the reading.
     """
 
     engine: str
@@ -43,17 +43,17 @@ class Finding:
 
 
 def conform(name: str, row: EngineRow) -> list[Finding]:
-    """One finding a probe, in the order of `PROBES`; only the finding "make" if the engine cannot
-    be made.
+    """One finding for each probe, in the order of `PROBES`; only the finding "make" if the engine
+    cannot be made.
 
-    Whatever an engine raises becomes a finding: a refusal (`Unsupported`) is not asked further; all
-    else misses the probe.
+    Every exception becomes a finding: a refusal (`Unsupported`) counts as not asked, any other
+    exception as a failed probe.
     """
     engine, profile = name.split(":")
     with processes_reused():
         try:
             row.make().close()
-        except Exception as error:  # a missing library, or one that fails as it starts
+        except Exception as error:  # a missing library, or one that fails to start
             return [no_answer(name, type(error).__name__, str(error))]
         return [ask(engine, profile, probe, row) for probe in PROBES]
 
@@ -82,7 +82,7 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
         verdict = "keeps" if reading.kept else missed(name, row)
     except Unsupported as refusal:
         reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "not asked"
-    except Exception as error:  # an engine may raise anything; the finding says what
+    except Exception as error:  # an engine may raise anything; the finding records it
         reading, verdict = (
             ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
             missed(name, row) if is_own(row) else "breaks",
@@ -101,12 +101,12 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
 
 
 def missed(name: str, row: EngineRow) -> str:
-    """The verdict on who misses a probe."""
+    """The verdict for an engine that fails a probe."""
     probe = PROBES[name]
     own_physics = name in row.departs or (probe.handed_on and is_own(row))
     return "departs" if own_physics else probe.failure
 
 
 def is_own(row: EngineRow) -> bool:
-    """Whether it is a solver's own file, to which the harness hands on what the scene states."""
+    """Whether it is a solver's own file, which gets the values of the scene from the harness."""
     return bool(row.source)

@@ -1,5 +1,5 @@
-"""The probes of the protocol: an adapter that misses one of them is broken, and so is every number
-it gives.
+"""The probes of the protocol: an adapter that fails one of them is broken, and so is every number
+from it.
 
 A solver's own file is played by an adapter of ours. So it breaks the protocol only by what the
 adapter cannot keep from it: state from one call to the next, numbers that are none, no answer.
@@ -34,13 +34,13 @@ from adapters.engine_row import EngineRow
 from adapters.runaway import fault_of
 
 NONE = np.zeros(2)
-# a scale, an inverse mass, a product, a sum: no path from a force to a velocity rounds more often
+# a scale, an inverse mass, a product, a sum: the most roundings between a force and a velocity
 ROUNDINGS = 8
 
 
 def order_and_shapes(row: EngineRow) -> ProbeReading:
-    """Three disks of which the middle one is static; float32 keeps 2^-24 of a number, twice where
-    units are scaled."""
+    """Three disks of which the middle one is static; float32 rounds by 2^-24, twice if units are
+    scaled."""
     scene = scene_of(
         position=[[1.0, 2.0], [-3.0, 0.5], [0.1, -4.0]],
         velocity=[[0.3, -0.7], [0.0, 0.0], [1.1, 0.2]],
@@ -66,7 +66,8 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
 
 
 def read_copies(row: EngineRow) -> ProbeReading:
-    """A state that was read is neither changed by a step nor a way to change the engine."""
+    """A step does not change a state that was read, and editing that state does not change the
+    engine."""
     faults = set()
     with loaded(row, *simplified(plain())) as engine:
         early = engine.read()
@@ -85,8 +86,8 @@ def read_copies(row: EngineRow) -> ProbeReading:
 
 
 def load_forgets(row: EngineRow) -> ProbeReading:
-    """An engine that has played, been struck, and still holds a force does after `load` what a
-    fresh one does."""
+    """After `load`, an engine that has played a collision and has a pending force behaves like a
+    fresh one."""
     scenes = simplified(plain())
     with loaded(row, *simplified(head_on(2.0))) as used:
         last = len(used.read().angle) - 1
@@ -152,12 +153,13 @@ def stays_finite(row: EngineRow) -> ProbeReading:
 
 
 def force_lasts_one_step(row: EngineRow) -> ProbeReading:
-    """One force, then one step, then three: the speed after the first is the speed after all."""
+    """One force, then one step, then three: the speed is the same after the first step and after
+    all."""
     force, torque = np.array([20.0, 10.0]), 3.0
     with loaded(row, one_disk()) as engine:
         try:
             engine.apply_force(0, force, torque)
-        except Unsupported:  # it may model forces, but no rotation
+        except Unsupported:  # it may model forces without rotation
             torque = 0.0
             engine.apply_force(0, force, torque)
         engine.step()
@@ -201,8 +203,8 @@ def inertia_by_torque(row: EngineRow) -> ProbeReading:
 
 
 def same_instant(row: EngineRow) -> ProbeReading:
-    """After 1 s of free fall the speed is g t; half a step off it would be g dt / 2 = 0.02 m/s less
-    or more."""
+    """After 1 s of free fall the speed is g t; a velocity half a step off would differ by g dt / 2
+    = 0.02 m/s."""
     steps, gravity = 256, 9.81
     with loaded(row, one_disk(gravity=gravity)) as engine:
         engine.step(steps)
@@ -245,8 +247,8 @@ def collisions_name_their_step(row: EngineRow) -> ProbeReading:
 
 
 def impulse_is_reported(row: EngineRow) -> ProbeReading:
-    """The impulses reported add up to the momentum that changed hands; an engine may also report
-    none (NaN)."""
+    """The reported impulses add up to the momentum exchanged; an engine may also report none
+    (NaN)."""
     with loaded(row, head_on(2.0)) as engine:
         must_report(engine)
         before = engine.read().velocity[2, 0]
@@ -261,7 +263,7 @@ def impulse_is_reported(row: EngineRow) -> ProbeReading:
 
 
 def static_stays(row: EngineRow) -> ProbeReading:
-    """A static disk that is struck and under a force keeps its state to the bit."""
+    """A static disk keeps its state to the bit under a collision and a force."""
     scene = scene_of(
         position=[[-1.02, 0.1], [0.0, 0.0]],
         velocity=[[2.0, 0.0], [0.0, 0.0]],

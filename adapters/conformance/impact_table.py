@@ -1,4 +1,5 @@
-"""What each engine does with e, as the probes read it: a row an engine, kept in impact_table.csv.
+"""What each engine does with e, as measured by the probes: a row for each engine, kept in
+impact_table.csv.
 
 `uv run --extra js python -m adapters.conformance.impact_table` asks all engines anew, and writes
 the file, the table of adapters/README.md and the short one of README.md; it takes half a minute.
@@ -28,10 +29,10 @@ from adapters.friction import Frictionless
 KEPT = Path(__file__).with_name("impact_table.csv")
 README = Path(__file__).parents[1] / "README.md"
 BEGIN, END = "<!-- impact table -->\n", "<!-- end of impact table -->"
-FRONT = Path(__file__).parents[2] / "README.md"  # of the repository, with the short form
+FRONT = Path(__file__).parents[2] / "README.md"  # README of the repository, with the short form
 SHORT_BEGIN, SHORT_END = "<!-- short form -->\n\n", "\n\n"
-SLOWEST, FASTEST = 1e-3, 100.0  # m/s, between which a threshold is looked for
-NEAR = 0.05  # of e: what is nearer to that at `FASTEST` is the same
+SLOWEST, FASTEST = 1e-3, 100.0  # m/s, range in which a threshold is searched
+NEAR = 0.05  # of e: a smaller difference from e at `FASTEST` counts as equal
 BOUNCES = 5
 
 
@@ -105,7 +106,7 @@ def scaled(row: EngineRow, scale: float) -> float:
 
 
 def reading(probe: str) -> Callable[[EngineRow], float]:
-    """The number that a probe of the physics reads."""
+    """A function that returns the number read by a probe of the physics."""
 
     def read(row: EngineRow) -> float:
         got = physics.PHYSICS[probe].read(row).got
@@ -115,8 +116,8 @@ def reading(probe: str) -> Callable[[EngineRow], float]:
 
 
 class Column(NamedTuple):
-    """A column of the table: its heading in README, and how it is read; what cannot be asked of an
-    engine is NaN."""
+    """A column of the table: its heading in README, and how it is read; NaN if an engine refuses
+    the scene."""
 
     heading: str
     read: Callable[[EngineRow], float]
@@ -137,7 +138,7 @@ COLUMNS: dict[str, Column] = {
 }
 
 SHORT = ("threshold", "energy", "friction_unasked", "friction_1", "spin", "e_small")
-OUTSIDE = list(  # the engines that are not of this project
+OUTSIDE = list(  # the engines from outside this project
     dict.fromkeys(
         name.partition(":")[0]
         for name, row in (ENGINES | FETCHED).items()
@@ -147,7 +148,7 @@ OUTSIDE = list(  # the engines that are not of this project
 
 
 def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
-    """What is read of one engine, with the date and its versions."""
+    """The row of one engine, with the date and its versions."""
     with closing(row.make()) as engine:
         engine.load(head_on(2.0), DT)
         versions = ", ".join(f"{library} {number}" for library, number in engine.versions().items())
@@ -161,7 +162,7 @@ def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
 
 
 def asked(read: Callable[[EngineRow], float], row: EngineRow) -> float:
-    """What is read; NaN if the engine refuses the scene."""
+    """The result of `read`; NaN if the engine refuses the scene."""
     try:
         return read(row)
     except (Unsupported, Frictionless):
@@ -179,7 +180,7 @@ def kept() -> pd.DataFrame:
 
 
 def in_markdown(table: pd.DataFrame) -> str:
-    """The table as README shows it, then when it was read and with which versions."""
+    """The table in the form of README, followed by its date and versions."""
     headings = ["engine", *(column.heading for column in COLUMNS.values()), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
     for row in table.to_dict("records"):
@@ -191,8 +192,8 @@ def in_markdown(table: pd.DataFrame) -> str:
 
 
 def short_form(table: pd.DataFrame) -> str:
-    """The outside engines in a row each, with the columns of `SHORT`: as shipped, and behind an
-    arrow as matched where that differs."""
+    """A row for each outside engine with the columns of `SHORT`: as shipped, and after an arrow as
+    matched if that differs."""
     rows = {str(row["engine"]): row for row in table.to_dict("records")}
     headings = [f"read on {table.date.max()}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
@@ -212,17 +213,17 @@ def cell(column: str, value: float) -> str:
     if np.isnan(value):
         return "-"
     if column == "energy":
-        return f"{round(value, 1) + 0.0:+.1f} %"  # and no -0.0
+        return f"{round(value, 1) + 0.0:+.1f} %"  # avoids -0.0
     return f"{round(value, 6):.3g}"
 
 
 def with_table(text: str, table: pd.DataFrame) -> str:
-    """The text of README of this folder's parent with this table in its place."""
+    """The text of adapters/README.md with this table."""
     return placed(text, BEGIN, in_markdown(table), END)
 
 
 def with_short_form(text: str, table: pd.DataFrame) -> str:
-    """The text of the repository's README with the short form of this table in its place."""
+    """The text of the repository's README with the short form of this table."""
     return placed(text, SHORT_BEGIN, short_form(table), SHORT_END)
 
 
@@ -234,7 +235,7 @@ def placed(text: str, begin: str, what: str, end: str) -> str:
 
 
 def main() -> None:
-    """Ask all engines, and write the file and both tables."""
+    """Probe all engines, and write the file and both tables."""
     table = table_of(ENGINES | FETCHED)
     table.to_csv(KEPT, index=False, float_format="%.10g")
     for path, filled in ((README, with_table), (FRONT, with_short_form)):

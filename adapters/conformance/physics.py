@@ -1,5 +1,5 @@
-"""The probes of the physics: an engine that misses one of them plays by the protocol, but not what
-the scene states."""
+"""The probes of the physics: an engine that fails one of them follows the protocol, but its physics
+differs from the scene."""
 
 from __future__ import annotations
 
@@ -28,16 +28,17 @@ FRICTION = 0.2  # that the scenes of the probes of friction state
 # alpha of explicit Euler, of exact flight or velocity Verlet, of symplectic Euler
 ORDERS_OF_UPDATES = (0.0, 0.5, 1.0)
 ROUNDINGS = (
-    # a relative velocity, an effective mass, a target, an impulse, two updates: a collision rounds
-    # no more often
+    # a relative velocity, an effective mass, a target, an impulse, two updates: the most roundings
+    # in a collision
     8
 )
 
 
 def free_flight(row: EngineRow) -> ProbeReading:
     """The offset of a thrown disk from x0 + v0 t + a t2 / 2 after 1 s, in m; x' = x + v dt + alpha
-    a dt2 gives (alpha - 1/2) a dt t. Every step rounds a position and a velocity, whose error flies
-    on. An engine whose alpha is not known, somebody's file, may have any of `ORDERS_OF_UPDATES`."""
+    a dt2 gives (alpha - 1/2) a dt t. Every step rounds a position and a velocity, and the error of
+    the velocity adds to later positions. An engine with unknown alpha, a user's file, may have any
+    of `ORDERS_OF_UPDATES`."""
     steps, gravity, speed = 256, 9.81, 4.1
     t = steps * DT
     with loaded(row, one_disk(velocity=(0.0, speed), gravity=gravity)) as engine:
@@ -145,7 +146,7 @@ def friction(row: EngineRow) -> ProbeReading:
 
 
 def where_modelled(read: Callable[..., ProbeReading]) -> Callable[..., ProbeReading]:
-    """A probe of friction, which a solver need not know, if it says so."""
+    """A probe of friction, for engines that model it; a solver may refuse friction."""
 
     @wraps(read)
     def asked(row: EngineRow, **parameters: float) -> ProbeReading:

@@ -1,5 +1,5 @@
-"""What a conformance probe is: a question on a tiny scene, asked of a fresh engine, and a reading
-with its bound."""
+"""The type of a conformance probe: a tiny scene played by a fresh engine, and a reading with its
+bound."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from adapters.run import SILENT
 from scenarios.model import Array, Scene, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states
-DT = 1 / 256  # s; a power of two, so that a whole number of steps is a time without rounding
+DT = 1 / 256  # s; a power of two, so that multiples of it are exact
 
 
 class ProbeReading(NamedTuple):
-    """What a probe read: a number that must lie within `bound` of `expected`, or words that must
-    equal it."""
+    """The reading of a probe: a number that must be within `bound` of `expected`, or words that
+    must equal it."""
 
     got: float | str
     expected: float | str
@@ -47,9 +47,9 @@ class Probe:
         read: makes fresh engines from a row of `ENGINES` and closes them again.
         failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of
             the engine may be trusted; "departs" if it means other physics than the scene states.
-        handed_on: it reads what an adapter hands on to its library (mass, forces, dt) or reports
-            from it (collisions). To a solver's own file the harness hands it on, so that a miss is
-            the physics of the file, and departs.
+        handed_on: it reads values that an adapter passes to its library (mass, forces, dt) or from
+            it (collisions). A solver's own file gets these from the harness, so a failure is due to
+            its physics, and departs.
     """
 
     asked: str
@@ -60,16 +60,16 @@ class Probe:
 
 @contextmanager
 def loaded(row: EngineRow, *scenes: Scene, dt: float = DT) -> Iterator[Engine]:
-    """A fresh engine with the first of `scenes` in it that it does not refuse, closed at the end
-    whatever happens."""
+    """Context with a fresh engine that has loaded the first of `scenes` that it does not refuse; it
+    is always closed."""
     with closing(row.make()) as engine:
         load_first(engine, scenes, dt)
         yield engine
 
 
 def load_first(engine: Engine, scenes: Sequence[Scene], dt: float) -> Scene:
-    """Load the first scene that the engine does not refuse, and return it; raises `Unsupported` if
-    it refuses all."""
+    """Load and return the first scene that the engine does not refuse; raises `Unsupported` if it
+    refuses all."""
     *fuller, last = scenes
     for scene in fuller:
         with suppress(Unsupported):
@@ -80,9 +80,9 @@ def load_first(engine: Engine, scenes: Sequence[Scene], dt: float) -> Scene:
 
 
 def simplified(scene: Scene) -> tuple[Scene, ...]:
-    """`scene`, then what a solver of the exercise plays of it, which has no walls, no static disks
-    and a restitution of its own: without the first two, with the exercise's e, one disk alone. Each
-    of them also without spin, gravity, or both, for an engine's file that does not model them."""
+    """`scene`, then simpler versions for a solver of the exercise, which has no walls, no static
+    disks and a fixed restitution: without the first two, with the exercise's e, one disk alone.
+    Each also without spin, gravity, or both, for an engine's file that does not model these."""
     moving = np.where(scene.static, 1.0, scene.mass)
     bare = replace(scene, walls=np.zeros((0, 2, 2)), mass=moving, inertia=moving)
     alone = {
@@ -110,7 +110,7 @@ def scene_of(restitution: float = 0.5, **arrays: ArrayLike) -> Scene:
 def one_disk(
     velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0, gravity: float = 0.0
 ) -> Scene:
-    """A disk alone, whose mass and inertia are those of no density and no solid disk."""
+    """A single disk, with a mass and an inertia that no default density or solid disk gives."""
     return scene_of(
         position=[[0.25, -0.5]],
         velocity=[velocity],
@@ -168,8 +168,8 @@ def must_report(engine: Engine) -> None:
 
 
 def pushed(engine: Engine, disk: int, force: tuple[float, float], torque: float) -> bool:
-    """Apply a force and a torque, or the force alone, or nothing, whatever the engine does not
-    refuse; whether the torque was among it."""
+    """Apply a force and a torque, or the force alone, or nothing, whichever the engine accepts
+    first; returns whether the torque was applied."""
     for turning in (torque, 0.0):
         with suppress(Unsupported):
             engine.apply_force(disk, np.array(force), turning)
@@ -178,7 +178,7 @@ def pushed(engine: Engine, disk: int, force: tuple[float, float], torque: float)
 
 
 def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
-    """What an engine does from now on, with a force in the first step: (what and when, its bytes)
+    """The next `steps` steps of an engine, with a force in the first: (array and time, its bytes)
     for every array at every 10th step, then the collisions."""
     seen: list[tuple[str, bytes]] = []
     pushed(engine, 0, (3.0, 1.0), 0.5)
@@ -196,7 +196,7 @@ def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
 
 
 def first_difference(seen: list[tuple[str, bytes]], wanted: list[tuple[str, bytes]]) -> str:
-    """Where two histories part, or "nowhere"."""
+    """The first difference of two histories, or "nowhere"."""
     return next((what for (what, a), (_, b) in zip(seen, wanted) if a != b), "nowhere")
 
 

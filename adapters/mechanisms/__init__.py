@@ -1,2 +1,2 @@
-"""What each engine does otherwise than exact flight with end-of-step detection, and the solver that
-can ablate it."""
+"""The mechanisms by which each engine differs from exact flight with end-of-step detection, and the
+solver that can ablate them."""

@@ -17,7 +17,7 @@ from scenarios.model import Array, Scene
 
 EXERCISE = ("accelerate", "move", "pairs", "walls")
 POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
-# Collide where they are, then aim at a velocity after gravity, then move (Box2D 2.3,
+# Detect at the old positions, set target velocities after gravity, then move (Box2D 2.3,
 # b2Island::Solve).
 BOX2D = (
     "detect",
@@ -30,10 +30,10 @@ BOX2D = (
     "move",
     "position_correction",
 )
-# Move, collide there, aim at a velocity before gravity; the position correction moves in the next
+# Move, detect there, set target velocities before gravity; position correction moves in the next
 # step (Munk2D, cpSpaceStep).
 PYMUNK = ("move", "detect", "aim", "accelerate", "warm_start", "bounce", "nudge")
-# Collide and aim once, then soft substeps, then one sweep for restitution (Box2D 3.1,
+# Detect and set targets once, then soft substeps, then one sweep for restitution (Box2D 3.1,
 # b2SolverStage).
 BOX2D_V3 = (
     "detect",
@@ -57,11 +57,11 @@ class AblatedReference(Reference):
     """`adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's
     solver, to the bit.
 
-    order: the stages of a step; substeps: how often it is gone through in a dt, whose share falls
-        to every move.
+    order: the stages of a step; substeps: how often the order is repeated in a dt, each with its
+        fraction of dt.
     alpha: free flight advances by v dt + alpha a dt2 a step, whatever the order; None: as the order
         has it.
-    mixing: how the restitutions of two disks make that of the pair, a key of `MIXING`.
+    mixing: how the restitutions of two disks are combined, a key of `MIXING`.
     friction: of a pair; None: the scene's.
     `parameters`: fields of `adapters.mechanisms.ablated_reference.Parameters`.
     """
@@ -81,7 +81,7 @@ class AblatedReference(Reference):
         self.order, self.substeps, self.alpha, self.mixing = tuple(order), substeps, alpha, mixing
         self.friction = friction
         self.moves = substeps * self.order.count("move")
-        # the solver is compiled once: an int in place of a float would be another
+        # an int instead of a float would compile the solver again
         kinds = Parameters._field_defaults
         numbers = {name: type(kinds[name])(value) for name, value in parameters.items()}
         self.on = Parameters(
@@ -89,7 +89,7 @@ class AblatedReference(Reference):
         )
 
     def _drift(self) -> float:
-        """What each of the moves of a step has to add to v h, in a h2, for the whole step to have
+        """The term, in units of a h2, that each move adds to v h so that the whole step has
         alpha."""
         if self.alpha is None:
             return 0.0
@@ -118,7 +118,7 @@ class AblatedReference(Reference):
         return [(k // self.substeps, i, j, impulse) for k, i, j, impulse in collisions]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """What is enabled."""
+        """The enabled mechanisms."""
         reported = {
             "mixing": self.mixing,
             "substeps": self.substeps,

@@ -1,9 +1,9 @@
-"""The exercise's solver with every mechanism by which engines differ: an order of stages stands for
-an engine.
+"""The exercise's solver with every mechanism by which engines differ: each engine is an order of
+stages.
 
 Every stage is a function below, and `Parameters` holds their numbers. The order accelerate, move,
-pairs, walls gives the bits of the exercise. The solver tests all pairs, so it is for some hundred
-disks. Compiled by numba, as `exercise` is.
+pairs, walls gives the bits of the exercise. The solver tests all pairs, so it suits up to some
+hundred disks. Compiled by numba, as `exercise` is.
 """
 
 from math import atan, atan2, inf, pi, sqrt
@@ -75,33 +75,33 @@ class Parameters(NamedTuple):
     """The numbers of the stages; the defaults are those of the exercise."""
 
     order: np.ndarray  # the stages of a step, as places in STAGES
-    drift: float = 0.0  # of a h2, by which `move` goes farther than v h
-    summed: bool = True  # of `move`: the moves of a step are added up, and then to the position
-    tangent: bool = False  # of `move`: (cos, sin) is kept, and turns along its tangent
+    drift: float = 0.0  # of a h2, the term that `move` adds to v h
+    summed: bool = True  # of `move`: sum the moves of a step, then add them to the position
+    tangent: bool = False  # of `move`: (cos, sin) is stored, and turns along its tangent
     threshold: float = 0.0  # m/s: closing speeds up to which a collision is inelastic
-    project: bool = True  # of `pairs`: an overlap is undone at once
+    project: bool = True  # of `pairs`: do the projection
     project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
-    lever: float = 0.0  # of the gap, by which friction's lever arm is longer than the radius
+    lever: float = 0.0  # of the gap, added to the lever arm of friction, the radius
     rub_first: bool = False  # of `bounce`: friction before the normal impulse of the same pass
-    rub_restituted: bool = True  # of `restitute`: what it adds allows more friction
+    rub_restituted: bool = True  # of `restitute`: its impulses allow more friction
     rub_biased: bool = True  # of `soften`: friction in its first pass, too
-    rebounds: bool = True  # of `aim`: a contact bounces again if it bore an impulse a step ago
+    rebounds: bool = True  # of `aim`: a contact with an impulse in the last step may bounce again
     correction_share: float = 0.0  # of the overlap beyond the slop, each iteration or `nudge`
     correction_iterations: int = 3
-    correction_most: float = inf  # m, that one of them moves at most
-    slop: float = 0.0  # m, of overlap that is left
-    cap: float = inf  # m, by which a disk moves at most; its velocity is cut
-    margin: float = 0.0  # m, from which on two are a contact
-    touching: bool = False  # whether they are at just this distance
-    recycled: float = 0.0  # m, up to which two may move before they are looked at again
-    fattened: float = 0.0  # m, by which boxes are larger, which are to overlap before that
-    memory: int = 1  # steps, for which a contact that is lost keeps its impulses
-    skin: float = 0.0  # m, by which walls are thicker than they are
-    carried: bool = False  # of `soften`: a disk's turning carries along the point that touches
+    correction_most: float = inf  # m, largest correction in one of them
+    slop: float = 0.0  # m, overlap that remains: the slop
+    cap: float = inf  # m, cap of a move; the velocity is cut
+    margin: float = 0.0  # m, gap below which two bodies are a contact
+    touching: bool = False  # whether a gap of exactly `margin` is a contact, too
+    recycled: float = 0.0  # m, relative motion after which a pair is tested again
+    fattened: float = 0.0  # m, margin of the boxes that must overlap before a test
+    memory: int = 1  # steps for which a lost contact keeps its impulses
+    skin: float = 0.0  # m, skin of the walls
+    carried: bool = False  # of `soften`: contact points turn with their disks
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
-    push_speed: float = 0.0  # m/s, of position correction, at most
+    push_speed: float = 0.0  # m/s, cap of the position correction
 
 
 @compiled
@@ -110,7 +110,7 @@ def advance(
 ) -> list[Collision]:
     """Advance `count` steps, each move by `h` s; return the collisions as `exercise.advance`
     does."""
-    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know the element type
     for k in range(count):
         for i in range(len(disks.mass)):
             kept.start[i, 0], kept.start[i, 1] = disks.position[i, 0], disks.position[i, 1]
@@ -125,7 +125,7 @@ def advance(
 
 
 @pasted
-def act(  # noqa: C901, PLR0912 - a branch a stage: numba keeps no table of functions
+def act(  # noqa: C901, PLR0912 - a branch for each stage: numba has no table of functions
     stage: int,
     disks: Disks,
     world: World,
@@ -187,11 +187,11 @@ def accelerate(disks: Disks, world: World, h: float) -> None:
 
 @internal
 def move(disks: Disks, world: World, on: Parameters, kept: Contacts, h: float) -> None:
-    """x += v h + drift a h2, and what `nudge` adds; the angle alike.
+    """x += v h + drift a h2, plus the velocity of `nudge`; the angle alike.
 
-    As in Box2D 3.1 the moves of a step are added up before they are added to the position, so that
-    the moves are rounded, not the position; unless not `summed`, as in Rapier, where each move
-    rounds the position.
+    If `summed`, as in Box2D 3.1, the moves of a step are summed before they are added to the
+    position, so that the moves are rounded, not the position; else, as in Rapier, each move rounds
+    the position.
     """
     v, moved, more = disks.velocity, kept.moved, on.drift * h * h
     for i in range(len(disks.mass)):
@@ -249,7 +249,7 @@ def walls(disks: Disks, world: World, on: Parameters, k: int, collisions: list[C
 def meet(
     disks: Disks, world: World, on: Parameters, i: int, j: int, k: int, collisions: list[Collision]
 ) -> None:
-    """Collide one pair as the exercise with friction does; without projection, both positions are
+    """Collide one pair as in the exercise, with friction; without projection both positions are
     restored afterwards."""
     x, other = disks.position, max(j, 0)
     xi, yi, xj, yj = x[i, 0], x[i, 1], x[other, 0], x[other, 1]
@@ -294,8 +294,8 @@ def aim(v, restitution: float, on: Parameters, kept: Contacts) -> None:  # type:
 def warm_start(disks: Disks, on: Parameters, kept: Contacts) -> None:
     """Apply the impulses that the contacts had in the last step.
 
-    An impulse of an earlier step is not applied, but `bounce` counts it as if it were, and may take
-    it back (Munk2D, cpArbiterUpdate).
+    An impulse older than that is not applied, but `bounce` treats it as applied, and may take it
+    back (Munk2D, cpArbiterUpdate).
     """
     for c in range(kept.found[0]):
         contact = kept.rows[c]
@@ -332,7 +332,8 @@ def cap(v, most: float, h: float) -> None:  # type: ignore[no-untyped-def]
 
 @internal
 def position_correction(disks: Disks, world: World, on: Parameters, kept: Contacts) -> None:
-    """Undo a share of every overlap beyond the slop, `correction_iterations` times in an island."""
+    """Undo a fraction of every overlap beyond the slop, `correction_iterations` times in each
+    island."""
     first = 0
     while on.correction_share > 0.0 and first < kept.found[0]:
         end = first
@@ -340,7 +341,7 @@ def position_correction(disks: Disks, world: World, on: Parameters, kept: Contac
             end += 1
         worst = -inf
         for _ in range(on.correction_iterations):
-            if worst < -3.0 * on.slop:  # else all are within three slops
+            if worst < -3.0 * on.slop:  # else all overlaps are within three slops
                 worst = correct_island(disks, world, on, kept, first, end)
         first = end
 
@@ -364,8 +365,8 @@ def correct_island(
 
 @internal
 def nudge(mass, on: Parameters, kept: Contacts, h: float) -> None:  # type: ignore[no-untyped-def]
-    """Give overlapping disks a velocity for the next move only, which undoes a share of the overlap
-    beyond the slop."""
+    """Give overlapping disks a velocity for the next move only, which undoes a fraction of the
+    overlap beyond the slop."""
     for c in range(kept.found[0]):
         kept.rows[c].nudged = 0.0
     for _ in range(on.iterations):
@@ -385,8 +386,8 @@ def soften(
     """Solve each contact as a damped spring, implicitly for the end of the substep (E. Catto,
     Solver2D, 2024: soft step).
 
-    The second pass, not `biased`, takes the bias out of the velocities again. Bodies that do not
-    touch yet may close their gap, and no more.
+    The second pass, not `biased`, removes the bias from the velocities. Bodies that do not touch
+    yet may only close their gap.
     """
     for c in range(kept.found[0]):
         contact = kept.rows[c]

@@ -1,8 +1,8 @@
 """The contacts of `ablated_reference`: which bodies touch, with which impulses, within a step and
 from step to step.
 
-A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i and is
-that of the moment it was found. Compiled by numba, as `exercise` is.
+A contact is of disk i and disk j, or wall w as j = -1 - w. Its normal n points from j to i, as at
+its detection. Compiled by numba, as `exercise` is.
 """
 
 from math import cos, inf
@@ -25,24 +25,24 @@ CONTACT = np.dtype(
         ("nx", "f8"),
         ("ny", "f8"),  # the normal
         ("gap", "f8"),  # m between the surfaces at the start of the step
-        ("seen", "f8"),  # m between them when the two were last looked at
-        ("target", "f8"),  # m/s: the speed of separation it is to have
+        ("seen", "f8"),  # m between them at the last test of the pair
+        ("target", "f8"),  # m/s: the target speed of separation
         ("impulse", "f8"),
         ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
-        ("strongest", "f8"),  # N s, of the impulses that one solve added
+        ("strongest", "f8"),  # N s, largest impulse added by one solve
         ("total", "f8"),  # N s, of the impulses at the end of each substep
         ("bore", "b1"),  # whether there was one in the step before
         ("nudged", "f8"),  # N s, of `ablated_reference.nudge`
         ("island", "i8"),
         ("colour", "i8"),  # from 1; 0: none yet
-        ("late", "b1"),  # whether its impulses are those of a step before the last
+        ("late", "b1"),  # whether its impulses are older than the last step
     ]
 )
 
 
 LOOK = np.dtype(
     [
-        ("known", "b1"),  # whether the two have been looked at since they came near
+        ("known", "b1"),  # whether the pair was tested since the boxes overlap
         ("touches", "b1"),  # whether they were a contact
         ("x", "f8"),
         ("y", "f8"),  # m, the centre of the second in the frame of the first
@@ -56,16 +56,17 @@ LOOK = np.dtype(
 
 
 class Contacts(NamedTuple):
-    """The contacts of a step, the first `found[0]` of `rows`, and what else the stages share."""
+    """The contacts of a step, the first `found[0]` of `rows`, and other data that the stages
+    share."""
 
     found: np.ndarray  # (1,): how many
     rows: np.ndarray  # of CONTACT, enough for twice as many as there can be
     start: np.ndarray  # (n, 2) m: where the disks were at the start of the step
-    moved: np.ndarray  # (n, 2) m: what they have moved since
-    turned: np.ndarray  # (n,) rad: what they have turned since
-    facing: np.ndarray  # (n, 2): cos and sin of their angles, where those are kept
-    nudge: np.ndarray  # (n, 2) m/s: what the next move adds to the velocity
-    # (n, n + w, 5): impulse, slide, colour, how many steps ago that was, 0 if long ago, and total
+    moved: np.ndarray  # (n, 2) m: their motion since then
+    turned: np.ndarray  # (n,) rad: their rotation since then
+    facing: np.ndarray  # (n, 2): cos and sin of their angles, if stored
+    nudge: np.ndarray  # (n, 2) m/s: added to the velocity in the next move only
+    # (n, n + w, 5): impulse, slide, colour, age in steps (0: long ago), and total
     before: np.ndarray
     looks: np.ndarray  # (n, n + w) of `recycling.LOOK`
     boxes: np.ndarray  # (n + w, 4) m: of `recycling`, left, bottom, right, top
@@ -73,7 +74,7 @@ class Contacts(NamedTuple):
 
 
 def no_contacts(n: int, walls: int, precision: type) -> Contacts:
-    """An empty table of contacts of `n` disks and so many walls; positions have this precision."""
+    """An empty table of contacts for `n` disks and `walls` walls; positions have this precision."""
     most = n * (n - 1) // 2 + n * walls
     place: np.ndarray = np.zeros((n, 2), precision)
     return Contacts(
@@ -103,8 +104,8 @@ def detect(
 ) -> None:
     """Find the contacts: pairs i < j with a gap below `margin`, then walls, thicker by `skin`.
 
-    If `touching`, a gap of exactly `margin` counts as well. A contact starts with the impulses that
-    it had last, unless that was more than `memory` steps ago.
+    If `touching`, a gap of exactly `margin` counts as well. A contact starts with its last
+    impulses, unless these are older than `memory` steps.
     """
     n = len(disks.radius)
     remember(memory, kept)
@@ -147,7 +148,7 @@ def remember(memory: int, kept: Contacts) -> None:
 
 @internal
 def note(disks: Disks, world: World, skin: float, kept: Contacts, i: int, j: int) -> None:
-    """Add a contact, with the impulses that it had last."""
+    """Add a contact with its last impulses."""
     contact, other = kept.rows[kept.found[0]], column(j, len(disks.radius))
     kept.found[0] += 1
     contact.i, contact.j = i, j
@@ -168,8 +169,8 @@ def column(j: int, n: int) -> int:
 
 @compiled
 def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Sort the contacts into islands, which share no disk that moves, in the order in which a
-    depth-first search finds them.
+    """Sort the contacts into islands, which share no moving disk, in the order of a depth-first
+    search.
 
     The search starts from the last disk, and takes the last contact of a disk first (Box2D 2.3,
     b2World::Solve).
@@ -199,10 +200,10 @@ def by_island(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 @internal
 def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
-    """Sort the contacts by colour: no disk that moves has two contacts of one colour.
+    """Sort the contacts by colour: no moving disk has two contacts of one colour.
 
     A new contact takes the first free colour, from the second on if only one body can move, and
-    keeps it for as long as it lasts (Box2D 3.1, b2AssignGraphColor).
+    keeps it while it lasts (Box2D 3.1, b2AssignGraphColor).
     """
     rows, count, copies, most = kept.rows, kept.found[0], len(kept.rows) // 2, 0
     for c in range(count):
@@ -225,7 +226,7 @@ def by_colour(mass, kept: Contacts) -> None:  # type: ignore[no-untyped-def]
 
 @internal
 def taken(mass, kept: Contacts, c: int, colour: int) -> bool:  # type: ignore[no-untyped-def]
-    """Whether a disk of contact c that moves has another contact of this colour."""
+    """Whether a moving disk of contact c has another contact of this colour."""
     i, j = kept.rows[c].i, kept.rows[c].j
     moving_i, moving_j = mass[i] != inf, j >= 0 and mass[j] != inf
     for k in range(kept.found[0]):
@@ -252,8 +253,8 @@ def gap_of(disks: Disks, world: World, i: int, j: int) -> tuple[float, float, fl
 
 @internal
 def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
-    """The gap in m along the normal of the contact: when it was found, plus what both bodies have
-    moved since."""
+    """The gap in m along the normal of the contact: when it was found, plus the motion of both
+    bodies since then."""
     i, j = contact.i, contact.j
     gap = contact.gap + moved[i, 0] * contact.nx + moved[i, 1] * contact.ny
     if j >= 0:
@@ -263,7 +264,7 @@ def gap_along(moved, contact) -> float:  # type: ignore[no-untyped-def]
 
 @internal
 def carried_off(radius, turned, contact) -> float:  # type: ignore[no-untyped-def]
-    """How much wider the gap seems, in m, as the points that touched have turned with the disks
+    """The change of the gap, in m, because the contact points have turned with the disks
     (Box2D 3.1, b2SolveContact: moving anchors)."""
     i, j = contact.i, contact.j
     gap = (radius[i] + contact.seen / 2) * (1.0 - cos(turned[i]))
@@ -283,7 +284,7 @@ def closing(v, i: int, j: int, nx: float, ny: float) -> float:  # type: ignore[n
 
 @internal
 def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
-    """The sum of the inverse masses in 1/kg; that of a wall is 0."""
+    """The sum of the inverse masses in 1/kg; 0 for a wall."""
     return 1.0 / mass[i] + (1.0 / mass[j] if j >= 0 else 0.0)
 
 
@@ -291,7 +292,7 @@ def inverse_mass(mass, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
 def drive_to_target(disks: Disks, contact, target: float, share: float, memory: float) -> None:  # type: ignore[no-untyped-def]
     """Apply the impulse that gives a contact its target velocity; the sum stays at least 0.
 
-    A soft contact gets `share` of it, less `memory` times its impulse so far.
+    A soft contact gets the fraction `share` of it, minus `memory` times its impulse so far.
     """
     i, j, nx, ny, before = contact.i, contact.j, contact.nx, contact.ny, contact.impulse
     wanted = (target - closing(disks.velocity, i, j, nx, ny)) / inverse_mass(disks.mass, i, j)
@@ -310,8 +311,8 @@ def apply_pair(rows, mass, i: int, j: int, nx: float, ny: float, by: float) -> N
 
 @internal
 def rub(disks: Disks, contact, friction: float, lever: float) -> None:  # type: ignore[no-untyped-def]
-    """Stop the slip of the surfaces by a tangential impulse of at most `friction` times the normal
-    one.
+    """Reduce the slip of the surfaces with a tangential impulse of at most `friction` times the
+    normal one.
 
     A lever arm is the radius and `lever` times the gap: 1/2 is the middle of the gap.
     """

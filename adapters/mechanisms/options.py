@@ -1,5 +1,5 @@
-"""What an engine costs with one option changed against its matched profile: a row an option, or a
-sweep of one parameter."""
+"""Engines with one option changed from the matched profile, whose cost is measured: a row for each
+option, or a sweep of one parameter."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ class Option:
     """One change to one engine.
 
     Attributes:
-        engine: the row of `ENGINES` it is set against, `engine:profile`.
-        change: what is different, in a few words.
-        make: the changed engine; imports its library only now.
+        engine: the row of `ENGINES` to compare with, `engine:profile`. change: the difference, in a
+        few words. make: makes the changed engine; imports its library when called.
     """
 
     engine: str
@@ -52,7 +51,7 @@ OPTIONS: tuple[Option, ...] = tuple(
 
 @dataclass(frozen=True)
 class Sweep:
-    """A parameter of an engine over its values: what time can be spent on instead of smaller steps.
+    """A parameter of an engine over its values: a way to spend time other than smaller steps.
 
     Attributes:
         engine: the row of `ENGINES` whose parameter is swept, `engine:profile`.
@@ -68,7 +67,7 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """The engine and a profile that says what is swept, as `reports.page.style` knows it."""
+        """The engine and a profile that names the swept parameter, as in `reports.page.style`."""
         return f"{self.engine}+{self.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:

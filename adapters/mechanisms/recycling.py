@@ -1,8 +1,8 @@
-"""Contacts of pairs that are not looked at in every step: how Rapier finds them.
+"""Contacts of pairs that are not tested in every step, as in Rapier.
 
-Two bodies are looked at when their boxes come to overlap, and again only when they have moved
-against each other by more than a given length. Until then a contact keeps its normal and the points
-that touched, and what was no contact stays none. Compiled by numba, as `exercise` is.
+A pair is tested when its boxes start to overlap, and again only after a relative motion above a
+given length. Until then a contact keeps its normal and contact points, and a pair without contact
+stays without. Compiled by numba, as `exercise` is.
 """
 
 from math import cos, hypot, inf, sin
@@ -11,15 +11,15 @@ from adapters.mechanisms.contacts import Contacts, column, gap_of, note, remembe
 from reference_impl.compiled import internal
 from reference_impl.state import Disks, World
 
-TURNED = 0.98  # cos of the angle by which a body turns at most before it is looked at again
+TURNED = 0.98  # cos of the rotation after which a body is tested again
 
 
 @internal
 def detect_again(
     disks: Disks, world: World, margin: float, recycled: float, fattened: float, kept: Contacts
 ) -> None:
-    """Find the contacts, pairs i < j with a gap below `margin`, then walls, but look only at pairs
-    whose boxes overlap and that have moved by more than `recycled`; by more than `margin`, if they
+    """Find the contacts, pairs i < j with a gap below `margin`, then walls, but test only pairs
+    whose boxes overlap and that have moved by more than `recycled`; by more than `margin` if they
     were no contact (Rapier, process_pair)."""
     n = len(disks.radius)
     remember(1, kept)
@@ -37,11 +37,11 @@ def detect_again(
 
 @internal
 def enclose(disks: Disks, world: World, margin: float, fattened: float, kept: Contacts) -> None:
-    """Renew every box that does not hold its body and `margin` around it.
+    """Renew every box that does not contain its body and `margin` around it.
 
-    A box is larger by `fattened`, but for the first one (parry, Bvh::insert_or_update_partially).
-    Boxes have the precision of the positions: a disk that leaves its box after a whole number of
-    steps does so by the last digit.
+    A box is larger by `fattened`, except the first one (parry, Bvh::insert_or_update_partially).
+    Boxes have the precision of the positions, because the last digit decides whether a disk leaves
+    its box after a whole number of steps.
     """
     n, x, least = len(disks.radius), disks.position, kept.least
     for k in range(n + len(world.walls)):
@@ -68,7 +68,7 @@ def enclose(disks: Disks, world: World, margin: float, fattened: float, kept: Co
 def consider(
     disks: Disks, world: World, margin: float, recycled: float, kept: Contacts, i: int, j: int
 ) -> None:
-    """Note a pair if it is a contact, or was one when it was last looked at."""
+    """Note a pair if it is a contact, or was one at its last test."""
     n = len(disks.radius)
     look, one, other = kept.looks[i, column(j, n)], kept.boxes[i], kept.boxes[column(j, n)]
     if one[0] > other[2] or other[0] > one[2] or one[1] > other[3] or other[1] > one[3]:
@@ -86,7 +86,7 @@ def consider(
 
 @internal
 def look_at(disks: Disks, world: World, margin: float, look, i: int, j: int) -> None:  # type: ignore[no-untyped-def]
-    """Whether the two are a contact now, and how they lie."""
+    """Test a pair: store whether it is a contact, and its relative position."""
     look.known = True
     look.gap, look.nx, look.ny = gap_of(disks, world, i, j)
     look.touches = look.gap < margin
@@ -95,8 +95,7 @@ def look_at(disks: Disks, world: World, margin: float, look, i: int, j: int) -> 
 
 @internal
 def lie(disks: Disks, i: int, j: int) -> tuple[float, float, float, float]:
-    """The centre of disk j, or the origin, which is that of a wall, in the frame of disk i; the
-    angles of both."""
+    """The centre of disk j (the origin for a wall) in the frame of disk i; the angles of both."""
     x, angle = disks.position, disks.angle[i]
     dx, dy, other = -x[i, 0], -x[i, 1], 0.0
     if j >= 0:
@@ -107,8 +106,8 @@ def lie(disks: Disks, i: int, j: int) -> tuple[float, float, float, float]:
 
 @internal
 def drift(disks: Disks, world: World, look, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
-    """m, by which any point of either has moved against the other at most since they were looked
-    at; inf if one has turned too far (Rapier, relative_pose_drift)."""
+    """m, largest relative motion of any point of the pair since its last test; inf if one body has
+    turned too far (Rapier, relative_pose_drift)."""
     x, y, angle, other = lie(disks, i, j)
     if min(cos(angle - look.angle), cos(other - look.other)) <= TURNED:
         return inf
@@ -124,7 +123,7 @@ def drift(disks: Disks, world: World, look, i: int, j: int) -> float:  # type: i
 
 @internal
 def gap_since(disks: Disks, look, i: int, j: int) -> float:  # type: ignore[no-untyped-def]
-    """The gap in m along the normal of the look between the points that were nearest then, which
+    """The gap in m along the normal of the last test, between the points that were nearest then and
     have turned with the disks."""
     x, (_, _, angle, other) = disks.position, lie(disks, i, j)
     c, s = cos(look.angle), sin(look.angle)

@@ -1,9 +1,8 @@
-"""The mechanisms of every engine: what it does otherwise than exact flight with end-of-step
-detection.
+"""The mechanisms of every engine: how it differs from exact flight with end-of-step detection.
 
 Each can be enabled in `adapters.mechanisms.ablated_reference`; some can be disabled in the
-engine, too. The numbers are read off the engine. With all of its mechanisms the reference plays
-what the engine plays, mostly to rounding.
+engine, too. The numbers are read from the engine. With all of its mechanisms the reference
+reproduces the engine, mostly to rounding.
 """
 
 from __future__ import annotations
@@ -48,8 +47,8 @@ NAMES = (
     SIDES,
 ) = NAMES
 MANY_SIDES = 400  # of matter's disks, which are polygons: what is left of them at 400 is residual
-# Exact flight; what overlaps at the end of a step gets its impulse there and then; nothing is moved
-# out of it.
+# Exact flight; bodies that overlap at the end of a step exchange their impulse there; nothing is
+# moved out of overlap.
 END_OF_STEP: dict[str, Any] = {
     "order": ("move", "accelerate", "pairs", "walls"),
     "alpha": 0.5,
@@ -58,9 +57,9 @@ END_OF_STEP: dict[str, Any] = {
 }
 
 
-# Of those in float32: each move of a substep rounds the position.
+# Of float32 engines: each move of a substep rounds the position.
 ROUNDED_MOVES = ("rapier2d:shipped", "rapier2d:matched")
-# Of those in float32: the angle is kept as (cos, sin).
+# Of float32 engines: the angle is stored as (cos, sin).
 COS_AND_SIN = (*ROUNDED_MOVES, "box2d_v3:shipped", "box2d_v3:matched")
 
 
@@ -70,9 +69,9 @@ class Mechanism:
 
     Attributes:
         name: one of `NAMES`.
-        parameters: of `AblatedReference`; none: the reference does not have the mechanism.
-        on_top: the mechanisms it acts on, and is therefore enabled with.
-        without: makes the engine without it, where it has a parameter for that.
+        parameters: of `AblatedReference`; empty: the reference does not have the mechanism.
+        on_top: the mechanisms on which it acts, and with which it is enabled.
+        without: makes the engine without it, if the engine has a parameter for that.
     """
 
     name: str
@@ -86,7 +85,7 @@ def mechanisms_of(
 ) -> list[Mechanism]:
     """The mechanisms of an engine in `KNOWN`, in this scene at this dt; `settings` are those
     it reported once loaded."""
-    # What cannot be read back is as it was asked for.
+    # A setting that cannot be read back has its requested value.
     resolved = {
         setting: asked if used in NOT_REPORTED else used
         for setting, (asked, used) in settings.items()
@@ -100,7 +99,7 @@ def mechanisms_of(
 
 
 def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
-    """The reference with all these mechanisms that it has parameters for."""
+    """The reference with those of these mechanisms for which it has parameters."""
     parameters = dict(END_OF_STEP)
     for mechanism in mechanisms:
         parameters |= mechanism.parameters
@@ -112,7 +111,7 @@ def _exercise(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[M
 
 
 def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
-    # Walls come first, and flip a velocity without moving the disk.
+    # Walls come first, and reverse a velocity without moving the disk.
     return [
         Mechanism(IMPULSE, {"order": ("move", "accelerate", "walls", "pairs")}),
         Mechanism(POSITION_CORRECTION, {"project": True}),
@@ -122,7 +121,7 @@ def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mec
 def _pymunk(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
     from adapters.pymunk import Pymunk
 
-    # Its bounce reverses whatever speed a contact has, also one at which the two separate
+    # Its bounce reverses any speed of a contact, also a separating one
     # (cpArbiterPreStep).
     impulse = {
         "order": PYMUNK,
@@ -275,7 +274,7 @@ def _box2d_v3_shipped(reported: Mapping[str, Any], scene: Scene, _dt: float) -> 
 
 
 def _planck(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str) -> list[Mechanism]:
-    """Those of Box2D 2.3 in float64, whose compiled-in numbers are settings here."""
+    """The mechanisms of Box2D 2.3 in float64; its compiled-in numbers are settings here."""
     made = partial(_javascript, "planck", profile)
     still = {"continuous": False, "bullet": False}
     still |= {f"elastic_{name}": value for name, value in still.items()}
@@ -311,15 +310,15 @@ def _planck(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
 
 
 def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str) -> list[Mechanism]:
-    """Soft substeps and one sweep for restitution, as in Box2D 3.1, with contacts that are not
-    looked at in every step.
+    """Soft substeps and one sweep for restitution, as in Box2D 3.1, with pairs that are not tested
+    in every step.
 
-    Not followed: that each impulse is rounded to float32, which rows of collisions enlarge, and the
+    Not modelled: that each impulse is rounded to float32, which rows of collisions enlarge, and the
     order of contacts that begin in the same step.
     """
     made, unit = partial(_javascript, "rapier2d", profile), reported["length unit in m"]
-    # Contacts as stiff as Box2D 3.1's: contact_erp is 0.1358 at 1/240 s. Friction is solved
-    # without bias alone (IntegrationParameters, friction_in_bias_pass).
+    # The stiffness of contacts is that of Box2D 3.1: contact_erp is 0.1358 at 1/240 s. Friction is
+    # solved without bias alone (IntegrationParameters, friction_in_bias_pass).
     impulse = {
         "order": BOX2D_V3,
         "margin": reported["prediction distance in m"],
@@ -350,7 +349,7 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
 def _matter(
     _reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str
 ) -> list[Mechanism]:
-    """Those that matter can be played without; the reference has none of them.
+    """The mechanisms that matter can switch off; the reference has none of them.
 
     Not known: the rest of the polygons, its contacts below the resting threshold, and the place of
     its position correction.

@@ -1,1 +1,2 @@
-"""A hand-written engine that is not the exercise, in a file of its own: create, step, read."""
+"""A user's own engine in a file with create, step and read, as opposed to a solver of the
+exercise."""

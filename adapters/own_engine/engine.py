@@ -1,5 +1,5 @@
-"""Somebody's own engine behind the protocol: its file is played step by step in a process of its
-own."""
+"""A user's own engine behind the protocol: its file is played step by step in a separate
+process."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TEMPLATES = {
     "python": Path(__file__).parent / "template.py",
 }
 CREATE_LIMIT = 10.0  # s that `create` may take
-# The relative rounding that the probes allow: as of an engine that keeps a velocity as the
+# The relative rounding that the probes allow: that of an engine that stores a velocity as the
 # difference of two positions some 1e-4 m apart.
 ROUNDING = 2.0**-36
 NAMED = ("create ", "step ", "read ", "collisions ")
@@ -36,12 +36,12 @@ CALLED = {"whole_load": "create", "whole_step": "step", "whole_play": "step or r
 
 @dataclass(frozen=True)
 class EngineText(SolverText):
-    """The text of an engine's file, which its process plays by create, step and read."""
+    """The text of an engine's file; its process plays it with create, step and read."""
 
     engine = True
 
     def load(self, copies: Path | None) -> Any:
-        """What answers the commands, in the process that calls this; raises `SolverFailed`."""
+        """The object that answers the commands, in the calling process; raises `SolverFailed`."""
         if self.kind == "javascript":
             from adapters.own_engine.javascript import JavaScriptFile
 
@@ -52,7 +52,8 @@ class EngineText(SolverText):
 
 
 class OwnEngine(Student):
-    """Plays an engine's file; a scene with more than its line `models` says is refused by name.
+    """Plays an engine's file; a scene that needs more than its line `models` is refused, naming
+    what is missing.
 
     A fault of the file is a `SolverFailed` that names file, function, what was returned and what is
     asked. A number that is not finite ends a run as "diverged".
@@ -60,12 +61,12 @@ class OwnEngine(Student):
 
     @property
     def own_restitution(self) -> float:
-        """That of the exercise's game: it takes any."""
+        """The restitution of the exercise's game; the file takes any."""
         return EXERCISE
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Let the file create a world; raises `Unsupported` for what it does not model, or for its
-        own reason."""
+        """Let the file create a world; raises `Unsupported` if it does not model the scene, or
+        refuses it."""
         self.models: Sequence[str] = self.process.functions["models"]
         must_model(scene, self.models, self.path.name)
         self.forget(scene)
@@ -74,30 +75,31 @@ class OwnEngine(Student):
             raise Unsupported(f"{self.path.name} refuses the scene: {printable(refused[:LONGEST])}")
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to what acts during the next step; raises `Unsupported` if the file models none."""
+        """Add to the forces of the next step; raises `Unsupported` if the file does not model
+        forces."""
         more = [word for word in self.missing(torque) if word not in self.models]
         if more:
             raise Unsupported(refusal(self.path.name, more))
         super().apply_force(disk, force, torque)
 
     def missing(self, torque: float) -> list[str]:
-        """What a thrust takes."""
+        """The features that a thrust needs and the file does not model."""
         return ["forces", "rotation"] if torque else ["forces"]
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer of the process; what fails is said with the name of the file."""
+        """The answer of the process; a failure names the file."""
         try:
             return super().do(command, argument, limit)
         except SolverFailed as failure:
             if failure.kind == "crashed":
                 failure.what = f"{CALLED[command]} was called: {failure.what}"
-            elif not failure.what.startswith(NAMED):  # whoever stopped it cannot say where it was
+            elif not failure.what.startswith(NAMED):  # the place where it was stopped is not known
                 failure.what = f"{CALLED[command]} {failure.what}"
             failure.what = f"{self.path.name}: {failure.what}"
             raise
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """What the file decides."""
+        """The settings that the file decides."""
         return {
             "models": (None, ", ".join(self.models)),
             "restitution": (None, "the scene's"),
@@ -108,8 +110,8 @@ class OwnEngine(Student):
 
 
 def told(scene: Scene) -> dict[str, Any]:
-    """A scene as an engine's file is given it: plain lists; None for what is infinite, the mass and
-    the inertia of a static disk."""
+    """A scene in the form that an engine's file gets: plain lists, with None for infinite numbers
+    (mass and inertia of a static disk)."""
 
     def plain(values: Array) -> list[float | None]:
         return [float(x) if np.isfinite(x) else None for x in values]
@@ -132,7 +134,7 @@ def told(scene: Scene) -> dict[str, Any]:
 
 
 def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
-    """The row of a file as it is now, an engine's or a solver's of the exercise; raises
+    """The row of a file in its present state, an engine or a solver of the exercise; raises
     `NotASolver`."""
     solver = read_solver(path)
     if not is_engine(solver):

@@ -33,7 +33,7 @@ class JavaScriptFile(JavaScriptSolver):
     drivers, bind = (DRIVER, ENGINE_DRIVER), BIND
 
     def load(self) -> None:
-        """Load the file, and look whether it has what an engine has."""
+        """Load the file, and check that it has the functions of an engine."""
         super().load()
         if lacking := [name for name in ENGINE if not self.functions[name]]:
             raise SolverFailed("error", f"has no function {' and no '.join(lacking)}; {HOW}")
@@ -46,8 +46,8 @@ class JavaScriptFile(JavaScriptSolver):
         self.v8.eval(f'__engine("turns", {json.dumps("rotation" in models.split())})')
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if a
-        function threw or returned what it may not."""
+        """The driver's answer to a command; raises `SolverFailed` after `limit` s, or if a function
+        threw or returned an invalid value."""
         code = f'__engine("{command}", {json.dumps(json.dumps(argument))})'
         try:
             answer = json.loads(str(self.evaluated(code, limit, may_repeat=False)))

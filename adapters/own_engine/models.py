@@ -1,5 +1,5 @@
-"""What a scene may have, in the words of the line `models` of an engine's file; a scene that has
-more is refused by name."""
+"""The features of scenes, in the words of the line `models` of an engine's file; a scene with other
+features is refused, naming them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from adapters.engine import Unsupported
 from adapters.friction import Frictionless
 from scenarios.model import Scene
 
-# The word in the line -> what it is called in a sentence.
+# Word in the line -> its name in a sentence.
 FEATURES = {
     "disks": "more than one disk",
     "walls": "walls",
@@ -23,7 +23,7 @@ FEATURES = {
 
 
 def must_model(scene: Scene, models: Collection[str], who: str) -> None:
-    """Raise `Unsupported` for a scene that has more than `who` models."""
+    """Raise `Unsupported` for a scene with features that `who` does not model."""
     has = {
         "disks": scene.n > 1,
         "walls": len(scene.walls) > 0,

@@ -18,7 +18,7 @@ from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.python import PythonSolver, seed
 from adapters.own_solver.spheres import Fields
 
-SHOWN = 60  # characters of what a file returned
+SHOWN = 60  # characters of a returned value in a message
 MODELS = f"models must be a text with some of the words {', '.join(FEATURES)}"
 COLLISION = "asked are rows [i, j] or [i, j, impulse]: disk i; disk j, or wall w as -1 - w; N s"
 
@@ -27,7 +27,7 @@ class PythonFile(PythonSolver):
     """The file as a module of this process. Raises `SolverFailed` if it is no engine."""
 
     def take(self, module: ModuleType) -> None:
-        """Its functions and its line `models`."""
+        """Take the functions and the line `models` of the module."""
         self.surface, self.whole, self.inside = "engine", self, ""
         self.file: dict[str, Callable[..., Any]] = {
             name: value
@@ -49,7 +49,7 @@ class PythonFile(PythonSolver):
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
-        """As of a solver; what fails inside one of its functions is said of that function."""
+        """As for a solver; a failure inside a function names that function."""
         self.inside = ""
         try:
             with super().guarded(limit, when):
@@ -61,12 +61,13 @@ class PythonFile(PythonSolver):
             raise
 
     def call(self, name: str, *arguments: Any) -> Any:
-        """What a function of the file returns."""
+        """Call a function of the file and return its result."""
         self.inside = name
         return self.file[name](*arguments)
 
     def whole_load(self, argument: dict[str, Any]) -> str:
-        """Create a world; a text that the file returns instead is its reason to refuse."""
+        """Create a world; if the file returns a text instead, that is its reason to refuse the
+        scene."""
         seed()
         scene = argument["scene"]
         for name in ("mass", "inertia"):
@@ -79,7 +80,7 @@ class PythonFile(PythonSolver):
         return self.world if isinstance(self.world, str) else ""
 
     def whole_play(self, argument: dict[str, Any]) -> dict[str, Any]:
-        """Some calls of `whole_step`, then where everything is and the collisions from number
+        """Call `whole_step` several times, then return the state and the collisions from number
         `heard` on."""
         for step in argument["steps"]:
             self.whole_step(step)
@@ -100,7 +101,7 @@ class PythonFile(PythonSolver):
         return [[0.0, 0.0, 0.0] for _ in range(self.n)]
 
     def hear(self) -> None:
-        """Log the collisions of this step."""
+        """Record the collisions of this step."""
         found = self.call("collisions", self.world)
         if not isinstance(found, (list, tuple, np.ndarray)):
             raise wrong("collisions", found, COLLISION)
@@ -138,8 +139,8 @@ def checked_models(models: Any) -> list[str]:
 
 
 def array_of(state: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """An array of what `read` returned; raises `SolverFailed` for what is none of that shape, or
-    not finite."""
+    """An array from the result of `read`; raises `SolverFailed` if it has another shape or is not
+    finite."""
     asked = f"asked is {'[x, y]' if len(shape) == 2 else 'a number'} for each of {shape[0]} disks"
     value = state.get(name) if isinstance(state, dict) else getattr(state, name, None)
     if value is None:
@@ -161,7 +162,7 @@ def array_of(state: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
 def wrong(
     function: str, value: Any, asked: str, what: str = "", kind: str = "error"
 ) -> SolverFailed:
-    """The sentence on something that a function may not return."""
+    """The failure for an invalid return value of a function."""
     text = repr(value)
     text = text if len(text) <= SHOWN else text[:SHOWN] + " ..."
     return SolverFailed(kind, f"{function} returned {text}{what}; {asked}")

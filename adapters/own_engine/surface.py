@@ -11,17 +11,17 @@ from adapters.own_solver.file import NotASolver, SolverText
 from adapters.own_solver.restitution import code_of
 
 ENGINE = ("create", "step", "read")
-# Names of the exercise: those that an engine may well have for itself, and those that it has not.
+# Names of the exercise: those that an engine may also use, and those that it does not.
 SHARED = ("integrate", "advance", "initScene")
 EXERCISE = ("sphereSphereCollisionHandling", "performSimStep", "projectObjects")
 HOW = "crosscheck new-engine NAME.js (or NAME.py) writes an engine that works"
 
 
 def is_engine(solver: SolverText) -> bool:
-    """Whether a file is an engine; else it is taken for a solver of the exercise.
+    """Whether a file is an engine; otherwise it counts as a solver of the exercise.
 
-    An engine may call functions of its own `integrate` or `advance`, if it has all of `ENGINE`.
-    Raises `NotASolver` if its functions are of both.
+    An engine may have its own functions `integrate` or `advance` if it has all of `ENGINE`. Raises
+    `NotASolver` for a mixture of both.
     """
     names = defined_in(solver.text, solver.kind)
     whole, theirs = names.issuperset(ENGINE), names.intersection(EXERCISE)
@@ -36,8 +36,7 @@ def is_engine(solver: SolverText) -> bool:
 
 
 def must_be_either(solver: SolverText) -> None:
-    """Raise `NotASolver` for a file that defines something, but in whose text no function of either
-    kind occurs."""
+    """Raise `NotASolver` for a file that defines names, but no function of either kind."""
     names = defined_in(solver.text, solver.kind)
     known = (*ENGINE, *EXERCISE, *SHARED)
     if names and not any(re.search(rf"\b{name}\b", solver.text) for name in known):
@@ -49,14 +48,14 @@ def must_be_either(solver: SolverText) -> None:
 
 
 def defined_in(text: str, kind: str) -> set[str]:
-    """The names that a text defines: of a Python file those of the module, of any other, or one
-    that is no Python, whatever looks like a definition."""
+    """The names that a text defines: for valid Python those of the module, else everything that
+    looks like a definition."""
     if kind == "python":
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of the text, which are for who wrote it
+                warnings.simplefilter("ignore")  # warnings about the text, meant for its author
                 return set(names_of(ast.parse(text).body))
-        except (SyntaxError, ValueError, RecursionError, MemoryError):  # said where it is run
+        except (SyntaxError, ValueError, RecursionError, MemoryError):  # reported when it is run
             return set(re.findall(r"^(?:async\s+)?def\s+(\w+)", text, re.MULTILINE))
     code = code_of(text)
     functions = re.findall(r"\bfunction\s*\*?\s*(\w+)\s*\(", code)
@@ -82,6 +81,6 @@ def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
 
 
 def listed(names: Iterable[str]) -> str:
-    """One, two and three."""
+    """Names as "one, two and three"."""
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last

@@ -1,1 +1,1 @@
-"""A solver of somebody's own, Exercise.js or solver.py, as an engine in a process of its own."""
+"""A user's own solver, Exercise.js or solver.py, as an engine in a separate process."""

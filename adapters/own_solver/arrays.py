@@ -1,8 +1,8 @@
-"""Makes a module with `advance(disks, world, dt, count)`, as in reference_impl, answer as the
-exercise's functions do.
+"""Wraps a module with `advance(disks, world, dt, count)`, as in reference_impl, in the functions of
+the exercise.
 
-A step of 0 s moves nothing, so that it shows what happens to a pair; a step of one disk alone is
-its integration.
+A step of 0 s moves nothing, so it gives the collision of a pair; a step of a single disk is its
+integration.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Call
         disks = disks_of(spheres)
         try:
             module.advance(disks, where, dt, 1)
-        finally:  # what it had done when it failed is judged, too
+        finally:  # the state at a failure is judged, too
             write_back(disks, spheres)
 
     def everybody() -> list[Any]:
@@ -46,20 +46,20 @@ def as_functions(module: ModuleType, restitution: float = 0.9) -> dict[str, Call
 
 
 class Whole:
-    """Plays scenes by the module's own `advance`, as the reference solver is played; it takes any
+    """Plays scenes with the module's own `advance`, like the reference solver, at any
     restitution."""
 
     def __init__(self, module: ModuleType) -> None:
         self.engine = Reference(module)
 
     def whole_load(self, argument: dict[str, Any]) -> None:
-        """Begin a scene, given by the fields of `Scene`."""
-        # JSON has no empty array of that shape
+        """Start a scene, given by the fields of `Scene`."""
+        # JSON has no empty array of this shape
         walls = np.reshape(argument["scene"]["walls"], (-1, 2, 2))
         self.engine.load(Scene(**argument["scene"] | {"walls": walls}), argument["dt"])
 
     def whole_play(self, argument: dict[str, Any]) -> dict[str, Any]:
-        """Some calls of `whole_step`, then where everything is and the collisions from number
+        """Call `whole_step` several times, then return the state and the collisions from number
         `heard` on."""
         for step in argument["steps"]:
             self.whole_step(step)
@@ -81,7 +81,7 @@ class Whole:
         return rows
 
     def collisions(self, heard: int) -> list[list[float]]:
-        """(step, i, j, impulse), as `advance` reported them, from number `heard` on."""
+        """(step, i, j, impulse) reported by `advance`, from number `heard` on."""
         return [
             [int(step), int(i), int(j), float(impulse)]
             for step, i, j, impulse in self.engine.collisions()[heard:]

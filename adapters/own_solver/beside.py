@@ -1,9 +1,9 @@
-"""What a solver.py imports from its own folder: found when the file is read, and imported from the
-texts read then.
+"""The modules that a solver.py imports from its own folder: found and read together with the file,
+and imported from these texts.
 
 A neighbour is a module that an import statement names, in the file or in another neighbour, and
-that is not installed: it never hides a library. What a file opens or imports by other means while
-it runs is its own affair.
+that is not installed: it never hides a library. Files that it opens or imports by other means at
+run time are not covered.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from adapters.safe_path import PACKAGES
 def modules_beside(
     folder: Path, text: str, read: Callable[[Path], str]
 ) -> Iterator[tuple[str, str]]:
-    """File, relative to `folder`, and text of every neighbour that `text` imports, or that such a
-    one imports."""
+    """File, relative to `folder`, and text of every neighbour that `text` imports directly or
+    indirectly."""
     seen: set[str] = set()
     names = imported_by(text)
     while names:
@@ -42,13 +42,13 @@ def modules_beside(
 
 
 def imported_by(text: str) -> set[str]:
-    """The first names of all modules that the import statements of a text name; none if it is no
+    """The top-level names of all modules in the import statements of a text; none if it is not
     Python."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the text, which are for who wrote it
+            warnings.simplefilter("ignore")  # warnings about the text, meant for its author
             nodes = list(ast.walk(ast.parse(text)))
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # which is said where it is run
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # reported when it is run
         return set()
     named = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     named += [
@@ -60,22 +60,23 @@ def imported_by(text: str) -> set[str]:
 
 
 def is_library(name: str, folder: Path) -> bool:
-    """Whether a module is found elsewhere than in `folder`."""
+    """Whether a module is found outside `folder`."""
     if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in PACKAGES:
         return True
     spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
-    # a folder without __init__.py is found after all others
+    # a folder without __init__.py is found last
     return spec is not None and spec.origin is not None
 
 
 def files_of(folder: Path, name: str) -> Sequence[Path]:
-    """The files of a module in `folder`, of a package all; none if it is not there."""
+    """The files of a module in `folder`, all files for a package; none if there is no such
+    module."""
     package, module = folder / name, folder / f"{name}.py"
     try:
         module.lstat()
     except FileNotFoundError:
         pass
-    except OSError:  # no file can have so long a name
+    except OSError:  # the name is too long for a file
         return []
     if module.exists() and not (package / "__init__.py").exists():
         return [module]
@@ -83,15 +84,14 @@ def files_of(folder: Path, name: str) -> Sequence[Path]:
 
 
 class Neighbours(SourceLoader, MetaPathFinder):
-    """Imports the neighbours of a solver from their texts, whatever has become of the files."""
+    """Imports the neighbours of a solver from their texts, whether or not the files still exist."""
 
     def __init__(self, folder: Path, texts: Mapping[str, str], copies: Path) -> None:
-        """`texts`: as `modules_beside` gives them, from `folder`; their code is said to be from
-        files in `copies`."""
+        """`texts`: from `modules_beside` of `folder`; their code objects name files in `copies`."""
         self.folder, self.texts, self.copies = folder, texts, copies
 
     def find_spec(self, fullname: str, *_: Any) -> ModuleSpec | None:
-        """As the system finds it in the folder: a package, a module, or a folder of such."""
+        """As Python finds it in the folder: a package, a module, or a namespace package."""
         place = fullname.replace(".", "/")
         for file, within in (
             (f"{place}/__init__.py", [str(self.folder / place)]),
@@ -105,23 +105,22 @@ class Neighbours(SourceLoader, MetaPathFinder):
         return ModuleSpec(fullname, None, is_package=True) if inside else None
 
     def get_filename(self, fullname: str) -> str:
-        """Where the file of a module was."""
+        """The path of a module's file."""
         spec = self.find_spec(fullname)
         if spec is None or spec.origin is None:
             raise ImportError(f"{fullname} is no module beside the solver", name=fullname)
         return spec.origin
 
     def get_data(self, path: str | bytes) -> bytes:
-        """The text of a file; raises `OSError` for any other, such as one with code that was
-        compiled before."""
+        """The text of a file; raises `OSError` for other files, such as compiled code."""
         file = Path(os.fsdecode(path)).relative_to(self.folder).as_posix()
         if file not in self.texts:
             raise OSError(f"{file} was not read with the solver")
         return self.texts[file].encode()
 
     def source_to_code(self, data: Any, path: Any = "<string>") -> CodeType:  # type: ignore[override]
-        """The code of a module; from text, for it is no more in the letters that its first line may
-        name."""
+        """The code of a module; compiled from decoded text, to which the encoding in its first line
+        no longer applies."""
         return compile(
             data.decode(),
             str(self.copies / Path(path).relative_to(self.folder)),

@@ -1,5 +1,5 @@
-"""Somebody's own solver file as an engine: an Exercise.js or a solver.py, driven step by step in
-its own process."""
+"""A user's own solver file as an engine: an Exercise.js or a solver.py, driven step by step in a
+separate process."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from adapters.own_solver.restitution import EXERCISE, restitution_of
 from scenarios.model import Array, Scene, State
 
 NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
-STEP_LIMIT = 30.0  # s that one call for some steps may take
+STEP_LIMIT = 30.0  # s that one call for several steps may take
 BEGIN_LIMIT = 2.0  # s that initScene may take
 
 
 class Student:
-    """Plays the text of a file in a process of its own, whatever becomes of the file.
+    """Plays the text of a file in a separate process, whatever happens to the file.
 
-    One with `advance` is played by it and plays what the reference solver plays. Of any other the
-    functions `integrate` and `sphereSphereCollisionHandling` are called: all spheres, every pair i
-    < j, then the wrap; whatever they do is played. Its restitution is written into it, so a scene
-    that needs another than the file is written for is refused, as are walls and disks that cannot
-    move, which the exercise does not have, and what calls a function that the file lacks.
+    A file with `advance` is played with it, in all scenes of the reference solver. For any other
+    file `integrate` is called for all spheres, `sphereSphereCollisionHandling` for every pair i <
+    j, then the wrap; whatever they do is played. Its restitution is a constant in the file, so a
+    scene with another one is refused. So are walls and static disks, which the exercise does not
+    have, and scenes that need a function that the file lacks.
 
     patience: s that a call for some steps may take after the first, in which a file may still be
         compiled.
-    collected: steps are asked for when somebody reads what came of them, all in one request: a
-        frame under thrust is one exchange with the process instead of one a step.
+    collected: steps are requested together with the next `read`: a frame under thrust is one
+        exchange with the process instead of one per step.
     """
 
     listening, wrapping = True, 0.0
@@ -54,7 +54,7 @@ class Student:
 
     @property
     def process(self) -> SolverProcess:
-        """The process, started when it is first needed; raises `Unsupported` if the file cannot be
+        """The process, started when first needed; raises `Unsupported` if the file cannot be
         loaded."""
         if self.started is None:
             try:
@@ -69,14 +69,15 @@ class Student:
 
     @property
     def own_restitution(self) -> float:
-        """What the file is written for; the exercise's where its text tells nothing, or it takes
+        """The restitution of the file; that of the exercise if its text has none, or if it takes
         any. Raises `Unsupported` if the file cannot be loaded."""
         if self.process.surface == "advance" or self.restitution.own is None:
             return EXERCISE
         return self.restitution.own
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Make the scene's spheres; raises `Unsupported` for what the exercise has not."""
+        """Make the scene's spheres; raises `Unsupported` for features that the exercise does not
+        have."""
         must_be_frictionless(scene, self.path.name)
         process = self.process
         self.forget(scene)
@@ -95,7 +96,7 @@ class Student:
         )
 
     def forget(self, scene: Scene) -> None:
-        """Forget the scene before: what acted, what was asked for, what was heard and seen."""
+        """Forget the previous scene: forces, requested steps, collisions and states."""
         self.forces = np.zeros((scene.n, 3))
         self.asked: list[dict[str, Any]] = []
         self.log: list[ContactImpulse] = []
@@ -123,11 +124,11 @@ class Student:
             )
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to what acts during the next step."""
+        """Add to the force and torque of the next step."""
         self.forces[disk] += [*force, torque]
 
     def step(self, count: int = 1) -> None:
-        """One request for all the steps, now or, if they are collected, with the next `read`."""
+        """One request for all the steps, at once or, if `collected`, with the next `read`."""
         forces = self.forces.tolist() if self.forces.any() else None
         single = forces is not None and count == 1 and not self.whole
         last = self.asked[-1] if self.asked else {}
@@ -143,12 +144,12 @@ class Student:
             self.limit = self.patience
 
     def take(self) -> list[dict[str, Any]]:
-        """The steps that were not asked for yet, which are taken for asked for from now on."""
+        """Return the steps not yet requested, and mark them as requested."""
         asked, self.asked = self.asked, []
         return asked
 
     def look(self) -> Array:
-        """(n, 12) or (n, 6) numbers of the spheres or the arrays; collisions are noted, too."""
+        """(n, 12) or (n, 6) numbers of the spheres or the arrays; also records collisions."""
         if self.rows is None:
             what = {"steps": self.take(), "heard": len(self.log)}
             answer = self.do("whole_play" if self.whole else "play", what, self.limit)
@@ -167,19 +168,19 @@ class Student:
         return State(*(rows[:, part].copy() for part in (slice(0, 2), slice(2, 4), angle, spin)))
 
     def collisions(self) -> list[ContactImpulse]:
-        """What `advance` reported, or every call of the collision function that changed a
-        velocity."""
+        """The collisions that `advance` reported, or every call of the collision function that
+        changed a velocity."""
         self.look()
         return self.log
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """What the file decides."""
+        """The settings that the file decides."""
         own = "the scene's" if self.whole else str(self.restitution)
         order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
         return {"restitution": (None, own), "order of a step": (None, order), **self.of_file()}
 
     def of_file(self) -> dict[str, tuple[Any, Any]]:
-        """Which file it is, and what it takes from beside it."""
+        """The file, and the modules that it imports from its folder."""
         beside = ", ".join(file for file, _ in self.solver.beside)
         which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
         if not beside:
@@ -187,7 +188,7 @@ class Student:
         return which | {"from beside it": (None, f"{beside}; sha256 of all {self.solver.source}")}
 
     def versions(self) -> dict[str, str]:
-        """Of the language's engine."""
+        """The versions of the language's engine."""
         return self.process.versions
 
     def close(self) -> None:
@@ -198,10 +199,10 @@ class Student:
 
 
 def make_globals(process: SolverProcess) -> None:
-    """Let the file make its own scene, as the exercise's page does before the first step: its
-    functions may speak of `ufo` or `asteroids`."""
+    """Let the file make its own scene, as the exercise's page does before the first step, because
+    its functions may use `ufo` or `asteroids`."""
     if process.functions["begin"]:
-        with suppress(SolverFailed):  # what needs them says so itself
+        with suppress(SolverFailed):  # a function that needs them fails with its own message
             process.do("begin", None, BEGIN_LIMIT)
 
 
@@ -226,13 +227,13 @@ def spheres_of(scene: Scene) -> list[list[float]]:
 
 
 def engine_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
-    """The row of `ENGINES` that a solver's file, as it is now, stands for; raises `NotASolver` if
-    the path is none."""
+    """The engine row of a solver's file in its present state; raises `NotASolver` if the path is
+    not one."""
     return row_of_solver(read_solver(path), patience, collected)
 
 
 def row_of_solver(solver: SolverText, patience: float, collected: bool) -> EngineRow:
-    """The row of a solver's text."""
+    """The engine row of a solver's text."""
     return EngineRow(
         partial(Student, solver, patience, collected),
         f"your own solver, {solver.path}",

@@ -1,7 +1,6 @@
-"""Reads the file of somebody's solver as text, and says in a sentence why it cannot be one.
+"""Reads a solver's file as text, and says in a sentence why it cannot be one.
 
-It is read once: what is played, checked and hashed is the text that was read, whatever is saved
-meanwhile.
+It is read once: this text is played, checked and hashed, whatever is saved meanwhile.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import Any, ClassVar, Protocol
 
 from adapters.own_solver.beside import modules_beside
 
-LARGEST = 2**20  # bytes; the exercise's file has about five thousand
+LARGEST = 2**20  # bytes; the exercise's file has about 5000
 # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
 PATIENCE = 3
 LONGEST = 300  # characters of a message
@@ -23,25 +22,25 @@ KINDS = {".js": "javascript", ".py": "python"}
 
 
 class NotASolver(ValueError):
-    """A path that is no JavaScript or Python text; the message names it and says what to do."""
+    """A path is not JavaScript or Python text; the message names it and says what to do."""
 
     def __init__(self, what: str) -> None:
         super().__init__(printable(what))
 
 
 class SolverFailed(Exception):
-    """A solver that cannot be loaded or did not come back from a call.
+    """A solver cannot be loaded, or did not return from a call.
 
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
-            adapters/javascript; "diverged" of an engine's file that reads what is not finite.
-        what: what happened, as the end of the sentence "it ..."; what no terminal may be sent is
-            escaped, and what goes on for more than `LONGEST` characters is cut.
-        line, column: where in the solver's file, from 1; 0 where nobody can tell.
+            adapters/javascript; "diverged" if `read` of an engine's file returns numbers that are
+            not finite. what: the end of the sentence "it ..."; control characters are escaped, and
+            text beyond `LONGEST` characters is cut. line, column: the place in the solver's file,
+            from 1; 0 if it is not known.
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
-        # cut first: to escape millions of letters takes longer than a call may
+        # cut first: escaping millions of characters would exceed the limit of a call
         what = printable(what[: LONGEST + 1])
         what = what if len(what) <= LONGEST else what[:LONGEST] + " ..."
         super().__init__(what)
@@ -49,7 +48,7 @@ class SolverFailed(Exception):
 
     @property
     def status(self) -> str:
-        """Of a run that it ends, one of `STATUSES` of run.py."""
+        """The status of a run that it ends, one of `STATUSES` of run.py."""
         return self.kind if self.kind in ("timeout", "crashed", "diverged") else "error"
 
     def __str__(self) -> str:
@@ -57,25 +56,26 @@ class SolverFailed(Exception):
 
 
 def printable(text: str) -> str:
-    """Somebody's text on one line, its control characters as they are written in code: they would
-    act on a terminal."""
+    """Foreign text on one line, with control characters escaped, because they would act on a
+    terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class Loadable(Protocol):
-    """What a process can load that is no solver's file; it is pickled on its way there."""
+    """Something other than a solver's file that a process can load; it is sent there pickled."""
 
     @property
     def kind(self) -> str:
         """It is `packaged`."""
 
     def load(self) -> Any:
-        """What answers the commands, as a solver does, in that process; raises `SolverFailed`."""
+        """The object that answers the commands of a solver, in that process; raises
+        `SolverFailed`."""
 
 
 @dataclass(frozen=True)
 class SolverText:
-    """A solver's file as it was when it was read, with all that it takes to play it on any machine.
+    """A solver's file as read, with all that is needed to play it on any machine.
 
     Attributes:
         path: where it was.
@@ -84,7 +84,7 @@ class SolverText:
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
         beside: the modules that it imports from its own folder, or the gl-matrix that it calls:
             file, relative to the folder or to the one above with its node_modules, -> text.
-        engine: it is an engine's file, `EngineText` of adapters/own_engine, which loads itself.
+        engine: for an engine's file its `EngineText` of adapters/own_engine, which loads itself.
     """
 
     engine: ClassVar[bool] = False
@@ -97,7 +97,7 @@ class SolverText:
 
     @property
     def source(self) -> str:
-        """16 hex digits over every text that decides what it does."""
+        """16 hex digits of a hash over every text that affects its behaviour."""
         return hashlib.sha256(repr((self.digest, self.beside)).encode()).hexdigest()[:16]
 
 
@@ -141,7 +141,7 @@ def read_beside(path: Path, text: str) -> dict[str, str]:
 def read_library(path: Path, text: str) -> dict[str, str]:
     """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
     `NotASolver`."""
-    # it loads numpy, which --help does without
+    # it imports numpy, which --help does not need
     from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
 
     found = gl_matrix_of(path, text)
@@ -154,12 +154,12 @@ def read_module(path: Path) -> str:
 
 
 def read_bytes(path: Path, wanted: str) -> bytes:
-    """All of a small file; raises `NotASolver`, with what is `wanted` in the place of something
-    that is no file."""
+    """All bytes of a small file; raises `NotASolver`, which says what is `wanted` instead of
+    something that is not a file."""
     try:
         about = path.stat()
         if not stat.S_ISREG(about.st_mode):
-            raise NotASolver(f"{path}: is no file; {wanted}")  # a pipe would be waited for
+            raise NotASolver(f"{path}: is no file; {wanted}")  # reading a pipe would block
         size = about.st_size
         if size > LARGEST:
             raise NotASolver(
@@ -181,7 +181,7 @@ def dangling(path: Path) -> bool:
     """Whether it is a link to nothing."""
     try:
         return path.is_symlink() and not path.exists()
-    except OSError:  # a name that no file can have, as it is too long
+    except OSError:  # a name that is too long for a file
         return False
 
 
@@ -192,7 +192,7 @@ def decoded(path: Path, data: bytes) -> str:
 
 
 def letters(path: Path, data: bytes) -> str:
-    """The text of `decoded` with its own line ends."""
+    """The text as in `decoded`, with its own line ends."""
     if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return data.decode("utf-32", errors="replace")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

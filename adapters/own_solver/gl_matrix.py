@@ -1,5 +1,5 @@
-"""Finds the gl-matrix that an Exercise.js calls: the one the exercise hands out beside the file,
-else that of npm above it, else the one that the extra `js` fetches."""
+"""Finds the gl-matrix that an Exercise.js calls: the exercise's copy beside the file, else that of
+npm above it, else the one that the extra `js` fetches."""
 
 from __future__ import annotations
 
@@ -28,11 +28,10 @@ TAKE_OUT = f"""if (typeof glMatrix === "object") {{
 
 
 def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
-    """Name, relative to where it was found, and file of what a solver of that `text` calls; None if
-    there is none.
+    """Relative name and path of the gl-matrix that a solver with this `text` calls; None if there
+    is none.
 
-    It is loaded for who mentions one of its names only; whoever defines that name for himself is
-    not disturbed.
+    It is loaded only if the text uses one of its names and does not define that name itself.
     """
     return next(found_from(solver), None) if CALLS.search(text) else None
 
@@ -52,7 +51,7 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
 
 
 def main_of(package: Path) -> str:
-    """The file that a package names as its main one; its own folder, which is no file, if it names
+    """The main file named by a package; the package's folder, which is not a file, if it names
     none."""
     try:
         return str(json.loads((package / "package.json").read_text(encoding="utf-8"))["main"])

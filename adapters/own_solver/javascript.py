@@ -24,9 +24,9 @@ from adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, WHERE_TO
 
 HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
 LOAD_LIMIT = 2.0  # s
-NAME = "solver-file"  # how the solver's text is called in stack traces
+NAME = "solver-file"  # the name of the solver's text in stack traces
 DRIVER = (Path(__file__).parent / "driver.js").read_text(encoding="utf-8")
-# Evaluated after the file, where its `let` and `const` can be seen too; a name that it lacks fails
+# Evaluated after the file, where its `let` and `const` are visible, too; a missing name fails
 # when it is used.
 BIND = """__crosscheck("bind", {
   integrate: typeof integrate === "undefined" ? null : integrate,
@@ -58,13 +58,13 @@ class JavaScriptSolver:
         self.load()
 
     def renew(self) -> None:
-        """Load the file into a new V8, with nothing in it of what was called before."""
+        """Load the file into a new V8, without any state of earlier calls."""
         self.close()
         self.v8 = MiniRacer()
         self.load()
 
     def close(self) -> None:
-        """Give back what V8 takes."""
+        """Release the memory of V8."""
         self.v8.close()
 
     def load(self) -> None:
@@ -82,8 +82,8 @@ class JavaScriptSolver:
             raise self.failure(error, LOAD_LIMIT, "while it is loaded") from None
 
     def load_library(self, name: str, text: str) -> None:
-        """The gl-matrix, as the exercise's page loads it before the file. Raises `SolverFailed` if
-        it is none."""
+        """Load gl-matrix, as the exercise's page does before the file. Raises `SolverFailed` if it
+        fails."""
         try:
             self.v8.eval(f"{text}\n//# sourceURL={name}", timeout_sec=LOAD_LIMIT)
             self.v8.eval(TAKE_OUT)
@@ -94,8 +94,8 @@ class JavaScriptSolver:
             ) from None
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """What the driver answers to a command; raises `SolverFailed` after `limit` s, or if the
-        file threw."""
+        """The driver's answer to a command; raises `SolverFailed` after `limit` s, or if the file
+        threw."""
         code = f'__crosscheck("{command}", {json.dumps(json.dumps(argument))})'
         try:
             answer = json.loads(str(self.evaluated(code, limit, may_repeat=command == "ask")))
@@ -104,8 +104,8 @@ class JavaScriptSolver:
         return read(command, answer)
 
     def together(self, questions: Sequence[Any], limit: float) -> list[dict[str, Any]]:
-        """The answers to the first of these questions, in one call of V8, which takes longer than
-        a question: to all, unless they take `limit` s or the file wants too much memory."""
+        """The answers to the first questions, or to all, in a single call of V8, because a call
+        takes longer than a question. Fewer if they take `limit` s or too much memory."""
         answers: list[Any] = []
         with suppress(JSEvalException):
             try:
@@ -122,14 +122,14 @@ class JavaScriptSolver:
         return replies
 
     def done(self, code: str, limit: float) -> Any:
-        """What the driver gives, where the file cannot have thrown."""
+        """The result of driver code in which the file cannot have thrown."""
         return json.loads(str(self.v8.eval(code, timeout_sec=limit)))["done"]
 
     def evaluated(self, code: str, limit: float, may_repeat: bool) -> object:
-        """What V8 makes of `code`; what was stopped without having run for `limit` s is asked again
-        if `may_repeat`.
+        """The result of `code` in V8. If it was stopped before it had run for `limit` s, it is
+        repeated if `may_repeat`.
 
-        V8 is stopped by the clock, on a busy machine before it has had its time.
+        V8 is stopped by wall time, on a busy machine before it has had its processor time.
         """
         began = process_time()
         try:
@@ -140,11 +140,11 @@ class JavaScriptSolver:
             return self.v8.eval(code, timeout_sec=(PATIENCE - 1) * limit)
 
     def versions(self) -> dict[str, str]:
-        """What decides the numbers."""
+        """The versions that affect the numbers."""
         return {"mini-racer": version("mini-racer"), "V8": self.v8.v8_version}
 
     def failure(self, error: JSEvalException, limit: float, when: str) -> SolverFailed:
-        """What V8 says, in a sentence, with line and column where it reports them."""
+        """The message of V8 as a `SolverFailed`, with line and column if known."""
         if isinstance(error, JSTimeoutException):
             return SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
         if isinstance(error, JSOOMException):
@@ -164,7 +164,7 @@ class JavaScriptSolver:
 
 
 def read(command: str, answer: dict[str, Any]) -> Any:
-    """What an answer of the driver gives; raises `SolverFailed` if the file threw."""
+    """The value of an answer of the driver; raises `SolverFailed` if the file threw."""
     if "error" in answer:
         raise thrown(answer["error"])
     if command == "accesses":
@@ -180,7 +180,7 @@ def lines_of(stack: str) -> list[int]:
 
 
 def thrown(error: dict[str, str]) -> SolverFailed:
-    """What a function threw, and where in the solver's file."""
+    """The exception of a function, and its place in the solver's file."""
     place = re.search(rf"{NAME}:(\d+):(\d+)", error["stack"])
     line, column = (int(place[1]), int(place[2])) if place else (0, 0)
     return SolverFailed("error", plainly(error["what"]), line, column)
@@ -202,7 +202,7 @@ SCRIPT = "the exercise's page loads the file as a plain script, which has no mod
 
 
 def plainly(what: str) -> str:
-    """V8's words, with a hint where they alone do not help."""
+    """V8's message, with a hint if it alone does not help."""
     what = what.removeprefix("Uncaught ")
     if "Maximum call stack" in what:
         return "calls itself without end (maximum call stack size exceeded)"

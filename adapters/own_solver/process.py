@@ -1,4 +1,4 @@
-"""Runs a solver's file in a process of its own, so that nothing the file does ends this program."""
+"""Runs a solver's file in a separate process, so that nothing in the file can end this program."""
 
 from __future__ import annotations
 
@@ -32,24 +32,25 @@ Request = tuple[str, Any, float]
 
 
 class Idle(NamedTuple):
-    """A process whose solver is done with, what that was, and what the process writes."""
+    """A process that has finished with its solver, the solver's text, and the output of the
+    process."""
 
     solver: str
     process: subprocess.Popen[bytes]
     pieces: system.Pieces
 
 
-# Of each language the process that waits for its next use; None where a process ends with its use.
+# Language -> the process that waits for reuse; None if processes are not reused.
 waiting: dict[str, Idle] | None = None
 REUSED = ("javascript", "python")
 
 
 def keep_processes() -> None:
-    """From now on a process is not ended after its use: the next one that is asked for is it.
+    """From now on processes are reused instead of ended.
 
-    A start takes a third of a second, of Python and its libraries. In V8 any other file can be
-    loaded, with nothing in it of the last one; in Python only the same file, as modules may have
-    been changed by it. A process that is left ends with the one that calls this.
+    Starting Python and its libraries takes a third of a second. V8 can load another file without
+    any state of the last one; a Python process can only load the same file again, because the file
+    may have changed modules. A waiting process ends with this one.
     """
     global waiting
     waiting = {} if waiting is None else waiting
@@ -57,7 +58,7 @@ def keep_processes() -> None:
 
 @contextmanager
 def processes_reused() -> Iterator[None]:
-    """As `keep_processes`, within."""
+    """Context in which processes are reused, as by `keep_processes`."""
     global waiting
     before = waiting
     keep_processes()
@@ -81,12 +82,12 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 class SolverProcess:
-    """A solver's text, or an engine's package, in a process of its own; use it in a `with`, or
-    close it.
+    """A solver's text, or an engine's package, in a separate process; use it in a `with`, or close
+    it.
 
     Attributes:
-        functions: which of integrate, collide, step, wrap and begin it has, and which built-ins it
-            replaced.
+        functions: those of integrate, collide, step, wrap and begin that it has, and the built-ins
+            that it replaced.
         kind: "javascript" or "python"; or "packaged", an engine of adapters/javascript.
         surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl),
             "engine" (a file of adapters/own_engine) or "packaged".
@@ -107,7 +108,7 @@ class SolverProcess:
         copies = None
         if compiled and kept and isinstance(solver, SolverText) and self.kind == "python":
             copies = kept_copies(solver, kept)
-        # Plain Python gives the same bits as numba, and starts 20 s sooner.
+        # Plain Python gives the same bits as numba, and starts 20 s earlier.
         settings = {"PYTHONDONTWRITEBYTECODE": "1"} | ({} if copies else {"NUMBA_DISABLE_JIT": "1"})
         settings["PYTHONPATH"] = path_of_this()
         if kept is not None:
@@ -125,7 +126,7 @@ class SolverProcess:
         self.versions: dict[str, str] = hello["versions"]
 
     def start(self, settings: dict[str, str]) -> Any:
-        """Start the process, or take the one that waits, and send it the solver; returns its first
+        """Start a process, or reuse the waiting one, and send it the solver; returns its first
         answer.
 
         The process itself stops a file that does not load in time. If it does not answer at all, it
@@ -144,7 +145,8 @@ class SolverProcess:
         raise AssertionError("the second start returns or raises")
 
     def take(self) -> bool:
-        """Whether one waits that can load this solver; another one is ended."""
+        """Reuse the waiting process if it can load this solver, else end it; returns whether it is
+        reused."""
         idle = waiting.pop(self.kind, None) if waiting else None
         if idle is None:
             return False
@@ -190,9 +192,9 @@ class SolverProcess:
     def request(
         self, requests: Sequence[Request], total: float = float("inf")
     ) -> list[Any | SolverFailed]:
-        """The answer to each, or how it failed, within `total` s; raises `SolverFailed` if the
-        process is lost."""
-        # After one call that does not come back the worker puts no other like it, so a few limits
+        """The answer to each request, or its failure, within `total` s; raises `SolverFailed` if
+        the process is lost."""
+        # After a call that does not return the worker makes no other like it, so a few limits
         # are enough.
         most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
         answers = self.exchange(requests, min(most + GRACE, total))
@@ -226,7 +228,7 @@ class SolverProcess:
         while not received.endswith(b"\n"):
             left = deadline - monotonic()
             chunk = self.pieces.next(left)
-            if chunk is None or left < 0:  # a process that writes without end always has a piece
+            if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
                 self.end()
                 raise SolverFailed(
                     "timeout", f"does not come back within {limit:g} s and had to be stopped"
@@ -243,7 +245,7 @@ class SolverProcess:
             raise SolverFailed("crashed", INTRUDED) from None
 
     def lost(self) -> SolverFailed:
-        """The failure that says how the process ended."""
+        """The failure of a process that has ended."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         # what V8 sends when its heap is full
@@ -279,7 +281,7 @@ class SolverProcess:
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:
-    """A folder below `kept` with the texts of a Python solver, named by what they are; None if it
+    """A folder below `kept` with the texts of a Python solver, named by their hash; None if it
     cannot be written.
 
     numba caches compiled code by path and content of the file at that moment. The file may have

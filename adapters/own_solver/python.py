@@ -18,12 +18,12 @@ from adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
 from adapters.system import stopped_after
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
-LOGGED = 400  # contacts that are kept for the judge
-TRACED = 400  # accesses that are kept of a traced call
+LOGGED = 400  # contacts kept for the check
+TRACED = 400  # accesses kept of a traced call
 
 
 def row_of(s: Any) -> list[float]:
-    """The 12 numbers of a sphere; NaN where it holds none."""
+    """The 12 numbers of a sphere; NaN for a field that is not a number."""
     try:
         vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
     except AttributeError:
@@ -36,7 +36,7 @@ def row_of(s: Any) -> list[float]:
 
 
 def number(x: Any) -> float:
-    """`x` as a float, NaN if it is none."""
+    """`x` as a float; NaN if it is not a number."""
     try:
         return float(x)
     except (TypeError, ValueError):
@@ -44,7 +44,7 @@ def number(x: Any) -> float:
 
 
 def seed() -> None:
-    """The same random numbers for every question."""
+    """Seed the random numbers, the same for every question."""
     random.seed(1)
     if "numpy" in sys.modules:
         sys.modules["numpy"].random.seed(1)
@@ -54,7 +54,7 @@ class PythonSolver:
     """The file as a module of this process. Raises `SolverFailed` if it cannot be loaded."""
 
     def __init__(self, solver: SolverText, copies: Path | None = None) -> None:
-        """`copies`: where the texts lie as they were read, for numba: it keeps what it compiled by
+        """`copies`: the folder with the texts as read, for numba, which caches compiled code by
         file and content."""
         here = solver.path.resolve()
         self.solver, self.name = solver, str(solver.path if copies is None else copies / here.name)
@@ -63,8 +63,7 @@ class PythonSolver:
         self.renew()
 
     def renew(self) -> None:
-        """Load the file and the modules beside it as new ones, with nothing in them of what was
-        called before."""
+        """Load the file and the modules beside it again, without any state of earlier calls."""
         solver, here = self.solver, self.solver.path.resolve()
         for name, loaded in list(sys.modules.items()):
             if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
@@ -72,7 +71,7 @@ class PythonSolver:
         seed()
         self.module = module = ModuleType("solver")
         module.__file__ = str(here)
-        sys.modules["solver"] = module  # numba and dataclasses look a function's module up
+        sys.modules["solver"] = module  # numba and dataclasses look up a function's module
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
             exec(compile(solver.text, self.name, "exec"), module.__dict__)
         self.take(module)
@@ -90,7 +89,7 @@ class PythonSolver:
         self.file: dict[str, Callable[..., Any]] = {
             k: vars(module)[f] for k, f in named.items() if callable(vars(module).get(f))
         }
-        self.whole: Any = None  # plays whole scenes by `advance`, where the file has it
+        self.whole: Any = None  # plays whole scenes with `advance` if the file has it
         if self.surface == "advance":
             from adapters.own_solver.arrays import Whole, as_functions
 
@@ -103,13 +102,13 @@ class PythonSolver:
             return getattr(self.whole if command.startswith("whole") else self, command)(argument)
 
     def versions(self) -> dict[str, str]:
-        """What decides the numbers."""
+        """The versions that affect the numbers."""
         return {"python": ".".join(map(str, sys.version_info[:3]))}
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
-        """Turns whatever the file does into `SolverFailed`, and stops it after `limit` s of
-        processor time."""
+        """Context that turns every exception of the file into `SolverFailed`, and stops it after
+        `limit` s of processor time."""
 
         def too_late() -> SolverFailed:
             return SolverFailed("timeout", f"does not come back within {limit:g} s {when}")
@@ -123,7 +122,7 @@ class PythonSolver:
             raise self.failure(error, when) from None
 
     def failure(self, error: BaseException, when: str) -> SolverFailed:
-        """What was raised, in a sentence, with its place in the solver's file."""
+        """An exception as a `SolverFailed`, with its place in the solver's file."""
         if isinstance(error, RecursionError):
             what = "calls itself without end (maximum recursion depth exceeded)"
         elif isinstance(error, MemoryError):
@@ -158,15 +157,15 @@ class PythonSolver:
         return [self.module.ufo, *self.module.asteroids]
 
     def globals(self, _argument: Any = None) -> list[list[float]] | None:
-        """The numbers of the file's own spheres, None if it has none."""
+        """The numbers of the file's own spheres; None if it has none."""
         try:
             return [row_of(s) for s in self.everybody()]
         except (AttributeError, TypeError):
             return None
 
     def ask(self, question: dict[str, Any]) -> dict[str, Any]:
-        """The spheres after each call of a question, and whether anything was returned, strayed or
-        failed."""
+        """The answer to a question: the spheres after each call, and what was returned, changed
+        elsewhere, or failed."""
         states: list[list[list[float]]] = []
         returned, error = False, None
         seed()
@@ -207,16 +206,16 @@ class PythonSolver:
         }
 
     def left(self, _argument: Any = None) -> list[list[float]]:
-        """The spheres of the last question, which a call that failed may have changed."""
+        """The spheres of the last question, which a failed call may have changed."""
         return [row_of(s) for s in self.asked]
 
     def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
-        """Call a function of the file on some of the spheres; what it returns."""
+        """Call a function of the file on some of the spheres, and return its result."""
         on = {"integrate": 1, "collide": 2}.get(name, 0)
         return self.file[name](*(spheres[i] for i in arguments[:on]), *arguments[on:])
 
     def numbers(self) -> dict[str, str]:
-        """The file's global numbers as text: those that a call leaves changed are its state."""
+        """The file's global numbers as text; those that a call changes are its state."""
         return {
             name: repr(value)
             for name, value in vars(self.module).items()
@@ -224,7 +223,7 @@ class PythonSolver:
         }
 
     def watched(self, spheres: list[Any]) -> list[list[Any]]:
-        """A list that gets a row for every call the file makes of its own functions."""
+        """A list that gets a row for every call of the file to its own functions."""
         calls: list[list[Any]] = []
         place = {id(s): k for k, s in enumerate(spheres)}
 
@@ -243,8 +242,8 @@ class PythonSolver:
         return calls
 
     def trace(self, question: dict[str, Any]) -> None:
-        """Make the calls of a question on spheres that write down who reads or writes which of
-        their numbers; `accesses` then reports it, even if a call never came back."""
+        """Make the calls of a question on spheres that record every read and write of their
+        numbers; `accesses` then returns these, even if a call never returned."""
         self.trail: list[tuple[str, int, str, list[int]]] = []
         seed()
         spheres = [self.traced(r, k) for k, r in enumerate(question["spheres"])]
@@ -252,15 +251,15 @@ class PythonSolver:
             self.call(name, arguments, spheres)
 
     def accesses(self, _argument: Any = None) -> list[tuple[str, int, str, list[int]]]:
-        """("r" or "w", sphere, field, lines of the file from the innermost call on) of the last
+        """("r" or "w", sphere, field, lines of the file, the innermost call first) of the last
         `trace`."""
         return self.trail
 
     def traced(self, numbers: list[float], k: int) -> Any:
-        """Sphere `k`, which reports its accesses."""
+        """Sphere `k` that records its accesses."""
 
         def access(kind: str, field: str) -> None:
-            last = len(self.trail) > TRACED  # of a loop without end only the latest is kept
+            last = len(self.trail) > TRACED  # only the latest accesses of an endless loop are kept
             self.trail[TRACED if last else len(self.trail) :] = [
                 (kind, k, field, self.lines_of(sys._getframe(2)))
             ]
@@ -281,7 +280,7 @@ class PythonSolver:
         return lines
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
-        """The question's spheres, new ones or the file's own."""
+        """The spheres of a question, new ones or the file's own."""
         made = [sphere_of(r) for r in question["spheres"]]
         if not question["world"]:
             return made
@@ -303,8 +302,8 @@ class PythonSolver:
         self.spheres: list[Any] = [sphere_of(r) for r in scene["spheres"]]
 
     def step(self, argument: dict[str, Any]) -> None:
-        """Integrate all, collide every pair i < j, wrap; `count` times; forces act in the first, or
-        in all if held."""
+        """Integrate all, collide every pair i < j, wrap; `count` times. Forces act in the first
+        step, or in all if held."""
         gx, gy = self.scene["gravity"]
         forces, held = argument["forces"], argument.get("held", False)
         for k in range(argument["count"]):
@@ -322,7 +321,7 @@ class PythonSolver:
             self.steps += 1
 
     def pair(self, i: int, j: int) -> None:
-        """Collide two, and log them if they overlapped or anything changed."""
+        """Collide a pair, and record it if it overlapped or anything changed."""
         a, b = self.spheres[i], self.spheres[j]
         was_a, was_b = self.motions[i], self.motions[j]
         self.file["collide"](a, b)
@@ -340,14 +339,14 @@ class PythonSolver:
             self.log.append([self.steps, i, j, *numbers])
 
     def play(self, argument: dict[str, Any]) -> dict[str, Any]:
-        """Some calls of `step`, then where everything is and the collisions from number `heard` on:
-        one request for all."""
+        """Call `step` several times, then return the state and the collisions from number `heard`
+        on, all in one request."""
         for step in argument["steps"]:
             self.step(step)
         return {"rows": self.read(), "collisions": self.collision_rows[argument["heard"] :]}
 
     def samples(self, argument: dict[str, Any]) -> list[list[list[float]]]:
-        """Where everything is at the beginning and after each of `count` calls of `step`."""
+        """The states at the start and after each of `count` calls of `step`."""
         all_rows = [self.read()]
         for _ in range(argument["count"]):
             self.step(argument["step"])
@@ -355,11 +354,11 @@ class PythonSolver:
         return all_rows
 
     def read(self, _argument: Any = None) -> list[list[float]]:
-        """The scene's spheres as they are."""
+        """The present numbers of the scene's spheres."""
         return [row_of(s) for s in self.spheres]
 
     def contacts(self, _argument: Any = None) -> list[list[float]]:
-        """What `pair` logged."""
+        """The contacts that `pair` recorded."""
         return self.log
 
 
@@ -369,12 +368,12 @@ def motion(s: Any) -> tuple[float, float, float, float]:
 
 
 def wrap(p: Any, box: list[float]) -> None:
-    """As projectObjects: beyond an edge of the box, onto the opposite one."""
+    """Set a position beyond an edge of the box onto the opposite edge, as projectObjects does."""
     left, bottom, right, top = box
     p.x = right if p.x < left else left if p.x > right else p.x
     p.y = top if p.y < bottom else bottom if p.y > top else p.y
 
 
 def same(one: Any, other: Any) -> bool:
-    """Equal, NaN being equal to itself."""
+    """Whether two values are equal; NaN equals NaN."""
     return repr(one) == repr(other)

@@ -1,5 +1,5 @@
-"""The restitution of somebody's file: the number that is written into it, beside the one that its
-collisions have. What plays a file and what checks it read it here."""
+"""The restitution of a solver's file: the number in its text, and the measured one of its
+collisions. Both playing and checking a file use it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from math import nan
 from adapters.own_solver.file import SolverFailed, SolverText
 from adapters.own_solver.process import SolverProcess
 
-# largest difference between two restitutions that are the same: that of a constant written 0.9
+# largest difference between two equal restitutions: that of a constant written 0.9
 SAME = 1e-3
 EXERCISE = 0.9
 COMMENTS = re.compile(r"/\*.*?\*/|//[^\n]*|#[^\n]*", re.DOTALL)
@@ -24,14 +24,13 @@ NUMBER = re.compile(r"(?<![\w.])\d*\.?\d+(?![\w.])")
 
 @dataclass(frozen=True)
 class OwnRestitution:
-    """Of a file with the exercise's functions, which take none.
+    """The restitution of a file with the exercise's functions, which have no such argument.
 
     Attributes:
-        stated: the numbers from 0 to 1 that its text gives to a name such as e or restitution; then
-            0.9, if that or 1.9 occurs in it.
-        came: separation over approach speed of two equal spheres that meet head-on; NaN where no
-            collision came of it.
-        occurs: whether what came, or 1 more, is a number of its text.
+        stated: the numbers from 0 to 1 that its text assigns to a name such as e or restitution;
+            then 0.9, if that or 1.9 occurs in it.
+        came: separation over approach speed of two equal spheres that meet head-on; NaN if there
+            was no collision. occurs: whether `came` or 1 + `came` is a number in its text.
     """
 
     stated: tuple[float, ...]
@@ -40,23 +39,22 @@ class OwnRestitution:
 
     @property
     def own(self) -> float | None:
-        """The number that the file is written for: of those that are stated the one that came, else
-        the first; else what came, if it occurs. None if its text holds none."""
+        """The restitution of the file: the stated number that equals the measured one, else the
+        first stated; else the measured one, if it occurs in the text; else None."""
         first = next(iter(self.stated), self.came if self.occurs else None)
         return next((e for e in self.stated if same(e, self.came)), first)
 
     def fits(self, wanted: float) -> bool:
-        """Whether the file can be played where a scene wants this restitution.
+        """Whether the file can play a scene with this restitution.
 
-        It cannot if it is written for another one. A file whose text says nothing is played, and so
-        is one whose collisions have what is wanted, or ought to have it: a fault makes any number
-        of them.
+        It cannot if its text states another one. A file whose text states none is played, and so is
+        one that states or has the wanted one: a fault can change the measured number.
         """
         fitting = any(same(e, wanted) for e in (*self.stated, self.came))
         return fitting or self.own is None
 
     def __str__(self) -> str:
-        """What a table of settings says."""
+        """The text in a table of settings."""
         has = f"its collisions have {self.came:.6g}" if self.came == self.came else "none came"
         if self.own is None:
             return f"none is found in the file; {has}"
@@ -65,29 +63,28 @@ class OwnRestitution:
 
 
 def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution:
-    """What the text of a file says, and what its collisions give."""
+    """The stated and the measured restitution of a file."""
     return own_restitution(own_text(solver), probed(process))
 
 
 def own_text(solver: SolverText) -> str:
-    """All that its author wrote."""
+    """All text that its author wrote."""
     return "\n".join([solver.text, *(module for file, module in solver.beside if is_own(file))])
 
 
 def own_restitution(text: str, came: float) -> OwnRestitution:
-    """What a text says of the restitution, beside the one that `came` of its collisions."""
+    """The restitution from a text, with the measured one, `came`."""
     occurs = any(same(number, came) or same(number, 1 + came) for number in numbers_in(text))
     return OwnRestitution(tuple(stated(text)), came, 0 <= came <= 1 and occurs)
 
 
 def is_own(file: str) -> bool:
-    """Whether what lies beside a solver is its author's: the other thing that is read is
-    gl-matrix."""
+    """Whether a file beside a solver is its author's; the only other one is gl-matrix."""
     return file.endswith(".py")
 
 
 def stated(text: str) -> list[float]:
-    """The numbers from 0 to 1 that a name such as e or restitution gets; then 0.9 if that or 1.9
+    """The numbers from 0 to 1 assigned to a name such as e or restitution; then 0.9 if that or 1.9
     occurs."""
     numbers = numbers_in(text)
     named = [e for e in named_in(text) if 0 <= e <= 1]
@@ -95,7 +92,7 @@ def stated(text: str) -> list[float]:
 
 
 def named_in(text: str) -> list[float]:
-    """The numbers that a name such as e or restitution gets."""
+    """The numbers assigned to a name such as e or restitution."""
     return [float(number) for number in NAMED.findall(code_of(text))]
 
 
@@ -105,13 +102,13 @@ def numbers_in(text: str) -> list[float]:
 
 
 def code_of(text: str) -> str:
-    """A file with blanks for its comments, so that its lines keep their numbers."""
+    """A file with comments replaced by blanks, so that line numbers stay the same."""
     return COMMENTS.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
 
 
 def probed(process: SolverProcess) -> float:
-    """Separation over approach speed of two equal spheres that meet head-on at 2 m/s; NaN where no
-    collision comes out of it."""
+    """Separation over approach speed of two equal spheres that meet head-on at 2 m/s; NaN if they
+    do not collide."""
     pair = [
         [-0.45, 0.0, 1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
         [0.45, 0.0, -1.0, *[0.0] * 6, 1.0, 1.0, 0.5],
@@ -129,8 +126,8 @@ def probed(process: SolverProcess) -> float:
 
 
 def separation(closing: float, a: float, b: float) -> float:
-    """The speed of separation of two that now move at `a` and `b` m/s along x, over the speed at
-    which they closed."""
+    """Separation over approach speed of two spheres that now move at `a` and `b` m/s along x;
+    `closing`: their approach speed."""
     return float(b - a) / closing
 
 

@@ -1,5 +1,4 @@
-"""The sphere that a solver in Python is given: the fields of the exercise, by attribute or by
-item."""
+"""The sphere passed to a solver in Python: the fields of the exercise, by attribute or by item."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ class Fields:
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)
 
-    def __getattr__(self, name: str) -> Any:  # only for a name that is not there
+    def __getattr__(self, name: str) -> Any:  # only called for a missing name
         raise AttributeError(f"a sphere has no field {name!r}", name=name, obj=self)
 
     def __getitem__(self, name: str) -> Any:

@@ -1,8 +1,7 @@
 """The process in which a solver's file runs: bounded memory, no output, one JSON line in and one
 out per request.
 
-It runs with the rights of the user who started it: the limits are against accidents, not against
-malice.
+It has the rights of the user: the limits protect against accidents, not against malice.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import pickle
 import queue
 import sys
 from itertools import takewhile
-from json import dumps, loads  # as they are before a solver may replace them
+from json import dumps, loads  # before a solver can replace them
 from pathlib import Path
 from threading import Thread
 from typing import IO, Any
@@ -20,14 +19,14 @@ from typing import IO, Any
 from adapters import system
 from adapters.own_solver.file import SolverFailed
 
-HERE = "here"  # what is said before anything of the solver is in this process
-# bytes of data; V8 sets aside far more addresses than it uses, so that these cannot be bounded
+HERE = "here"  # the first line, before the solver is loaded
+# bytes of data; the address space cannot be limited, because V8 reserves far more than it uses
 MEMORY = 2 * 2**30
 
 
 def main() -> None:
-    """Load the text that a line holds, say what it has, then answer request by request until the
-    next text comes or the input ends."""
+    """Load the text in a line, report its functions, then answer requests until the next text or
+    the end of the input."""
     stream, answers = private_pipes()
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
     Thread(target=listen, args=(stream, requests), daemon=True).start()
@@ -51,7 +50,7 @@ def main() -> None:
 
 
 def private_pipes() -> tuple[IO[str], IO[str]]:
-    """The two ends of the talk with the parent; what the solver prints or reads goes nowhere."""
+    """The two pipes to the parent; output and input of the solver itself are discarded."""
     requests, answers = (
         os.fdopen(os.dup(0), encoding="utf-8"),
         os.fdopen(os.dup(1), "w", encoding="utf-8"),
@@ -63,16 +62,15 @@ def private_pipes() -> tuple[IO[str], IO[str]]:
 
 
 def listen(stream: IO[str], requests: queue.SimpleQueue[str]) -> None:
-    """Hand on the lines of the parent; at their end, when nobody is left who could ask, end this
-    process and all that the file has started, whatever it is doing."""
+    """Pass on the lines of the parent; when the parent has closed the pipe, end this process and
+    all its children."""
     for line in stream:
         requests.put(line)
     system.end_all(os.getpid())
 
 
 def loaded(line: str, before: str, solver: Any) -> Any:
-    """The solver that a line holds, with nothing in it of the one `before`; raises
-    `SolverFailed`."""
+    """The solver in a line, without any state of the one `before`; raises `SolverFailed`."""
     if solver is not None and line == before:
         solver.renew()
         return solver
@@ -82,8 +80,8 @@ def loaded(line: str, before: str, solver: Any) -> Any:
 
 
 def load(solver: Any, copies: Path | None) -> Any:
-    """The solver by its kind, its texts kept in `copies`, or the engine of a package or of a file;
-    raises `SolverFailed`."""
+    """The solver of the right kind, with its texts in `copies`, or the engine of a package or a
+    file; raises `SolverFailed`."""
     if solver.kind == "packaged":
         return solver.load()
     if solver.engine:
@@ -101,7 +99,7 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
     """An answer for every (command, argument, limit s) of a request; one that fails does not stop
     the others.
 
-    After a call that did not come back, no question is put that would make the same call again.
+    After a call that did not return, no question with the same call is asked.
     """
     answers: list[dict[str, Any]] = []
     endless: dict[str, dict[str, Any]] = {}
@@ -127,7 +125,7 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
 
 
 def questions_at(request: list[tuple[str, Any, float]], k: int, solver: Any) -> list[Any]:
-    """The questions from number k on that can be put together, if the solver takes several."""
+    """The questions from number k on that can be asked together, if the solver takes several."""
     if not hasattr(solver, "together"):
         return []
     alike = takewhile(lambda each: (each[0], each[2]) == ("ask", request[k][2]), request[k:])
@@ -136,7 +134,7 @@ def questions_at(request: list[tuple[str, Any, float]], k: int, solver: Any) -> 
 
 
 def done_by(solver: Any, command: str, argument: Any, limit: float) -> Any:
-    """What a command gives; raises `SolverFailed`."""
+    """The result of a command; raises `SolverFailed`."""
     return solver.renew() if command == "renew" else solver.run(command, argument, limit)
 
 
@@ -147,7 +145,7 @@ def tell(answers: IO[str], what: Any) -> None:
 
 
 def work() -> None:
-    """All that the process does."""
+    """The main function of the process."""
     sys.dont_write_bytecode = True
     try:
         main()

@@ -1,4 +1,5 @@
-"""`crosscheck bits`: which engines give the bits here that the repository keeps."""
+"""`crosscheck bits`: which engines give the same bits on this machine as those kept in the
+repository."""
 
 from __future__ import annotations
 
@@ -40,7 +41,7 @@ SHOWN = 12  # differences
 
 def compare_bits(out: Path | None) -> NoReturn:
     """Play every scene through every engine at its middle step size, and print in how many the bits
-    are the kept ones; write the table to `out`, if one is named.
+    equal the kept ones; write the table to `out`, if given.
 
     Exits 0, 1 (other bits, or no row to compare) or 2 (`out` cannot be written).
     """
@@ -67,7 +68,7 @@ def compare_bits(out: Path | None) -> NoReturn:
 
 
 def made_here() -> dict[str, str]:
-    """System, architecture and versions, on which bits may depend."""
+    """System, architecture and versions, which may affect the bits."""
     return {
         "system": platform.system(),
         "architecture": platform.machine(),
@@ -77,14 +78,14 @@ def made_here() -> dict[str, str]:
 
 
 def play_all() -> list[dict[str, Any]]:
-    """A row of the table for each scene of the catalogue and engine, in their order."""
+    """A row of the table for each scene of the catalogue and each engine, in order."""
     tasks: dict[Hashable, Callable[[], Any]] = {}
     for scene in SCENARIOS:
         scenario = open_scene(scene, 0)
         middle = scenario.substeps[len(scenario.substeps) // 2]
         for name in told_apart(UNASKED, scenario.scene):
             cell = Cell(scene, 0, name, middle)
-            bare = replace(scenario, truth=None)  # no worker needs it
+            bare = replace(scenario, truth=None)  # workers do not need it
             tasks[scene, name] = partial(bits_here, cell, ENGINES[name], bare)
     rows: dict[Any, dict[str, Any]] = {}
     with Progress() as progress:
@@ -102,7 +103,7 @@ def play_all() -> list[dict[str, Any]]:
 
 
 def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> None:
-    """A row an engine, and the first differences."""
+    """Print a row for each engine, and the first differences."""
     other = Counter(each.name for each in found)
     rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
     title = "In how many scenes the bits are those kept in reports/bits.csv"
@@ -114,7 +115,7 @@ def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> No
 
 
 def in_words(one: ChangedBits) -> str:
-    """Where the bits are others."""
+    """A sentence on where the bits differ."""
     if one.other < 0:
         return f"{one.name} in {one.scenario}: it did not play to the same sample"
     if one.same < 0:

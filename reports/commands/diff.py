@@ -29,7 +29,7 @@ HEADINGS = (
 
 
 def show_difference(before: Path, after: Path) -> NoReturn:
-    """Print it; exits 0, 1 (something got worse) or 2 (a folder cannot be used)."""
+    """Print the difference; exits 0, 1 (something got worse) or 2 (a folder cannot be used)."""
     try:
         changed = difference(found(before), found(after))
     except OSError as fault:
@@ -44,7 +44,7 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     print_table(console, HEADINGS, by_engine(changed), "What changed", left=HEADINGS[-1:])
     console.print()
     total = len(changed.statuses) + len(changed.numbers)
-    if worst := sorted((*changed.statuses, *changed.numbers), key=gravity)[:SHOWN]:
+    if worst := sorted((*changed.statuses, *changed.numbers), key=severity)[:SHOWN]:
         shown = f"The {len(worst)} largest of {total} changes" if total > SHOWN else "The changes"
         console.print(f"{shown}, before → after", style="italic", highlight=False)
         print_list(console, map(in_words, worst))
@@ -54,7 +54,7 @@ def show_difference(before: Path, after: Path) -> NoReturn:
 
 
 def by_engine(changed: Difference) -> list[list[str]]:
-    """A row an engine: statuses and numbers that changed, and how much longer it takes."""
+    """A row for each engine: changed statuses and numbers, and the factor of its time."""
     timings = {timing.engine: timing for timing in changed.timings}
     every = (
         *changed.same,
@@ -86,12 +86,12 @@ def in_words(change: Change) -> str:
 
 
 def count(changes: list[Change], verdict: str) -> str:
-    """How many of them, or nothing."""
+    """The number of changes with this verdict, or nothing."""
     return str(sum(one.verdict == verdict for one in changes) or "")
 
 
 def said_of(timing: Timing | None) -> str:
-    """The factor, its interval, and what it means."""
+    """The factor, its interval, and the verdict."""
     if timing is None:
         return ""
     if timing.high == inf:
@@ -100,13 +100,13 @@ def said_of(timing: Timing | None) -> str:
     return f"×{timing.factor:.2f} ({timing.low:.2f}–{timing.high:.2f}){verdict}"
 
 
-def gravity(change: Change) -> tuple[bool, bool, float]:
-    """The order of the list: worse first, of these statuses first, then by how much."""
+def severity(change: Change) -> tuple[bool, bool, float]:
+    """The sort key of the list: worse changes first, among them statuses first, then by size."""
     return change.verdict != "worse", not change.what.endswith("status"), -change.factor
 
 
 def sentence(changed: Difference) -> str:
-    """What it comes to."""
+    """The summary in a sentence."""
     said = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
     if not changed.timings:
         return f"{said} No times were compared: run both on one machine that is idle."

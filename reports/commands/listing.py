@@ -15,7 +15,7 @@ from scenarios.truth.exact import answered_by
 
 
 def explain(what: str) -> None:
-    """A line for every engine, scenario and metric, or for one of the three kinds."""
+    """Print a line for every engine, scenario and metric, or for one of the three kinds."""
     kinds = {
         "engines": {name: _engine(row) for name, row in (ENGINES | FETCHED).items()},
         "scenarios": {name: _line(name) for name in SCENARIOS},

@@ -1,4 +1,4 @@
-"""`crosscheck new-engine`: an engine that works, in a file of one's own."""
+"""`crosscheck new-engine`: writes a working engine to a file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from reports.terminal.exits import refuse
 
 
 def write_engine(path: Path) -> None:
-    """Write the template of the language that the name ends in, and say how to judge it; exits 2 if
-    it cannot be written, or something is there."""
+    """Write the template of the language given by the suffix, and print how to judge it; exits 2 if
+    it cannot be written or exists."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         refuse([f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file"])

@@ -1,4 +1,4 @@
-"""What `crosscheck check` says of the solvers' files that play in a run or fly in the game."""
+"""The checks of solvers' files that take part in a run or in the game."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CHECKING = 10.0  # s that the game waits for the check of a file, which takes on
 
 
 def checks_of(engines: Sequence[str]) -> dict[str, Callable[[], Check]]:
-    """A task for each solver's file among these engines; its path is taken from here."""
+    """A task for each solver's file among these engines, relative to the current folder."""
     return {
         name: partial(checked, Path(name.removesuffix(OWN)).absolute())
         for name in engines
@@ -35,8 +35,8 @@ def checked(path: Path) -> Check:
 
 
 def said_of(engines: Sequence[str]) -> dict[str, list[str]]:
-    """What `check` says of each solver's file among these engines, said on standard error, too: the
-    game plays them with their faults."""
+    """The check of each solver's file among these engines, also printed on standard error: the game
+    plays them with their faults."""
     tasks: dict[Hashable, Any] = {name: check for name, check in checks_of(engines).items()}
     found: dict[str, list[str]] = {}
     if not tasks:
@@ -55,7 +55,7 @@ def said_of(engines: Sequence[str]) -> dict[str, list[str]]:
 
 
 def lines(found: Mapping[str, list[str]]) -> list[str]:
-    """For people in a terminal: the file, then its sentences."""
+    """Lines for a terminal: the file, then its sentences."""
     return [
         line
         for name, says in found.items()

@@ -1,5 +1,5 @@
-"""`crosscheck replay CELL`: one cell again, step by step from its last good state, with all that
-its engine prints."""
+"""`crosscheck replay CELL`: plays one cell again, step by step from its last good state, with the
+output of its engine."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def replay(
 
 
 def show(line: str) -> None:
-    """One line on standard output, at once: what the engine prints comes after it."""
+    """Print one line and flush it, so that the output of the engine comes after it."""
     print(legible(line), flush=True)
 
 
@@ -83,8 +83,8 @@ def ending(status: str, reason: str) -> str:
 
 
 def record_of(archive: Archive, name: str) -> dict[str, Any]:
-    """The line of the one cell whose key begins with `name`; raises `ValueError` naming what is
-    near."""
+    """The line of the one cell whose key begins with `name`; raises `ValueError` with similar
+    keys."""
     keys = {record["cell"]: record for record in archive.records}
     matching = [key for key in keys if key.startswith(name)]
     if len(matching) == 1:
@@ -125,8 +125,7 @@ def continued(scenario: Scenario, substeps: int, before: Trajectory | None, k: i
 def again(
     record: dict[str, Any], row: EngineRow, scenario: Scenario, timeout: float
 ) -> tuple[str, str, Trajectory | None]:
-    """Status, reason and trajectory, from a process of its own that prints where the user sees
-    it."""
+    """Status, reason and trajectory, from a new process whose output the user sees."""
     cell = Cell(record["scene"], record["seed"], f"{record['engine']}:{record['profile']}", 1)
     worker = new_worker(memory=0, show=True)
     try:
@@ -151,7 +150,7 @@ def again(
 
 
 def recorded(archive: Archive, record: dict[str, Any]) -> Trajectory | None:
-    """The samples that the run has of a cell; None if it has none."""
+    """The samples of a cell in the run; None if there are none."""
     if record["damage"]:
         say(
             f"{archive.folder / 'trajectories'}: {record['damage']}, so the cell is played from the"
@@ -161,7 +160,7 @@ def recorded(archive: Archive, record: dict[str, Any]) -> Trajectory | None:
 
 
 def same(before: Trajectory | None, after: Trajectory | None, substeps: int) -> bool:
-    """Whether a cell that was sampled at every step has the bits of its record."""
+    """Whether a cell sampled at every step has the bits of its record."""
     if before is None or after is None:
         return before is after
     return all(

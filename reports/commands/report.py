@@ -1,5 +1,5 @@
-"""`crosscheck report OUT`, and how every run ends: tables and page from the journal, the summary,
-the exit status."""
+"""`crosscheck report OUT`, and the end of every run: tables and page from the journal, summary,
+exit status."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from reports.terminal.tables import print_list, print_table
 
 
 def finish(report: Report, out: Path) -> NoReturn:
-    """Print the summary; exit 1 if there is an engine, or a scene, of which not all that was asked
-    for is compared."""
+    """Print the summary; exit 1 if an engine or a scene is not compared completely."""
     print_summary(report, str((out / "report.html").resolve()))
     runs = [run for comparison in report.comparisons for run in comparison.runs]
     played = {run.name for run in runs if run.status == "ok"}
@@ -43,7 +42,7 @@ def finish(report: Report, out: Path) -> NoReturn:
 
 
 def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
-    """Tables and page from the journal in `out`; `scenes` are on paper where it is printed."""
+    """Make tables and page from the journal in `out`; `scenes` are printed with the page."""
     if scenes and not printed:
         refuse([f"{' '.join(scenes)}: to print scenes with the page, name them after --print"])
     if printed and not scenes:
@@ -63,7 +62,8 @@ def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
 
 
 def print_summary(report: Report, page: str) -> None:
-    """Medians over the scenarios at their middle step, the finding, and where the page is."""
+    """Print the medians over the scenarios at their middle step, the findings, and the path of the
+    page."""
     console = Console()
     for comparisons in filter(None, by_friction(report.comparisons)):
         headings, rows, without = medians(comparisons, report.untrusted)
@@ -84,7 +84,8 @@ def print_summary(report: Report, page: str) -> None:
 def medians(
     comparisons: Sequence[Comparison], untrusted: Set[str]
 ) -> tuple[list[str], list[list[str]], list[str]]:
-    """The headings and rows of the summary, and who has no row, as it does not model friction."""
+    """The headings and rows of the summary, and the engines without a row because they do not model
+    friction."""
     found = overview.summary(comparisons, overview.names_of(comparisons), untrusted)
     columns, shown = overview.with_numbers(found)
     without = [name for name, cells in shown.items() if cells[-1].text == overview.NO_FRICTION]
@@ -95,18 +96,18 @@ def medians(
 
 
 def heading(column: overview.Column) -> str:
-    """Its title above its unit, in lines so short that ten engines fit into 80 columns."""
+    """The title of a column above its unit, in lines short enough for 80 columns."""
     title = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
     return f"{title}\n{column.short}"
 
 
 def own_solvers(said: Mapping[str, list[str]]) -> list[str]:
-    """What `check` says of each solver's file, a paragraph a file."""
+    """The check of each solver's file, a paragraph for each."""
     return ["\n".join(lines({name: says})) for name, says in said.items()]
 
 
 def title_of(scenes: int, rough: bool = False) -> str:
-    """What the numbers of the summary are; `rough`: of scenes with friction."""
+    """The title of the summary; `rough`: of scenes with friction."""
     kind = " with friction" if rough else ""
     if scenes == 1:
         return (
@@ -120,14 +121,15 @@ def title_of(scenes: int, rough: bool = False) -> str:
 
 
 def off_grid(report: Report) -> list[str]:
-    """Of each scene whose thrusts do not start and stop at a step: how far off every engine is."""
+    """A sentence for each scene whose thrusts start or stop inside a step: the displacement of
+    every engine."""
     scenarios = [comparison.scenario for comparison in report.comparisons]
     notes = {scenario.name: off_grid_note(scenario) for scenario in scenarios}
     return [f"{name}: {note}." for name, note in notes.items() if note]
 
 
 def statuses(report: Report) -> str:
-    """How many cells ended how, and whether all of them did."""
+    """The number of cells of each status, and whether all have ended."""
     counts = report.runs.status.value_counts()
     said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
     ended = counted(len(report.runs), "cell")
@@ -137,7 +139,7 @@ def statuses(report: Report) -> str:
 
 
 def failures(report: Report, out: Path) -> str:
-    """How to look into the first cell that failed; "" if none did."""
+    """How to replay the first cell that failed; "" if none did."""
     runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
     if runs.empty:
         return ""

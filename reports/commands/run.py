@@ -1,4 +1,4 @@
-"""`crosscheck run`: play, compare, report; or go on with a run that was broken off."""
+"""`crosscheck run`: play, compare, report; or continue an interrupted run."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from scenarios.catalogue import SCENARIOS
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What is to be played, as it was typed, and the folder for the results."""
+    """The arguments of the command, as typed, and the folder for the results."""
 
     scenes: Sequence[str]
     engines: Sequence[str]
@@ -72,7 +72,7 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
         seed=request.seed,
         dts=request.dts,
         full=request.full,
-        # a call to a JavaScript engine, and to start one, takes long
+        # starting and calling a JavaScript engine is slow
         timings=request.timings * (2 if any(row.package for row in rows.values()) else 1),
         command=command,
         folder=folder,
@@ -83,9 +83,9 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
 
 
 def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:
-    """The means that are asked for; exits 2 if no worker could start, or no scheduler answers.
+    """The `Means` of these options; exits 2 if no worker can start, or no scheduler answers.
 
-    `workers` 0: one a core; `memory` in MB, 0: the share of a worker.
+    `workers` 0: one per core; `memory` in MB, 0: an equal share.
     """
     workers = affordable(workers or os.cpu_count() or 1)
     if 0 < memory < LEAST_MEMORY:
@@ -107,7 +107,7 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
 def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     """Play what is missing or changed in the run of `out`, compare, report; exits as `run_plan`.
 
-    `alone`: nothing is asked for but to resume, and with which means.
+    `alone`: whether no other options but those of `Means` are given.
     """
     if not alone:
         refuse(
@@ -126,11 +126,11 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
 
 
 def plan_of(folder: Path, part: Path) -> RunPlan:
-    """What was asked for, as the journal has it, wherever one is now; of a scene file that is gone
-    the copy is played.
+    """The plan in the journal, independent of the current folder; for a missing scene file its copy
+    is played.
 
-    `part`: where `folder` will be when that is carried out. Exits 2 where a scene file, or a
-    solver's, is at fault.
+    `part`: the path of `folder` during the run. Exits 2 if a scene file or a solver's file is at
+    fault.
     """
     header = {"folder": os.getcwd()} | Archive.read(folder).header
     files = {
@@ -156,15 +156,15 @@ def plan_of(folder: Path, part: Path) -> RunPlan:
 
 
 def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
-    """The file of a scene, from where the run was begun, or where that is gone the copy in the
-    run's folder."""
+    """The file of a scene, relative to the folder where the run was started; if it is missing, the
+    copy in the run's folder."""
     path = Path(header["folder"], scene)
     copy = stored_scene(folder, header["names"].get(scene, ""))
     return copy if not path.exists() and copy.exists() else path
 
 
 def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path) -> NoReturn:
-    """Carry out the plan, report, and put it all in its place; what was played is kept, whatever
+    """Carry out the plan, report, and move the result to `out`; finished cells are kept, whatever
     happens."""
     part = journal.path.parent
     try:
@@ -180,12 +180,12 @@ def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path) -> NoRetu
 
 
 def what_is_kept(out: Path) -> str:
-    """A sentence on what a run that was broken off has left, and how to go on."""
+    """A sentence on what an interrupted run has left, and how to continue."""
     part = part_of(out)
     if not part.exists() and (out / JOURNAL).exists():
         return f"All is done: {out}"
     journal = part / JOURNAL
-    # it is empty until the copies of the scenes are written
+    # the journal is empty until the copies of the scenes are written
     begun = journal.exists() and journal.stat().st_size > 0
     ended = len(Archive.read(part).records) if begun else 0
     if not ended:

@@ -23,7 +23,8 @@ def application(game: Game) -> Starlette:
 
 
 def play(flight: Path | None, engines: Sequence[str], port: int, opens: bool) -> None:
-    """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is none."""
+    """Serve the game, or a saved flight, until Ctrl-C; exits 2 if the file or an engine is
+    invalid."""
     game = game_of(flight, engines)
     game.said = said_of([name for name in game.engines if ENGINES[name].exercise])
     server.serve(application(game), port, "/", opens)

@@ -1,5 +1,5 @@
-"""`crosscheck truth`: the exact answer to one scene, its collisions, how far it reaches and what
-ends it."""
+"""`crosscheck truth`: the exact answer to one scene, its collisions, its horizon and what ends
+it."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ HEADINGS = ("t, s", "disk", "with", "impulse, N s", "cosine of\nimpact angle")
 
 
 def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
-    """Print the exact answer to a scene, up to where `timeout` s lead; exits 1 where there is none,
-    2 on no scene."""
+    """Print the exact answer to a scene, as far as it is found in `timeout` s; exits 1 if there is
+    none, 2 if there is no such scene."""
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
-    # In a worker, which can be stopped whatever it is doing.
+    # In a worker, which can always be stopped.
     task = partial(record_here, checked, seed, timeout)
     with (
         waiting(f"the exact answer to {scenario.name}"),
@@ -59,7 +59,7 @@ def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Say on a terminal what is being computed, and for how long by now."""
+    """Show on a terminal what is being computed, and the time so far."""
     if not sys.stderr.isatty():
         yield
         return
@@ -69,7 +69,7 @@ def waiting(what: str) -> Iterator[None]:
 
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
-    """The record for programs; numbers that are not finite are text or null, as JSON has none."""
+    """The record as plain JSON values; numbers that are not finite become text or null."""
     collisions = [
         {
             "t_s": t,
@@ -99,8 +99,8 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
 
 
 def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
-    """How a simultaneous collision may end: the velocity (m/s) of each disk, and the collisions in
-    one order that leads there."""
+    """The possible outcomes of a simultaneous collision: the velocity (m/s) of each disk, and one
+    order of collisions that leads there."""
     return [
         {
             "velocities_m_s": {
@@ -114,7 +114,7 @@ def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
 
 
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
-    """The record for people."""
+    """Print the record as text."""
     console = Console()
     duration = scenario.duration
     whole = record.horizon >= duration
@@ -147,7 +147,7 @@ def seconds(t: float) -> str:
 
 
 def precision(record: TruthRecord) -> str:
-    """What the record was computed with."""
+    """The precision and method of the record."""
     if record.bits == 53:
         return "float64"
     return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (
@@ -156,8 +156,8 @@ def precision(record: TruthRecord) -> str:
 
 
 def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
-    """The headings, then the collisions, or the first and the last ten; without the angle where
-    none has one."""
+    """The headings, then the collisions, or the first and the last ten; without the column of
+    angles if it is empty."""
     rows = [list(HEADINGS)]
     for t, i, j, impulse, cosine in record.events.tolist():
         shown = f"{impulse:.6g}" if impulse else "comes to rest"
@@ -172,7 +172,7 @@ def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
 
 
 def outcomes_in_words(record: TruthRecord) -> dict[str, dict[str, str]]:
-    """A heading for each end that a simultaneous collision may have, none of which is the truth ->
+    """Heading for each possible outcome of a simultaneous collision, none of which is the truth ->
     the velocities after it, and one order of collisions that leads there."""
     found = outcomes(record)
     return {

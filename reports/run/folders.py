@@ -22,7 +22,7 @@ from reports.run.made import (
     read_made,
 )
 from reports.terminal.counts import counted
-from reports.terminal.exits import FolderTaken, unbroken
+from reports.terminal.exits import FolderTaken, deferring_signals
 
 RUN = Kind(
     "crosscheck run",
@@ -171,7 +171,7 @@ def reopened(journal: Journal, out: Path) -> None:
     meanwhile; raises `FolderTaken` if another process locks it then."""
     part = part_of(out)
     if journal.path.parent == out:
-        with unbroken():
+        with deferring_signals():
             journal.close()
             out.rename(part)
             try:
@@ -213,7 +213,7 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
     may_replace(target, kind)
     record = read_made(made)
     assert record is not None
-    with unbroken():
+    with deferring_signals():
         put_made(made, record._replace(finished=True, out=target.name))
         old = next(
             old

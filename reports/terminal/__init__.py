@@ -1,1 +1,1 @@
-"""What every command says and how it ends: console, progress, exit status, text of others."""
+"""The output and the end of every command: console, progress, exit status, foreign text."""

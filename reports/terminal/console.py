@@ -11,8 +11,8 @@ from reports.terminal.foreign_text import legible
 
 
 class Console(RichConsole):
-    """Every string that is printed is `legible`, and means no markup and no emoji; what has a
-    colour is a `Text`."""
+    """A console that prints every string `legible` and without markup or emoji; coloured text is a
+    `Text`."""
 
     def __init__(self, *, stderr: bool = False, width: int | None = None) -> None:
         """Print on standard output, or on standard error; `width` in columns, default the
@@ -20,6 +20,5 @@ class Console(RichConsole):
         super().__init__(stderr=stderr, width=width, markup=False, emoji=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """What all strings go through: those that are printed, and those of tables, their titles
-        and headings."""
+        """Called for all strings: printed ones, and those in tables, titles and headings."""
         return super().render_str(legible(text), **options | {"markup": False, "emoji": False})

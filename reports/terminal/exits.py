@@ -1,5 +1,5 @@
-"""How a command ends: its exit status, what it says on standard error, and that it does end when it
-is signalled to."""
+"""How a command ends: its exit status, its messages on standard error, and its reaction to
+signals."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from reports.terminal.foreign_text import legible
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 STATUS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
-AGAIN = 1.0  # s between two times that a command is signalled
+AGAIN = 1.0  # s between two repetitions of a signal
 
 
 class Stopped(KeyboardInterrupt):
-    """Ctrl-C, or SIGTERM as a batch system or a shutdown sends it: they end a command alike."""
+    """Ctrl-C, or SIGTERM from a batch system or a shutdown: both end a command in the same way."""
 
     def __init__(self, status: int = INTERRUPTED) -> None:
         super().__init__()
@@ -28,54 +28,54 @@ class Stopped(KeyboardInterrupt):
 
 
 class FolderTaken(Exception):
-    """An output folder, or file, that may not be written to, and why."""
+    """An output folder or file may not be written to; says why."""
 
 
 class Unusable(ValueError):
-    """A file of a run that does not fit the others: which, why, and what to do."""
+    """A file of a run does not fit the others; says which, why, and what to do."""
 
 
-class Listening:
+class SignalHandler:
     """The handler of both signals. `status`: of the first that came, 0 if none has."""
 
     def __init__(self) -> None:
         self.status = DONE
 
     def __call__(self, number: int, _: object) -> NoReturn:
-        """Raise `Stopped`, and again every `AGAIN` s: what is raised in a destructor or a callback
-        from C is lost."""
+        """Raise `Stopped`, and again every `AGAIN` s, because an exception in a destructor or a
+        callback from C is lost."""
         self.status = self.status or STATUS.get(signal.Signals(number), INTERRUPTED)
         every(AGAIN)
         raise Stopped(self.status)
 
 
 @contextmanager
-def stoppable() -> Iterator[Listening]:
-    """Within it Ctrl-C and SIGTERM raise `Stopped`; one within another changes nothing.
+def stoppable() -> Iterator[SignalHandler]:
+    """Context in which Ctrl-C and SIGTERM raise `Stopped`; nesting changes nothing.
 
-    SIGINT stays ignored where it is ignored, as in what a shell has put into the background.
+    An ignored SIGINT stays ignored, as in a shell's background job.
     """
     before = {number: signal.getsignal(number) for number in (*STATUS, REPEATED)}
     outer = before[signal.SIGTERM]
-    if isinstance(outer, Listening):
+    if isinstance(outer, SignalHandler):
         yield outer
         return
-    listening = Listening()
+    signals = SignalHandler()
     for number in {*STATUS, REPEATED}:
         if before[number] is not signal.SIG_IGN:
-            signal.signal(number, listening)
+            signal.signal(number, signals)
     try:
-        yield listening
+        yield signals
     finally:
-        with deaf():
+        with ignoring_signals():
             pass
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Within it a command that is ending is not signalled again; the timer is off for good."""
+def ignoring_signals() -> Iterator[None]:
+    """Context in which an ending command ignores both signals; the timer stays off afterwards."""
     every(0)
     before = {number: signal.signal(number, signal.SIG_IGN) for number in STATUS}
     try:
@@ -86,21 +86,20 @@ def deaf() -> Iterator[None]:
 
 
 @contextmanager
-def unbroken() -> Iterator[None]:
-    """What must not be left half done and takes no time: a signal that comes meanwhile is heard
-    after it."""
+def deferring_signals() -> Iterator[None]:
+    """Context for short work that must not be interrupted: a signal is handled after it."""
     with signals_wait({*STATUS, REPEATED}):
         yield
 
 
 @contextmanager
 def ends_on_signals() -> Iterator[None]:
-    """A command from its first word to its last; signalled to stop it exits with 130 or 143 and
-    waits for no thread.
+    """Context of a whole command: a signal ends it with status 130 or 143, without waiting for
+    threads.
 
-    What a thread still has under way is in another process, which ends with this one.
+    The work of a thread is in another process, which ends with this one.
     """
-    with stoppable() as listening:
+    with stoppable() as signals:
         try:
             yield
             status: str | int | None = DONE
@@ -108,31 +107,31 @@ def ends_on_signals() -> Iterator[None]:
             status = end.code
         except KeyboardInterrupt:
             status = INTERRUPTED
-        with deaf():
-            if not listening.status:
+        with ignoring_signals():
+            if not signals.status:
                 sys.exit(status)
             for stream in (sys.stdout, sys.stderr):
                 with suppress(OSError, ValueError):
                     stream.flush()
             # Typer makes 130 of any KeyboardInterrupt.
             os._exit(
-                listening.status if status == INTERRUPTED or not isinstance(status, int) else status
+                signals.status if status == INTERRUPTED or not isinstance(status, int) else status
             )
 
 
 @contextmanager
 def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
-    """What writes into `part` for long: broken off, or without room on the disk, it says what is
-    `kept` of it.
+    """Context for long work that writes into `part`: if it is interrupted, or the disk is full, it
+    prints what is `kept`.
 
-    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot be written, or may not any
-    more, 2 if what was kept before does not fit.
+    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot or may no longer be written, 2
+    if earlier files do not fit.
     """
     with stoppable():
         try:
             yield
         except KeyboardInterrupt as stopped:
-            with deaf():
+            with ignoring_signals():
                 status = stopped.status if isinstance(stopped, Stopped) else INTERRUPTED
                 say(f"\n{'Terminated' if status == TERMINATED else 'Interrupted'}. {kept()}")
                 sys.exit(status)
@@ -148,7 +147,7 @@ def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
 
 
 def refuse(faults: Sequence[str]) -> NoReturn:
-    """Say what is wrong, one line each, and exit 2."""
+    """Print the faults, one line each, and exit 2."""
     for fault in faults:
         say(fault)
     sys.exit(BAD_INPUT)

@@ -1,5 +1,5 @@
-"""Text that others wrote (names of files, scenes, messages of engines), as a terminal and a file
-can hold it."""
+"""Makes foreign text (names of files and scenes, messages of engines) safe for a terminal and a
+file."""
 
 from __future__ import annotations
 
@@ -14,28 +14,27 @@ from adapters.own_solver.file import printable
 
 
 def legible(text: str) -> str:
-    """The text with what would act on a terminal (escape codes, bytes that are no UTF-8) as it is
-    written in code.
+    """The text with escape codes and bytes that are not UTF-8 escaped: they would act on a
+    terminal.
 
-    Line ends stay, as sentences of this program hold some.
+    Line ends stay, because messages of this program contain some.
     """
     return "\n".join(map(printable, text.split("\n")))
 
 
 def encoded(text: str) -> bytes:
-    """UTF-8; what that cannot hold, the bytes of a path that are none, as `\\udcff`."""
+    """The text in UTF-8; bytes of a path that are not UTF-8 become `\\udcff`."""
     return text.encode(errors="backslashreplace")
 
 
 def put_text(path: Path, text: str) -> None:
-    """Write a file, `encoded`, whole or not at all; raises `OSError`."""
+    """Write a file, `encoded`, atomically; raises `OSError`."""
     put_bytes(path, encoded(text))
 
 
 def put_bytes(path: Path, data: bytes) -> None:
-    """Write a file as `whole` does; a pipe or a device is written to as it comes. Raises
-    `OSError`."""
-    # asked before links are followed: /dev/stdout leads to no path at all
+    """Write a file as `whole` does; a pipe or a device is written to directly. Raises `OSError`."""
+    # tested before links are resolved: /dev/stdout resolves to no path
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
@@ -45,7 +44,7 @@ def put_bytes(path: Path, data: bytes) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to that takes the place of `path` when all of it is written; raises
+    """Context with a file to write to, which replaces `path` when it is complete; raises
     `OSError`."""
     part = path.with_name(f".crosscheck-{os.getpid()}.part")
     try:
@@ -58,5 +57,5 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def is_part(path: Path) -> bool:
-    """Whether it is what `whole` leaves where it was killed."""
+    """Whether `path` is a file that `whole` left when it was killed."""
     return re.fullmatch(r"\.crosscheck-\d+\.part", path.name) is not None

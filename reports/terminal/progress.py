@@ -1,5 +1,4 @@
-"""Progress: one line that changes while something runs on a terminal, a line now and then in a
-log."""
+"""Progress: one changing line on a terminal, an occasional line in a log."""
 
 from __future__ import annotations
 
@@ -16,15 +15,15 @@ from rich.text import Text
 from reports.terminal.console import Console
 from reports.terminal.foreign_text import legible
 
-QUIET = 30.0  # s between two lines where there is no terminal that a bar could be drawn on
+QUIET = 30.0  # s between two lines if there is no terminal
 BAR, GAP = 10, 2  # columns
-LEAST = 24  # columns for what is being done, before anything else is left out
+LEAST = 24  # columns for the description, before anything else is left out
 
 
 class OneLine(ProgressColumn):
-    """What is being done, how much of it is done, and how long it takes, in one line of any width.
+    """Description, progress and times in one line of any width.
 
-    What does not fit is left out as a whole, least important first: never a part of a number.
+    Parts that do not fit are left out, the least important first; a number is never cut.
     """
 
     def __init__(self, console: Console) -> None:
@@ -34,7 +33,7 @@ class OneLine(ProgressColumn):
     def render(self, task: Task) -> Table:
         """The line of a task."""
         parts, width = parts_of(task), self.console.width
-        # the bar first, then from the last number on; the first two are always there
+        # left out: the bar first, then the last number; the first two always stay
         while room_beside(parts, width) < LEAST and len(parts) > 2:
             parts.pop(0 if isinstance(parts[0], ProgressBar) else -1)
         what = legible(task.description).replace("\n", " ")
@@ -44,7 +43,7 @@ class OneLine(ProgressColumn):
 
 
 def parts_of(task: Task) -> list[ProgressBar | Text]:
-    """The bar, how many are done, the time left, the time each takes, the time so far."""
+    """The bar, the number done, the time left, the time per task, the time so far."""
     elapsed = Text(clock(task.elapsed), "progress.elapsed")
     if not task.total or task.finished:
         return [elapsed]
@@ -58,18 +57,18 @@ def parts_of(task: Task) -> list[ProgressBar | Text]:
 
 
 def room_beside(parts: list[ProgressBar | Text], width: int) -> int:
-    """How many of `width` columns are left beside them."""
+    """Columns of `width` left beside these parts."""
     widths = (BAR if isinstance(part, ProgressBar) else part.cell_len for part in parts)
     return width - sum(each + GAP for each in widths)
 
 
 def clock(seconds: float | None) -> str:
-    """As 0:01:05; of a time that is not known yet -:--:--."""
+    """A time as 0:01:05; -:--:-- if it is not known yet."""
     return "-:--:--" if seconds is None else str(timedelta(seconds=int(seconds)))
 
 
 def fitted(what: str, room: int) -> str:
-    """The words of `what`, as many as fit; of a first one that does not fit the beginning."""
+    """As many words of `what` as fit; if the first word does not fit, its beginning."""
     if len(what) <= room:
         return what
     kept = what[: room + 1]
@@ -78,8 +77,8 @@ def fitted(what: str, room: int) -> str:
 
 
 class Progress:
-    """Says what runs, how long one takes and how long all will; on a terminal in a line that is
-    gone at the end, in a log now and then."""
+    """Shows what runs, the time per task and the time left: on a terminal in a line that disappears
+    at the end, in a log occasionally."""
 
     def __init__(self) -> None:
         console = Console(stderr=True)
@@ -100,23 +99,23 @@ class Progress:
         self.bar.stop()
 
     def begin(self, what: str, total: int | None = None, completed: int = 0) -> None:
-        """Put a line in place of what was there before, its clocks at 0."""
+        """Replace the line by a new one, with its clocks at 0."""
         for task in self.bar.task_ids:
             self.bar.remove_task(task)
         self.task = self.bar.add_task(what, total=total, completed=completed, each="")
 
     def say(self, what: str) -> None:
-        """Say what is being done."""
+        """Set the description."""
         if self.bar.finished:
             self.begin(what)
         self.bar.update(self.task, description=what)
 
     def note(self, sentence: str) -> None:
-        """A line that stays."""
+        """Print a line that stays."""
         self.bar.console.print(sentence, highlight=False)
 
     def start(self, missing: int, total: int, what: str = "") -> None:
-        """From now on count to `total`, of which some may be `missing` only."""
+        """From now on count to `total`, of which only `missing` are still to do."""
         self.counted, self.since = 0, perf_counter()
         self.reported, self.missing = self.since, missing
         what = what or "starting workers (the first run compiles: some 40 s more)"

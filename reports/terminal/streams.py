@@ -1,5 +1,5 @@
-"""The standard streams as a command can rely on them: they may be closed, on a full disk, or know
-few letters."""
+"""Makes the standard streams reliable: they may be closed, on a full disk, or have a small
+character set."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from reports.terminal.exits import DONE, FAILED, say
 
 
 class Outlet(io.FileIO):
-    """A file descriptor that takes all it is given: what fails to be written is dropped, for the
-    work goes on.
+    """A file descriptor whose writes never fail: data that cannot be written is dropped, so that
+    the work goes on.
 
     Attributes:
-        fault: the first that was met, or None; after it nothing more is tried.
+        fault: the first error, or None; nothing is written after it.
     """
 
     fault: OSError | None = None
@@ -35,11 +35,10 @@ class Outlet(io.FileIO):
 
 @contextmanager
 def printing() -> Iterator[None]:
-    """Within it nothing that a command prints ends it: letters that a stream does not know are
-    written in code.
+    """Context in which printing cannot end a command: characters that a stream lacks are escaped.
 
-    Exits 1, and says why, if standard output did not take all; what fails on standard error has
-    nowhere to be reported.
+    Exits 1 with a message if standard output failed; a failure of standard error cannot be
+    reported.
     """
     fill_gaps()
     outlet = open_stream("stdout", 1)
@@ -58,10 +57,9 @@ def printing() -> Iterator[None]:
 
 
 def fill_gaps() -> None:
-    """Put something that nothing can be written to, and that is at its end, where a stream was
-    closed.
+    """Replace each closed stream by an empty one that takes no output.
 
-    The next file that is opened would have its number else, and would be printed into.
+    Otherwise the next opened file would get its number, and be printed into.
     """
     for number in range(3):
         try:

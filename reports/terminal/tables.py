@@ -12,8 +12,8 @@ from rich.text import Text
 from reports.terminal.console import Console
 from reports.terminal.foreign_text import legible
 
-GAPS = 2, 1  # columns between two columns of a table: the wider where all fits
-TEXT = 28  # columns that a text needs to stand beside its name
+GAPS = 2, 1  # gap between two columns of a table: the wider one if all fits
+TEXT = 28  # least width of a text beside its name
 
 
 def print_table(
@@ -23,10 +23,11 @@ def print_table(
     title: str = "",
     left: Sequence[str] = (),
 ) -> None:
-    """A name a row, and its numbers to the right; numbers of `left` headings are aligned left.
+    """Print a row for each name, with its numbers to the right; columns with `left` headings are
+    aligned left.
 
     What does not fit beside the names goes into a second table below, with the names again. A name
-    that is wider than half of the terminal is folded where its numbers need the room.
+    wider than half of the terminal is folded if its numbers need the room.
     """
     if title:
         console.print(title, style="italic", highlight=False)
@@ -62,7 +63,7 @@ def width_of(cell: str | Text) -> int:
 
 
 def groups(columns: Iterable[int], widths: Sequence[int], gap: int, room: int) -> list[list[int]]:
-    """The columns in order, as many together as fit into the room; at least one."""
+    """The columns in order, in groups that fit into the room; at least one in each."""
     found: list[list[int]] = [[]]
     for column in columns:
         if found[-1] and sum(widths[k] + gap for k in (*found[-1], column)) > room:
@@ -72,7 +73,7 @@ def groups(columns: Iterable[int], widths: Sequence[int], gap: int, room: int) -
 
 
 def print_texts(console: Console, texts: Mapping[str, str | Text], title: str = "") -> None:
-    """A name and its text a row; on a narrow terminal the text stands below, indented."""
+    """Print a name and its text in each row; on a narrow terminal the text is below, indented."""
     if title:
         console.print(title, style="italic", highlight=False)
     names = max(map(width_of, texts), default=0)
@@ -90,7 +91,7 @@ def print_texts(console: Console, texts: Mapping[str, str | Text], title: str = 
 
 
 def print_list(console: Console, sentences: Iterable[str]) -> None:
-    """A sentence an item."""
+    """Print a list with an item for each sentence."""
     table = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences:
         table.add_row("-", sentence)

@@ -1,1 +1,1 @@
-"""The questions: every scene that anything here plays is made in this folder."""
+"""The scenarios: every scene of the project is made in this folder."""

@@ -18,15 +18,14 @@ SHIP_INERTIA = np.pi / 2 * SHIP_RADIUS**4
 INTERVAL = 0.04
 LADDER = (4, 10, 20, 40)  # down to the exercise's own step of 0.001 s
 
-# Key down s, key up s, sign: whole numbers of sample intervals, so that every step is under a
-# thrust from its start to its end or not at all.
+# Key down s, key up s, sign: whole numbers of sample intervals, so that in every step a thrust
+# acts from start to end or not at all.
 KEYS_DOWN = ((0.20, 1.40, 1), (2.60, 4.00, 1), (4.40, 5.40, -1))  # W, W, S
 TURNS = ((0.60, 1.80, 1), (2.20, 3.40, -1), (4.80, 5.20, -1))  # A, D, D
 
 
 def asteroids(seed: int = 0) -> Scenario:
-    """The ship at rest among twenty asteroids, sampled as in the exercise but for
-    overlaps."""
+    """The ship at rest among twenty asteroids, sampled as in the exercise, but without overlaps."""
     question = Scenario(
         name="asteroids",
         asks=(

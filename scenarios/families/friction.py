@@ -1,5 +1,5 @@
-"""Disks with friction: bounces that turn, slides that become rolls, slopes, spinning disks that
-meet."""
+"""Disks with friction: bounces that change the spin, sliding that becomes rolling, slopes,
+collisions of spinning disks."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ MU_TAG = {0.1: "mu01", 0.5: "mu05"}
 
 
 def friction_bounce(restitution: float, friction: float) -> Scenario:
-    """Six disks fall onto the floor obliquely: some slip all along, some stop to slip, one is on
-    the edge between."""
+    """Six disks fall onto the floor obliquely: some slip during the whole collision, some stick,
+    one is at the limit between the two."""
     e, mu, radius, fall = restitution, friction, 0.25, 4.0
-    # At the edge friction just ends the slip of the rim: it takes 3 mu (1 + e) v_n of a solid disk.
+    # At the limit friction just ends the slip of the rim, which is 3 mu (1 + e) v_n for a solid
+    # disk.
     edge = 3 * mu * (1 + e) * fall
     return bounce_on_floor(
         f"friction_bounce_{TAG[e]}_{MU_TAG[mu]}",
@@ -120,8 +121,8 @@ def spinning_disks_meet() -> Scenario:
 
 
 def spin_to_flight_and_back() -> Scenario:
-    """A spinning disk falls straight: the floor turns spin into flight, the ceiling turns that into
-    a spin the other way."""
+    """A spinning disk falls straight: the floor turns spin into sideways motion, the ceiling turns
+    that into opposite spin."""
     radius, gap = 0.25, 1.5
     scene = lay_out(
         position=[[0.0, radius + gap / 2]],
@@ -193,7 +194,7 @@ def slip_to_roll() -> Scenario:
 
 
 def backspin_returns() -> Scenario:
-    """A disk with so much back spin that it comes back as fast as it went."""
+    """A disk with enough back spin to return at its start speed."""
     return slide_on_floor(
         "backspin_returns",
         "Does a disk with back spin stop, come back and roll at the right time?",
@@ -222,7 +223,7 @@ def roll_or_slide() -> Scenario:
     radius = np.array([c * scale for _, _, c, scale in SLOPES])
     foot = spacing * (np.arange(len(SLOPES)) - 2.0)
     normal = sides[:, :2] / sides[:, 2:]
-    # Binary fractions along each incline, 3 to 4 m either way.
+    # Positions along each incline are binary fractions, 3 to 4 m in either direction.
     reach = np.array([[b, -a] for a, b, _, _ in SLOPES]) * 2.0 ** -np.round(
         np.log2(sides[:, 2:] / 4)
     )

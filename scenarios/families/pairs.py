@@ -1,4 +1,4 @@
-"""Two disks that collide once, or just not: head-on, oblique, unequal, slow, near."""
+"""Two disks that collide once or just miss: head-on, oblique, unequal, slow, near."""
 
 from __future__ import annotations
 
@@ -100,8 +100,8 @@ def mass_ratios() -> Scenario:
     """Seven lanes, in each a disk of mass 1 and one of mass 1, 10, ... 1e6."""
     lanes = np.arange(7)
     y = 2.0 * (lanes - 3)
-    # A little farther away in each lane, so that the seven collisions fall at different phases of a
-    # step.
+    # The distance grows from lane to lane, so that the seven collisions are at different phases of
+    # a step.
     light = np.stack([-1.442 - 0.0499 * lanes, y], axis=-1)
     heavy = np.stack([1.3 + 0.0 * lanes, y], axis=-1)
     return _pairs(
@@ -116,8 +116,8 @@ def mass_ratios() -> Scenario:
 
 
 def slow_collision() -> Scenario:
-    """Half a metre a second: slower than the threshold below which some engines make every
-    collision dead."""
+    """A collision at 0.5 m/s, below the threshold under which some engines make every collision
+    inelastic."""
     return _pairs(
         "slow_collision",
         "Is a collision at 0.5 m/s as elastic as a fast one, or is it below a threshold?",

@@ -1,4 +1,4 @@
-"""How a scene is laid out: from lists, with walls, with random disks."""
+"""Makes scenes: from lists, with walls, with random disks."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def scatter(
     radius: Array,
     first: ArrayLike | None = None,
 ) -> Array:
-    """(n, 2) m, centres sampled uniformly between the corners, each again until its disk meets none
-    before it.
+    """(n, 2) m, centres sampled uniformly between the corners; each is sampled again until its disk
+    overlaps no earlier one.
 
-    radius (n,) m. first (2,) m: where disk 0 stands, if it is not sampled. For sparse disks only:
-    equal ones close four times their own area to the next, so up to a quarter of the box a free
-    place always remains.
+    radius (n,) m. first (2,) m: the place of disk 0 if it is not sampled. For sparse disks only:
+    each equal disk blocks four times its area for the next centres, so a free place always remains
+    up to a quarter of the box.
     """
     centres: list[Array] = [] if first is None else [np.asarray(first, float)]
     while len(centres) < len(radius):

@@ -16,7 +16,7 @@ EPS = float(np.finfo(float).eps)
 
 
 def _on_line(x: Array, v: Array) -> Motion:
-    """(..., 2) m, m/s: what is at x and v (...,) along the line y = 0."""
+    """(..., 2) m, m/s: positions or velocities x and v (...,) along the line y = 0."""
     zero = np.zeros_like(x)
     return np.stack([x, zero], axis=-1), np.stack([v, zero], axis=-1)
 
@@ -24,7 +24,7 @@ def _on_line(x: Array, v: Array) -> Motion:
 def line_gas() -> Scenario:
     """Fifteen equal disks between two walls."""
     n, radius, length = 15, 0.25, 12.0
-    # As irregular as random numbers, without any; plain multiples i sqrt(2) would make simultaneous
+    # Irregular without random numbers; plain multiples i sqrt(2) would cause simultaneous
     # collisions.
     squares = np.arange(1, n + 2) ** 2
     gap = 0.2 + (squares * np.sqrt(5)) % 1
@@ -62,11 +62,12 @@ def line_gas() -> Scenario:
 def counting_pi(
     collisions: int, ratio: float, duration: float, ladder: tuple[int, ...]
 ) -> Scenario:
-    """A wall, a light disk and one 100^k times as heavy, whose collisions count out pi."""
+    """A wall, a light disk and one 100^k times as heavy, whose number of collisions has the digits
+    of pi."""
     radius, speed = np.array([0.25, 0.5]), 0.25
     mass = np.array([1.0, ratio])
     gap = np.array([1.0, 1.4246])
-    # From the free room back to the centres: the light disk's width lies before the heavy one.
+    # From free room to centres: the light disk's width is in front of the heavy one.
     shift = np.array([radius[0], 2 * radius[0] + radius[1]])
     position, velocity = _on_line(gap + shift, np.array([0.0, -speed]))
     scene = lay_out(
@@ -106,7 +107,7 @@ def counting_pi(
 
 
 def _cradle(position: Array) -> Scene:
-    """Five equal disks, e = 1, of which the first two come in."""
+    """Five equal disks, e = 1, of which the first two move in."""
     n = len(position)
     x, v = _on_line(position, np.array([1.0, 1.0, 0.0, 0.0, 0.0]))
     return lay_out(
@@ -115,7 +116,7 @@ def _cradle(position: Array) -> Scene:
 
 
 def cradle_with_gaps() -> Scenario:
-    """Two disks come in, two go out, one collision after the other."""
+    """Two disks move in, two move out, one collision after the other."""
     x = np.array([-2.355, -1.8447, 0.0, 0.5169, 1.0317])
     scene = _cradle(x)
 

@@ -1,8 +1,7 @@
-"""Scenes that settings are chosen on, sampled from a seed; none is of the catalogue, which settings
-are judged on.
+"""Scenes for choosing settings, sampled from a seed. None is in the catalogue, on which the
+settings are judged.
 
-Sizes and speeds differ from scene to scene, so that no setting can be right for one length or one
-speed alone.
+Sizes and speeds differ from scene to scene, so that no setting is tuned to one length or one speed.
 """
 
 from __future__ import annotations
@@ -22,24 +21,23 @@ LADDER = (1, 2, 4)  # steps in it
 # m; radii a second, so .03 to .3 radii in the coarsest step
 RADII, SPEEDS = (0.1, 3.0), (2.0, 20.0)
 ELASTIC, INELASTIC = 1.0, (0.3, 0.9)
-# of the touching distance: nearer than that two disks pass as good as touching
+# of the touching distance: at smaller gaps two disks practically touch
 LEAST_GAP, MOST_GAP = 0.005, 0.05
-# so many pairs graze or miss in a scene, faster than elsewhere: up to a radius a step
+# number of grazing or missing pairs in a scene; they are faster than others: up to a radius a step
 PASSING, FASTER = 8, 3.0
-LANE = 6.0  # touching distances from pair to pair
-FAR = 100.0  # radii, to the end of a floor
+LANE = 6.0  # touching distances between lanes
+FAR = 100.0  # radii, half the length of a floor
 
 Sampled = Callable[[np.random.Generator, float, float], Scenario]
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number of which every power of ten is as likely."""
+    """A random number with a uniform logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def posed(asks: str, scene: Scene, duration: float) -> Scenario:
-    """The scenario with the oracle for its answer, cut to whole samples; `tuning` gives it its
-    name."""
+    """The scenario with the oracle as its truth, cut to whole samples; `tuning` sets its name."""
     samples = max(round(duration / SAMPLE_INTERVAL), 4)
     source = "sampled for crosscheck tune"
     question = Scenario(
@@ -49,7 +47,7 @@ def posed(asks: str, scene: Scene, duration: float) -> Scenario:
 
 
 def one_restitution(rng: np.random.Generator) -> float:
-    """1 in half of the scenes, else anything between."""
+    """1 in half of the scenes, else a random value."""
     return ELASTIC if rng.random() < 0.5 else float(rng.uniform(*INELASTIC))
 
 
@@ -69,11 +67,11 @@ def flight_alone(rng: np.random.Generator, r: float, v: float) -> Scenario:
 def pairs(
     rng: np.random.Generator, radius: Array, speed: float, offset: Array, duration: float, asks: str
 ) -> Scenario:
-    """Pairs of disks with these two radii in lanes beside each other; pair k passes at offset[k]
-    touching distances.
+    """Pairs of disks with these two radii in adjacent lanes; pair k passes at offset[k] touching
+    distances.
 
-    They close at `speed` m/s and come to touch, or pass, after .3 to .4 s: each pair at a phase of
-    the step of its own.
+    They close at `speed` m/s and collide or pass after .3 to .4 s, each pair at another phase of
+    the step.
     """
     turn, n, touch = rng.uniform(0, 2 * np.pi), len(offset), radius.sum()
     along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
@@ -94,7 +92,7 @@ def pairs(
 
 
 def head_on(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Two disks that meet in the line of their centres."""
+    """Two disks that collide along the line of their centres."""
     return pairs(
         rng,
         unlike(rng, r),
@@ -106,7 +104,7 @@ def head_on(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def oblique(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Two that meet beside it."""
+    """Two disks that collide off centre."""
     offset = rng.uniform(0.2, 0.9, 1)
     return pairs(
         rng,
@@ -119,7 +117,7 @@ def oblique(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def grazing(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Pairs that collide by as little as those of `near_miss` miss."""
+    """Pairs that just collide, by as much as those of `near_miss` miss."""
     offset = 1 - near(rng)
     return pairs(rng, np.array([r, r]), FASTER * v * r, offset, 0.5, "Is a grazing collision seen?")
 
@@ -148,7 +146,7 @@ def near(rng: np.random.Generator) -> Array:
 
 
 def onto_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk at a wall, at an angle."""
+    """One disk against a wall, at an angle."""
     x = -rng.uniform(0.35, 0.4) * v * r - r
     scene = lay_out(
         position=[[x, 0.0]],
@@ -162,7 +160,7 @@ def onto_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def onto_static(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk at a static one that is larger."""
+    """One disk against a larger static one."""
     y = rng.uniform(0, 2)
     x = -(rng.uniform(0.35, 0.4) * v + np.sqrt(9 - y * y))
     scene = lay_out(
@@ -176,7 +174,7 @@ def onto_static(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def wall_to_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """One disk, to and fro some times."""
+    """One disk, several times back and forth."""
     reach = r + 0.2 * v * r
     scene = lay_out(
         position=[[rng.uniform(-0.1, 0.1) * v * r, 0]],
@@ -192,7 +190,7 @@ def wall_to_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
 def dropped(
     rng: np.random.Generator, r: float, v: float, restitution: float, falls: float
 ) -> Scenario:
-    """A ball that reaches its floor at the speed v, for the time of so many falls of .3 to .5 s."""
+    """A ball that reaches its floor at the speed v; the duration is `falls` falls of .3 to .5 s."""
     t = rng.uniform(0.3, 0.5)
     scene = lay_out(
         position=[[0, r + v * r * t / 2]],
@@ -212,12 +210,12 @@ def bouncing_elastic(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def bouncing_lossy(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A ball that loses some, up to before it rests."""
+    """A ball that loses height, until before it rests."""
     return dropped(rng, r, v, rng.uniform(0.6, 0.9), 4.0)
 
 
 def long_bounce(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """The same for forty bounces, of which only conservation of energy is asked."""
+    """The same for forty bounces, judged by conservation of energy only."""
     ball = dropped(rng, r, v, ELASTIC, 80.0)
     asks = "Does a ball keep its energy over many bounces?"
     return replace(
@@ -251,7 +249,7 @@ def landing(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def row(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Five equal disks with small gaps, of which the first comes in."""
+    """Five equal disks with small gaps, of which the first moves in."""
     x = np.cumsum(
         np.append(0.0, 2 * r + r * np.append(rng.uniform(0.25, 0.3) * v, rng.uniform(0.02, 0.3, 3)))
     )
@@ -266,7 +264,7 @@ def row(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def light_between(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """A light disk between a wall and a heavy one that comes in."""
+    """A light disk between a wall and a heavy disk that moves in."""
     scene = lay_out(
         position=[[rng.uniform(1.5, 3) * r, 0], [rng.uniform(5, 6) * r + 0.2 * v * r, 0]],
         velocity=[[0, 0], [-v * r / 2, 0]],
@@ -279,7 +277,7 @@ def light_between(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def small_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Nine disks in a box of which they cover a sixth to a half, for some collisions each."""
+    """Nine disks that cover a sixth to a half of a box, for some collisions each."""
     n, pitch = 9, float(np.sqrt(np.pi / rng.uniform(0.15, 0.5))) * r
     places = pitch * (np.stack(np.meshgrid(np.arange(3), np.arange(3)), axis=-1).reshape(-1, 2) - 1)
     room, half = pitch / 2 - r, 1.5 * pitch
@@ -295,8 +293,7 @@ def small_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def long_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """The same at e = 1 for some ten times as long, which only conservation of energy is asked
-    of."""
+    """The same at e = 1 for some ten times as long, judged by conservation of energy only."""
     gas = small_gas(rng, r, v)
     scene = replace(gas.scene, restitution=ELASTIC)
     why = "after so many collisions chaos has its way"
@@ -305,8 +302,7 @@ def long_gas(rng: np.random.Generator, r: float, v: float) -> Scenario:
 
 
 def column(rng: np.random.Generator, r: float, v: float) -> Scenario:
-    """Three to eight disks that rest on each other; their gravity is that of a fall at speed v in
-    .4 s."""
+    """Three to eight disks that rest on each other; gravity is v / .4 s."""
     n = int(rng.integers(3, 9))
     r = 2.0 ** round(np.log2(r))  # so that they touch exactly
     y = r + 2 * r * np.arange(n)

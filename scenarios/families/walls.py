@@ -1,5 +1,4 @@
-"""One disk and what does not move: floors, walls, a box, an incline, static disks; and a stack at
-rest."""
+"""One disk with floors, walls, a box, an incline or static disks; and a stack at rest."""
 
 from __future__ import annotations
 
@@ -51,7 +50,7 @@ def _ball(
 
 
 def bouncing_ball_e1() -> Scenario:
-    """A ball that always comes back to where it was dropped."""
+    """A ball that always returns to its start height."""
     return _ball(
         "bouncing_ball_e1",
         "Does a ball dropped at e = 1 come back to its height every time?",
@@ -149,11 +148,11 @@ def box_billiard() -> Scenario:
 def disk_between_static_disks() -> Scenario:
     """A disk bounces between two static ones along a tilted line; an offset grows 2.6-fold at
     each."""
-    # All multiples of (4, 3) by binary fractions: the start is exactly on the line, whatever its
+    # All are multiples of (4, 3) by binary fractions: the start is exactly on the line despite its
     # tilt.
     along = np.array([4.0, 3.0])
     radius, mass, static = 0.5, 1.0, 1.0
-    centre, place, speed = 0.375, -0.00390625, 0.26953125  # in units of `along`, which is 5 long
+    centre, place, speed = 0.375, -0.00390625, 0.26953125  # in units of `along`, which has length 5
     scene = lay_out(
         position=[place * along, -centre * along, centre * along],
         velocity=[speed * along, [0, 0], [0, 0]],
@@ -170,7 +169,7 @@ def disk_between_static_disks() -> Scenario:
         position[:, 0], velocity[:, 0] = np.outer(x - reach, along), np.outer(v, along)
         kick = 2 * mass * speed * 5
         collisions = [(float(at), 0, 2 - k % 2, kick) for k, at in enumerate(legs.start[1:])]
-        # A rounding of one part in 2^52 grows to 1e-9 m in that many bounces, in any float64
+        # A relative rounding of 2^-52 grows to 1e-9 m in that many bounces, in any float64
         # engine.
         growth = offset_growth(10 * reach, radius + static)
         bounces = int(np.log(1e-9 / (EPS * centre * 5)) / np.log(growth))

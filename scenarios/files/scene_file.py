@@ -1,5 +1,5 @@
-"""A scenario as a TOML file: read with every fault named at once, written to read back bit for
-bit."""
+"""Reads a scenario from a TOML file, naming all faults at once, and writes one that reads back bit
+for bit."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from scenarios.truth.exact import with_oracle
 
 MOST_BYTES = 5_000_000
 LONG_NUMBER = re.compile(r"(?<![\w.])\d[\d_]{4000,}")
-MOST_FAULTS = 100  # listed; n disks in one place would make n2 / 2 lines
+MOST_FAULTS = 100  # faults listed; n disks in one place would give n2 / 2 lines
 
-# Disks placed to touch are off by the rounding of their coordinates; a few thousand roundings are
-# forgiven.
+# Disks that should touch are off by the rounding of their coordinates; a few thousand roundings are
+# allowed.
 TOUCHING = 1e-12
 
 
@@ -52,8 +52,8 @@ _KINDS = {
 
 
 def read_scene_file(path: str | Path) -> Scenario:
-    """The scenario a TOML file describes; its source is the file's name, its truth is the oracle's,
-    if it has one.
+    """The scenario in a TOML file; its source is the file's name, its truth comes from the oracle,
+    if there is one.
 
     Raises:
         SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is
@@ -90,7 +90,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
             raise SceneFileError([f"larger than {MOST_BYTES} bytes; must be smaller"])
-        # some editors begin every file with a byte order mark
+        # some editors start every file with a byte order mark
         return tomllib.loads(text.removeprefix("\ufeff"))
     except SceneFileError:
         raise
@@ -136,7 +136,7 @@ def _checked(table: dict[str, Any]) -> SceneTable:
 
 
 def _sentence(fault: ErrorDetails) -> str:
-    """What pydantic found, as `KEY = VALUE: what is wrong; what is allowed`."""
+    """A fault that pydantic found, as `KEY = VALUE: what is wrong; what is allowed`."""
     where, value, kind = fault["loc"], fault["input"], fault["type"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{_bare(part)}" for part in where)[1:]
     words = [part for part in where if isinstance(part, str)]
@@ -249,10 +249,9 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
     """Each (first, second, overlap m, smallest shift (2,) m of the second to end it); walls count
     before disks.
 
-    A disk is taken as a thick wall of no length, so that one row of distances serves both. The
-    disks stand in the order of their left edges, and a row is measured against a slice of them: a
-    wall against all that may reach it, a disk against those that begin within it. Memory stays
-    linear.
+    A disk counts as a thick wall of zero length, so that one function measures both. The disks are
+    sorted by their left edges, and each row is measured against a slice of them: a wall against all
+    disks that may reach it, a disk against those whose left edge is within it. Memory stays linear.
     """
     # "left" is along the longer side
     w, x = len(scene.walls), np.argmax(np.ptp(scene.position, axis=0))
@@ -284,7 +283,7 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
             )
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
-                # Where the side is not known, the way out may lead across the middle: it is longer
+                # If the side is not known, the shift may lead across the middle: then it is longer
                 # by that.
                 reach = thick[row] + radius[near][k] - away[k] @ normal
                 yield (
@@ -306,7 +305,7 @@ def write_scene_file(scenario: Scenario, path: str | Path) -> None:
 
 
 def scene_text(scenario: Scenario) -> str:
-    """What `write_scene_file` writes."""
+    """The text that `write_scene_file` writes."""
     scene = scenario.scene
     keys = ("name", "asks", "duration", "sample_interval")
     top = {key: getattr(scenario, key) for key in keys} | {
@@ -337,7 +336,7 @@ def _disk_row(scene: Scene, i: int) -> dict[str, object]:
         row["mass"], row["static"] = None, True
     solid = scene.mass[i] * (scene.radius[i] * scene.radius[i]) / 2
     usual = {"mass": None, "inertia": float(solid), "angle": 0.0, "angular_velocity": 0.0}
-    # Compared as text, for -0.0 == 0.0 and is another number all the same.
+    # Compared as text, because -0.0 == 0.0 although the numbers differ.
     return {
         key: value
         for key, value in row.items()

@@ -1,5 +1,5 @@
-"""The tables a scene file is made of, and what each key may hold; how a fault is reported is not
-defined here.
+"""The tables of a scene file, and the values allowed for each key; scene_file.py reports the
+faults.
 
 A description completes the sentence "KEY = VALUE: must be ...". A check that needs two keys sits on
 the later one, so that a fault in one key never hides the faults of another.
@@ -17,7 +17,7 @@ from pydantic_core import PydanticCustomError
 
 MOST_DISKS = 100_000
 MOST_WALLS = 10_000
-# disks times walls, each of which is measured when a scene is read: some 2 s
+# disks times walls; all their distances are computed when a scene is read: some 2 s
 MOST_PAIRS = 20_000_000
 MOST_STEPS = 10_000_000  # over the whole dt ladder, for one engine
 SMALLEST, LARGEST = 1e-9, 1e9
