@@ -104,7 +104,8 @@ def test_a_folder_beside_the_files_of_a_class_is_nobody(tmp_path: Path):
 
     assert [one.name for one in found] == ["anna.js", "cem.pdf", "dora.ZIP", "empty", "zipped"]
     assert command.others_in(tmp_path, found) == ["marks.csv", "pictures/"]
-    assert check_file(tmp_path / "dora.ZIP").refused.endswith("a solver is a .js or a .py file; unpack it")
+    refused = check_file(tmp_path / "dora.ZIP").refused
+    assert refused.endswith("a solver is a .js or a .py file; unpack it")
 
 
 def test_every_output_names_what_was_not_read(tmp_path: Path):
