@@ -6,12 +6,12 @@ bits. It asks every pair, so this is for some hundred disks. Compiled by numba, 
 """
 
 from reference_impl import exercise
-from reference_impl.compiled import compiled, kernel
+from reference_impl.compiled import inlined, kernel, pasted
 from reference_impl.exercise import direction, integrate, move, nearest_point, wrap
 from reference_impl.state import Disks, World
 
 
-@compiled
+@pasted
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse along the
     normal in N s), wall w as j = -1 - w."""
@@ -21,7 +21,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return collisions
 
 
-@compiled
+@inlined
 def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
     """One step of the exercise, with its two kinds of collision replaced by those below."""
     integrate(disks, world, dt)

@@ -7,11 +7,11 @@ source runs as plain Python and gives the same bits.
 
 from math import inf, sqrt
 
-from reference_impl.compiled import compiled, inlined, kernel
+from reference_impl.compiled import inlined, kernel, pasted
 from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 
-@inlined
+@pasted
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
@@ -21,7 +21,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return collisions
 
 
-@compiled
+@inlined
 def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
     """One step, as `performSimStep`: integrate all, collide every pair i < j in order, then the
     edges of the world."""
@@ -32,7 +32,11 @@ def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> Non
             impulse = collide(disks, i, j, world)
             if impulse != 0.0:
                 collisions.append((k, i, j, impulse))
-    collide_walls(disks, world, k, collisions)
+    for i in range(n):
+        for w in range(len(world.walls)):
+            impulse = collide_wall(disks, i, w, world)
+            if impulse != 0.0:
+                collisions.append((k, i, -1 - w, impulse))
     wrap(disks.position, world)
 
 
@@ -82,16 +86,6 @@ def collide(disks: Disks, a: int, b: int, world: World) -> float:
     move(v, a, nx, ny, J / mass[a])
     move(v, b, nx, ny, -J / mass[b])
     return J
-
-
-@compiled
-def collide_walls(disks: Disks, world: World, k: int, collisions: list) -> None:
-    """Every disk against every wall, in order."""
-    for i in range(len(disks.radius)):
-        for w in range(len(world.walls)):
-            impulse = collide_wall(disks, i, w, world)
-            if impulse != 0.0:
-                collisions.append((k, i, -1 - w, impulse))
 
 
 @kernel

@@ -8,11 +8,11 @@ file, know one method.
 
 from math import inf, sqrt
 
-from reference_impl.compiled import compiled
+from reference_impl.compiled import compiled, inlined, pasted
 from reference_impl.state import Disks, World
 
 
-@compiled
+@pasted
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
@@ -22,7 +22,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     return collisions
 
 
-@compiled
+@inlined
 def step(disks: Disks, world: World, dt: float, k: int, collisions: list) -> None:
     """One step: move, accelerate, bounce off the walls, collide every pair i < j, then the edges of
     the world."""
@@ -56,7 +56,7 @@ def integrate(disks: Disks, world: World, dt: float) -> None:
         disks.angular_velocity[i] += disks.torque[i] / disks.inertia[i] * dt
 
 
-@compiled
+@inlined
 def bounce(disks: Disks, world: World, k: int, collisions: list) -> None:
     """A wall flips the normal velocity of a disk that comes in, v' = -c_r v; the position stays as
     it is."""

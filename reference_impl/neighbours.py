@@ -14,7 +14,6 @@ from reference_impl.compiled import compiled, inlined, kernel, pasted
 from reference_impl.exercise import (
     collide,
     collide_wall,
-    collide_walls,
     touching_wall,
     wrap,
 )
@@ -73,9 +72,11 @@ def advance_listed(disks: Disks, world: World, dt: float, count: int, collisions
         if used_up(near):
             near.length[STRIDE] = longest_stride(disks, dt)
             build_list(near, disks.position, disks.radius, world, count - k)
-        collide_near(disks, world, dt, near, k, p, count, collisions)
-        collide_near_walls(disks, world, dt, near, k, collisions)
-        wrap_near(disks, world, near)
+            p = next_touching(disks, near, 0)
+        if not is_quiet(disks, world, near, p):
+            collide_near(disks, world, dt, near, k, p, count, collisions)
+            collide_near_walls(disks, world, dt, near, k, collisions)
+            wrap_near(disks, world, near)
         k += 1
     turn(disks, kicks, dt, count)
 
@@ -93,10 +94,16 @@ def take_quiet_steps(
         if used_up(near):
             return k, 0
         p = next_touching(disks, near, 0)
-        if p < near.found[PAIRS] or touch_edges(disks, world, near):
+        if not is_quiet(disks, world, near, p):
             return k, p
         k += 1
     return k, 0
+
+
+@kernel
+def is_quiet(disks: Disks, world: World, near: NeighbourList, p: int) -> bool:
+    """Whether nothing collides in this step; p is the first near pair that touches."""
+    return holds(near) and p == near.found[PAIRS] and not touch_edges(disks, world, near)
 
 
 @kernel
@@ -256,6 +263,16 @@ def collide_from(disks: Disks, world: World, k: int, collisions: list, i: int, j
             impulse = collide(disks, a, b, world)
             if impulse != 0.0:
                 collisions.append((k, a, b, impulse))
+
+
+@compiled
+def collide_walls(disks: Disks, world: World, k: int, collisions: list) -> None:
+    """Every disk against every wall, in order, as `exercise.step` does."""
+    for i in range(len(disks.radius)):
+        for w in range(len(world.walls)):
+            impulse = collide_wall(disks, i, w, world)
+            if impulse != 0.0:
+                collisions.append((k, i, -1 - w, impulse))
 
 
 @inlined

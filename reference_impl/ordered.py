@@ -67,7 +67,11 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
         k, first = fly_until_meeting(disks, world, acceleration, near, dt, k, count)
         if k == count:
             break
-        resolve(disks, world, acceleration, near, dt, k, first, count, collisions)
+        if used_up(near):
+            find_near(disks, world, acceleration.now, near, dt, count - k)
+            first = first_meeting(disks, world, acceleration.now, near, -dt)
+        if first[1] != NOBODY:
+            resolve(disks, world, acceleration, near, dt, k, first, count, collisions)
         k += 1
     if world.friction == 0.0:
         turn(disks, acceleration, dt, count)
@@ -169,9 +173,6 @@ def resolve(  # type: ignore[no-untyped-def]
     collisions: list,
 ) -> None:
     """Meeting after meeting, from the first on, of a step in which all have flown to its end."""
-    if used_up(near):
-        find_near(disks, world, acceleration.now, near, dt, count - k)
-        first = first_meeting(disks, world, acceleration.now, near, -dt)
     for _ in range(MOST * len(disks.radius)):
         now, i, j = first
         if i == NOBODY:
