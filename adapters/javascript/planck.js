@@ -97,6 +97,7 @@
       },
       settings: () => [
         ...Object.keys(DEFAULTS).map((name) => [name, chosen.matched ? planck.Settings[name] : null, planck.Settings[name]]),
+        ["speed cap in m/s", null, planck.Settings.maxTranslation / dt],
         ["baumgarte", chosen.matched ? chosen.baumgarte : null, planck.Settings.baumgarte],
         ["wall skin in m", chosen.skin ? null : 0, walls.length ? walls[0].getFixtureList().getShape().getRadius() : "no wall"],
         ["friction", friction, bodies[0].getFixtureList().getFriction()],

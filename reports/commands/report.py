@@ -12,6 +12,7 @@ from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
 from reports.commands.own_solvers import lines
 from reports.compare.comparison import Comparison
+from reports.compare.fast_disks import fast_note
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
 from reports.page.report import Report, make_report
@@ -74,7 +75,7 @@ def print_summary(report: Report, page: str) -> None:
         console.print()
     print_list(
         console,
-        [*report.findings, *own_solvers(report.said), *off_grid(report), statuses(report)],
+        [*report.findings, *own_solvers(report.said), *notes(report), statuses(report)],
     )
     if failed := failures(report, Path(page).parent):
         console.print(failed, highlight=False, soft_wrap=True)
@@ -120,12 +121,15 @@ def title_of(scenes: int, rough: bool = False) -> str:
     )
 
 
-def off_grid(report: Report) -> list[str]:
-    """A sentence for each scene whose thrusts start or stop inside a step: the displacement of
-    every engine."""
-    scenarios = [comparison.scenario for comparison in report.comparisons]
-    notes = {scenario.name: off_grid_note(scenario) for scenario in scenarios}
-    return [f"{name}: {note}." for name, note in notes.items() if note]
+def notes(report: Report) -> list[str]:
+    """A sentence for each scene whose thrusts start or stop inside a step, or whose disks are fast
+    for their step."""
+    found = [
+        (comparison.scenario.name, note)
+        for comparison in report.comparisons
+        for note in (off_grid_note(comparison.scenario), fast_note(comparison))
+    ]
+    return [f"{name}: {note.removesuffix('.')}." for name, note in found if note]
 
 
 def statuses(report: Report) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from adapters.run import Run
 from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
+from reports.compare.fast_disks import fast_note
 from reports.page import overview, style
 from reports.page.charts import CHARTS, Drawing, packed_charts
 from reports.page.page_tables import by_name
@@ -27,6 +28,7 @@ class ScenarioSection:
         truth: a sentence on the exact answer.
         dt: s, the step size of `table`.
         off_grid: the step sizes at which a thrust starts or stops inside a step, or "".
+        fast: the step sizes at which a disk can pass through another, and caps on speed, or "".
         failures: the engines that did not play it to its end.
         layers: what the replay shows: name, and its run; None for the exact answer.
         replay: the frames of `layers`, packed.
@@ -44,6 +46,7 @@ class ScenarioSection:
     truth: str
     dt: float
     off_grid: str
+    fast: str
     failures: list[overview.Failure]
     layers: list[tuple[str, Run | None]]
     replay: str
@@ -77,6 +80,7 @@ def section_of(
         truth=truth_of(comparison),
         dt=comparison.middle_dt,
         off_grid=off_grid_note(scenario),
+        fast=fast_note(comparison),
         failures=overview.failures(comparison),
         layers=[(name_of(run), run) for run, _ in layers],
         replay=pack(comparison),
