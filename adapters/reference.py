@@ -94,12 +94,12 @@ class Reference:
     def step(self, count: int = 1) -> None:
         """One call into the compiled solver; a force lasts for the first step only."""
         if self.forced:
-            self._keep(self.advance(1))
+            self.forced = False
+            self.step(1)
             self.disks.force.fill(0.0)
             self.disks.torque.fill(0.0)
-            self.forced = False
-            self.steps, count = self.steps + 1, count - 1
-        if collisions := self.advance(count):
+            count -= 1
+        if count and (collisions := self.advance(count)):
             self._keep(collisions)
         self.steps += count
 
