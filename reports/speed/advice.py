@@ -3,6 +3,7 @@ not need: all from runs of the scene itself."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -196,7 +197,10 @@ def held_by(scene: str, seed: int) -> Scenario:
     try:
         return ladder.held(scene, seed).scenario
     except NoTruth as refusal:
-        raise NoAdvice(f"no exact answer: {refusal}") from refusal
+        raise NoAdvice(
+            f"no exact answer: {refusal}. To compare the engines with each other and with the laws"
+            f" of physics: crosscheck run {shlex.quote(scene)}"
+        ) from refusal
 
 
 def ladder_of(scenario: Scenario) -> tuple[int, ...]:
@@ -314,12 +318,12 @@ def played_as(name: str) -> str:
 
 
 def largest(budget: Any, measure: str) -> str:
-    """The mechanism with the largest contribution, as the end of a sentence; "" if unknown."""
+    """The mechanism with the largest contribution, as the end of a sentence."""
     if budget is None or isinstance(budget, Failure):
-        return ""
+        return "not known: this engine has no error budget here"
     left_out = (*TOTALS, INTERPLAY)
     parts = [row for row in budget if row["contribution"] not in left_out and measure in row]
     if not parts:
-        return ""
+        return "not known: the error budget says nothing of this error"
     most = str(max(parts, key=lambda row: row[measure])["contribution"])
     return "mostly " + {TIME: "end-of-step detection", RESIDUAL: "unknown"}.get(most, most)

@@ -18,7 +18,7 @@ from reports.speed.purposes import PURPOSES
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
 from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table
+from reports.terminal.tables import print_table, print_texts
 
 SHOWN = 3  # the cheapest and the next two
 
@@ -143,9 +143,12 @@ def print_short(console: Console, advice: Advice) -> None:
     coarse, *_, fine = advice.step_sizes
     title = f"Not within it at any step size from {number(coarse * 1e3)} to {number(fine * 1e3)} ms"
     rows = [
-        [best.name, number(best.error), number(best.dt * 1e3), why] for best, why in advice.short
+        [best.name, number(best.error), number(best.dt * 1e3) if isfinite(best.error) else "–"]
+        for best, _ in advice.short
     ]
-    print_table(console, ["engine", "least error", "at dt, ms", "why"], rows, title, ["why"])
+    print_table(console, ["engine", "least error", "at dt, ms"], rows, title)
+    console.print()
+    print_texts(console, {best.name: why for best, why in advice.short}, "Why")
 
 
 def print_changes(console: Console, advice: Advice, bound: float) -> None:
