@@ -50,7 +50,7 @@ def capped(runs: Sequence[Run], fastest: float) -> list[str]:
         return []
     dt = max(caps)
     return [
-        f"The fastest disk has {fastest:.3g} m/s; with steps of {dt:.4g} s the most is"
+        f"The fastest disk has {fastest:.3g} m/s; in steps of {dt:.4g} s some engines allow less:"
         f" {', '.join(caps[dt])}."
     ]
 
