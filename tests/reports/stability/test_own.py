@@ -20,9 +20,9 @@ from reports.stability.interventions import (
     faster,
     intervention_of,
     larger,
+    reason_by_intervention,
     slower,
     smaller,
-    reason_by_intervention,
 )
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
