@@ -15,10 +15,10 @@ forget_stale(Path(__file__).parent)
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-# Kernels make no arrays, so nothing needs counting; numba would count every use of those they are
-# handed, which takes three quarters of the time (0.65 against 2.5 million collisions a second), and
-# the only option is one it calls private. Entries for callers in C, and for Python where only
-# kernels call, are a seventh of the time it takes to compile all.
+# Kernels allocate no arrays, so that references need no counting. Numba would count every use of an
+# array argument, which takes three quarters of the time (0.65 against 2.5 million collisions a
+# second); the only option against it, `_nrt`, is one it calls private. Wrappers for callers in C,
+# and in Python for functions that only kernels call, would take a seventh of the time of compiling.
 OPTIONS: dict[str, Any] = {
     "cache": True,
     "error_model": "numpy",
@@ -33,12 +33,11 @@ def kernel(function: Kernel) -> Kernel:
 
 
 def inlined(function: Kernel) -> Kernel:
-    """The compiled function, pasted by LLVM where it is called: handing over arguments takes as
-    long as its work."""
+    """The compiled function, inlined by LLVM: passing its arguments takes as long as its work."""
     return njit(**OPTIONS | {"forceinline": True, "no_cpython_wrapper": True})(function)
 
 
-def pasted(function: Kernel) -> Kernel:
-    """The function, pasted by numba where it is called once, so that it is not also compiled for
-    itself."""
+def inlined_early(function: Kernel) -> Kernel:
+    """The function, inlined by numba itself where it is called once, so that it is not also
+    compiled on its own."""
     return njit(**OPTIONS, inline="always")(function)

@@ -1,8 +1,8 @@
-"""When two things meet: first contact times of disks, points and lines that fly on parabolas.
+"""First contact times of disks, points and lines on parabolas.
 
 Compiled by numba; with NUMBA_DISABLE_JIT=1 the same source runs as plain Python. Times are s from
-now, inf: never. A gap is positive before a contact. What rounding has closed too far counts as
-touching, never as lost.
+now, inf: never. A gap is positive before a contact. A gap that rounding has made slightly negative
+counts as a contact.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ Quartic = tuple[float, float, float, float, float]
 
 @kernel
 def line_time(gap: float, speed: float, acceleration: float) -> float:
-    """First t >= 0 at which gap + speed t + acceleration t2 / 2 goes down through 0, without a
-    difference of near equals.
+    """First t >= 0 at which gap + speed t + acceleration t2 / 2 falls through 0, without
+    cancellation.
 
-    Where the gap is below 0 and rises, it must come down again; where it never gets above 0, the
-    answer is its top.
+    A gap that is below 0 and rises must come down again first; if it never gets above 0, the time
+    is that of its maximum.
     """
     if gap <= 0.0 and (speed < 0.0 or (speed == 0.0 and acceleration < 0.0)):
         return 0.0
@@ -38,7 +38,7 @@ def disk_time(gap: float, closing: float, speed2: float) -> float:
     """Contact of two disks with equal accelerations: gap = dr.dr - R2, closing = dr.dv, speed2 =
     dv.dv.
 
-    t = c / (-b + sqrt(b2 - a c)), which cancels nothing (Alder & Wainwright, J. Chem. Phys. 31,
+    t = c / (-b + sqrt(b2 - a c)), which avoids cancellation (Alder & Wainwright, J. Chem. Phys. 31,
     459, 1959).
     """
     disc = closing * closing - speed2 * gap
@@ -62,7 +62,7 @@ def curved_time(
     """Contact of two disks with different accelerations up to `until` s: the first down-crossing of
     a quartic.
 
-    d, u, a: position, velocity and acceleration of the one relative to the other; a != 0.
+    d, u, a: position, velocity and acceleration of one relative to the other; a != 0.
     """
     if gap <= 0.0 and closing < 0.0:
         return 0.0
@@ -88,10 +88,11 @@ def curved_time(
 
 @kernel
 def turning_points(f: Quartic, end: float) -> Quartic:
-    """Where f turns between 0 and `end`, and both: its third derivative's root parts the range for
-    the second's.
+    """The extrema of f between 0 and `end`, with 0 and `end` themselves.
 
-    Their roots part it for the first's. Where a part has no root, its end stands for it.
+    The root of the third derivative splits the range into intervals on which the second is
+    monotone; the roots of the second split it for the first. An interval without a root gives its
+    end instead.
     """
     first = (f[1], 2 * f[2], 3 * f[3], 4 * f[4], 0.0)
     second = (first[1], 2 * first[2], 3 * first[3], 0.0, 0.0)
@@ -109,8 +110,8 @@ def value(f: Quartic, t: float) -> float:
 
 @kernel
 def root(f: Quartic, low: float, high: float) -> float:
-    """The root of what is monotone from low to high, or high: Newton, halving where that would
-    leave the bracket."""
+    """The root of a polynomial that is monotone from low to high, or high if there is none:
+    Newton's method, with bisection where that would leave the bracket."""
     rising = value(f, high) > 0.0
     if rising == (value(f, low) > 0.0):
         return high

@@ -1,11 +1,11 @@
-"""What the event engine keeps: disks with a next-event record each, a cell grid, the rules; and how
-disks fly in it.
+"""The data of the event engine: disks, each with a record of its next event, the cell grid, the
+rules; and how disks fly in it.
 
-A record holds the earliest contact of its disk with another one, as of when it was last looked for,
-and the earliest event of the disk by itself: a wall, an edge of its cell or of the wrap box. A
-contact is void if the other disk has been struck since (its `count` moved on); it is looked for
-again when its time comes, and is early rather than late until then. Every pair is covered by the
-record made last of its two (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
+A record holds the earliest contact of its disk with another one, as of the last search, and the
+earliest event of the disk on its own: a wall, an edge of its cell or of the wrap box. A contact is
+stale if the other disk has collided since (its `count` has changed); the search is then repeated
+at the time of the contact, which is never after the next true one. Of every pair, the disk whose
+record was made last has the valid one (Lubachevsky, J. Comput. Phys. 94, 255, 1991).
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ Links = NDArray[np.uint32]
 Disks = NDArray[np.void]  # (n,) of DISK
 Runs = NDArray[np.void]  # (n,) of RUN
 Spins = NDArray[np.void]  # (n,) of SPIN
-# ends a chain; without a sign, so that nobody must ask whether to count from the end
+# the end of a chain; unsigned, so that numba need not test for negative indices
 NONE = np.uint32(2**32 - 1)
-NOBODY = -(2**31)
-DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)  # what the loop says
+NOBODY = -(2**31)  # the value of `last` before the first collision
+DONE, GOES_ON, LOG_FULL, ACCUMULATION, REENTRY, ROUND_END = range(6)  # statuses of the loop
 BASE, STOP = 0, 1  # columns of Arena.clock
-LOGGED, WHO, WHOM, LEFT = range(4)  # and of Arena.counters
-# by itself: + side (left, right, bottom, top); the wall's end; no more slip; + 3 wall + part
-EDGE, WRAP, END, GRIP, WALL = 0, 4, 8, 9, 10
+LOGGED, END_DISK, END_PARTNER, LEFT = range(4)  # columns of Arena.counters
+# Codes of the events of a disk on its own: EDGE and WRAP + side (left, right, bottom, top); the end
+# of its wall; the end of its slip; WALL + 3 wall + part.
+EDGE, WRAP, END, SLIP_END, WALL = 0, 4, 8, 9, 10
 
-# A disk in three lines of the cache: what a search for contacts reads of others, its record, what
-# only some need.
+# A disk in three cache lines: what a search for contacts reads of other disks, its record, and what
+# few events need.
 DISK = np.dtype(
     [
         # state at the disk's own time
@@ -51,59 +52,59 @@ DISK = np.dtype(
         ("weight", "f8"),  # 1 / mass
         # m/s, what rounding may have left of the closing speed of its last collision
         ("noise", "f8"),
-        # when it meets another disk, or something by itself
+        # the times of its next contact with a disk, and of its next event on its own
         ("pair_time", "f8"),
         ("own_time", "f8"),
         ("partner", "u4"),
-        ("partner_count", "i4"),  # that disk, and its count when this was found
-        ("own_code", "i4"),  # what it meets by itself, as above
-        ("last", "i4"),  # what it struck last: a disk, or -1 - wall
+        ("partner_count", "i4"),  # the disk of that contact, and its count when it was predicted
+        ("own_code", "i4"),  # its next event on its own, as above
+        ("last", "i4"),  # its last collision: a disk, or -1 - wall
         ("before", "u4"),  # the disk before it in its chain
-        # collisions since, to notice when they accumulate
+        # a time, and the collisions since, to detect accumulation
         ("mark_collisions", "i4"),
         ("mark_time", "f8"),
         ("ax", "f8"),
-        ("ay", "f8"),  # acceleration; lying on a wall, only that along it
+        ("ay", "f8"),  # acceleration; of a disk that rests on a wall, only the part along it
         ("free_ax", "f8"),
         ("free_ay", "f8"),  # acceleration of free flight
-        # where cell (0, 0) of its lap lies: the grid of an open scene repeats for ever
+        # the corner of cell (0, 0) of its copy of the grid, which repeats in an open scene
         ("ox", "f8"),
         ("oy", "f8"),
-        ("wall", "i4"),  # the wall it lies on; -1: none; -2 - wall: none since it slid off that one
+        ("wall", "i4"),  # the wall it rests on; -1: none; -2 - wall: it has just slid off that one
         ("bounces", "i4"),  # collisions in a row on the face of one wall
-        ("corner", "i4"),  # the second wall of the corner in which it lies still; -1: none
+        ("corner", "i4"),  # the second wall of the corner in which it rests; -1: none
         ("", "i4"),
     ]
 )
 
-# Of each disk the collisions in a row between which it has not flown, see `event_rest.rattles`.
+# For each disk the latest collisions without a flight between them, see `rest.rattles`.
 RUN = np.dtype(
     [
         ("collisions", "i4"),  # those that count
-        ("walls", "i4"),  # collisions in a row with walls, whether it has flown between them or not
-        ("start", "f8"),  # s, when the first of the run was
-        ("acceleration", "f8"),  # m/s2, the largest that acted on those who took part
+        ("walls", "i4"),  # collisions in a row with walls, with or without flights between them
+        ("start", "f8"),  # s, the first of these collisions
+        ("acceleration", "f8"),  # m/s2, the largest of the disks in these collisions
     ]
 )
 
-# How each disk turns, where friction makes that matter.
+# The rotation of each disk, used where there is friction.
 SPIN = np.dtype(
     [
-        ("t", "f8"),  # s, when the next three were so
+        ("t", "f8"),  # s, the time of the next three
         ("angle", "f8"),  # rad
         ("spin", "f8"),  # rad/s
         ("rate", "f8"),  # rad/s2
-        ("free_rate", "f8"),  # rad/s2, of torques alone
-        ("turns", "f8"),  # 1 / inertia
-        ("sliding", "i4"),  # the sign of the slip on the wall it lies on; 0: it rolls
+        ("free_rate", "f8"),  # rad/s2, by torques without friction
+        ("inverse_inertia", "f8"),
+        ("sliding", "i4"),  # the sign of the slip on the wall it rests on; 0: it rolls
     ],
     align=True,
 )
 
 
 class Grid(NamedTuple):
-    """Cells at least as wide as the largest disk; in a torus leaving the grid shifts the disk, else
-    its origin."""
+    """Cells at least as wide as the largest disk. A disk that leaves the grid is shifted by its
+    span in a torus; otherwise its copy of the grid is shifted."""
 
     side: tuple[float, float]  # m
     shape: tuple[int, int]  # at least 3
@@ -112,56 +113,56 @@ class Grid(NamedTuple):
     torus: bool
 
 
-# () where there are only disks and they fly straight, else (True,). Numba knows how long a tuple is
-# when it compiles, so that a gas has a loop of its own, without a trace of walls and accelerations.
+# () where there are only disks on straight lines, else (True,). Numba knows the length of a tuple
+# when it compiles, so that a gas gets its own loop without code for walls and accelerations.
 Scenery = tuple[()] | tuple[bool]
 
 
 class Rules(NamedTuple):
-    """What all disks obey."""
+    """The physics of the scene."""
 
     restitution: float
-    falling: bool  # something is accelerated
-    mixed: bool  # not everything alike
+    falling: bool  # some disk is accelerated
+    mixed: bool  # not all with the same acceleration
     wrapped: bool
-    lasting: bool  # bounces die out too slowly for `crowd`, or never
-    # units in the last place of the time: a disk that collides 64 times within so many has no
-    # single continuation
-    crowd: float
+    lasting: bool  # bounces die out too slowly for `accumulation_ulps`, or never
+    # units in the last place of the time: the collisions of a disk that collides 64 times within so
+    # many accumulate
+    accumulation_ulps: float
     friction: float
 
 
 class Walls(NamedTuple):
-    """What stands around, and which cells it is near."""
+    """The wrap box and the walls, and which walls are near each cell."""
 
     wrap: Array  # (2, 2) m
     segment: Array  # (w, 5) start m, direction, length m
-    first: Ints  # (cells + 1,) where a cell's walls begin in `of`
+    first: Ints  # (cells + 1,) the index in `of` of a cell's first wall
     of: Ints
 
 
 class Arena(NamedTuple):
-    """All there is. Kernels change its arrays in place."""
+    """The whole state of the engine. Kernels change its arrays in place."""
 
     disks: Disks
     tree: Tree
     head: Links  # (cells,) first disk
-    near: Links  # (n + 9,) candidates of the search under way
+    near: Links  # (n + 9,) candidates of the present search
     grid: Grid
     rules: Rules
     walls: Walls
-    clock: Array  # s: when the present epoch began, when the answer ends
+    clock: Array  # s: the start of the present epoch, the end of the answer
     log: Array  # (h, 4) t s, disk, other disk or -1 - wall, impulse N s
-    # rows in the log; the two for whom the answer ends, as in the log; events until the loop comes
-    # back
+    # rows in the log; the two for which the answer ends, as in the log; events until the loop
+    # returns
     counters: Ints
-    runs: Runs  # untouched where there is no scenery
-    spins: Spins  # untouched where there is no friction
+    runs: Runs  # unused without scenery
+    spins: Spins  # unused without friction
 
 
 @inlined
 def fly(a: Any, now: float, scenery: Scenery) -> None:
-    """Bring a disk to `now` on its parabola."""
+    """Move a disk on its parabola to `now`."""
     t = now - a.t
     if len(scenery):
         a.x += (a.vx + a.ax * t / 2) * t
@@ -199,14 +200,14 @@ def unlink(disks: Disks, head: Links, g: Grid, i: int) -> None:
 
 @inlined
 def lap(k: int, cells: int) -> int:
-    """By how many laps of the grid cell k, a step beyond it at most, is off."""
+    """By how many spans of the grid cell k, at most one cell outside, is off: -1, 0 or 1."""
     return -1 if k < 0 else (1 if k == cells else 0)
 
 
 @inlined
 def cross(disks: Disks, head: Links, g: Grid, i: int, side: int) -> None:
-    """Move disk `i` to the next cell; over the end of the grid, shift the disk (torus) or the grid
-    under it."""
+    """Move disk `i` to the next cell; beyond the end of the grid, shift the disk (torus) or its
+    copy of the grid."""
     a = disks[i]
     unlink(disks, head, g, i)
     step = 2 * (side % 2) - 1
@@ -224,8 +225,8 @@ def cross(disks: Disks, head: Links, g: Grid, i: int, side: int) -> None:
 
 
 @inlined
-def settle(disks: Disks, head: Links, g: Grid, i: int) -> None:
-    """Find the cell and the lap of disk `i` from its position, and link it there."""
+def link_by_position(disks: Disks, head: Links, g: Grid, i: int) -> None:
+    """Find the cell of disk `i`, and its copy of the grid, from its position; link it there."""
     a = disks[i]
     kx = int(np.floor((a.x - a.ox) / g.side[0]))
     ky = int(np.floor((a.y - a.oy) / g.side[1]))

@@ -1,8 +1,7 @@
-"""The float64 event engine: disks, walls, a torus or the exercise's wrap, event by event without
-time steps.
+"""The event-driven engine for callers in Python: disks, walls, a torus or the exercise's wrap.
 
-It has no step size and no tolerance: contact times are roots, flights are parabolas. Where the
-motion has no single continuation it says so (`NoTruth`) rather than go on.
+It has no step size and no tolerance: contact times are roots, flights are parabolas. It raises
+`NoTruth` where the motion has no single continuation.
 """
 
 from __future__ import annotations
@@ -18,6 +17,8 @@ from adapters.event_driven.disks import (
     ACCUMULATION,
     BASE,
     DISK,
+    END_DISK,
+    END_PARTNER,
     GOES_ON,
     LEFT,
     LOG_FULL,
@@ -29,28 +30,26 @@ from adapters.event_driven.disks import (
     RUN,
     SPIN,
     STOP,
-    WHO,
-    WHOM,
     Arena,
     Grid,
     Rules,
     Scenery,
     Walls,
 )
-from adapters.event_driven.friction import look_turned
+from adapters.event_driven.friction import rotation_at
 from adapters.event_driven.queue import empty_queue
 from scenarios.model import Array, Scene
 from scenarios.no_truth import NoTruth
 
 LOG_ROWS = 1 << 14
-EVENTS = 1 << 14  # in one go, some ms, without looking up for Ctrl-C
-# events, less than a second, after which the time they took must account for them, ...
-MOST = 400_000
-# ... at so many in all, and so many a disk, while the fastest flies the smallest radius
-NARROW, CROWDED = 1e4, 1e2
-MOST_AHEAD = 1e9  # events, some ten minutes, that may still be to come at the present pace
-SLOWEST = 0.9999  # the restitution up to which bounces are waited for to die out
-# cells are wider than the largest disk by more than rounding, so that contacts are always next door
+EVENTS = 1 << 14  # in one call of the loop, some ms: in between Python can handle Ctrl-C
+MOST = 400_000  # events, less than a second, between two checks whether there are too many
+# the events allowed in all, and for each disk, while the fastest disk moves by the smallest radius
+IN_ALL, PER_DISK = 1e4, 1e2
+MOST_AHEAD = 1e9  # events, about ten minutes, that may remain at the present rate
+SLOWEST = 0.9999  # up to this restitution the bounces of a disk are played until they die out
+# a factor above rounding: cells are wider than the largest disk, so that contacts are always in
+# neighbouring cells
 WIDER = 1 + 1e-9
 
 
@@ -58,9 +57,9 @@ class EventEngine:
     """Plays a scene exactly, but for the rounding of float64.
 
     torus: (2, 2) m, low and high corner of a periodic box in place of walls. cell: m, the least
-    side of a grid cell; it changes the speed only. Raises `NoTruth` where the start is no start:
-    disks that overlap each other or a wall or touch and close in, a disk larger than its box, a
-    torus narrower than three diameters.
+    side of a grid cell; it changes the speed only. Raises `NoTruth` for an invalid
+    start: disks that overlap each other or a wall, or touch and approach; a disk larger than its
+    box; a torus narrower than three diameters.
     """
 
     def __init__(self, scene: Scene, torus: ArrayLike | None = None, cell: float = 0.0) -> None:
@@ -86,7 +85,7 @@ class EventEngine:
             spins=spins_of(scene),
         )
         self.kept: list[Array] = []
-        # events since refuse_crawl has looked, and when that was, s
+        # events since the last call of refuse_too_many, and the simulated time of that, s
         self.spent, self.since = 0, 0.0
         self.scenery: Scenery = (
             (True,) if rules.falling or rules.wrapped or len(scene.walls) or rules.friction else ()
@@ -95,16 +94,20 @@ class EventEngine:
         self.refuse_pairs()
 
     def advance(self, until: float) -> None:
-        """Let all events up to `until` s happen; `NoTruth` if the answer ends before."""
+        """Carry out all events up to `until` s; raises `NoTruth` if the answer ends before."""
         status, counters = GOES_ON, self.arena.counters
         while status in (GOES_ON, LOG_FULL):
             counters[LEFT] = EVENTS
             status = event_loop.advance(self.arena, self.scenery, until)
             self.spent += EVENTS - int(counters[LEFT])
-            self.drain()
+            self.empty_log()
             if self.spent >= MOST:
-                self.refuse_crawl(until)
-        at, i, j = float(self.arena.clock[STOP]), int(counters[WHO]), int(counters[WHOM])
+                self.refuse_too_many(until)
+        at, i, j = (
+            float(self.arena.clock[STOP]),
+            int(counters[END_DISK]),
+            int(counters[END_PARTNER]),
+        )
         if status == ACCUMULATION:
             raise NoTruth(
                 f"the collisions of disk {i} on {self.partners(i, j, at)} accumulate at {at:.9g} s",
@@ -114,35 +117,35 @@ class EventEngine:
             raise NoTruth(f"disk {i} re-enters on top of disk {j} at {at:.9g} s", at)
         if status == ROUND_END:
             raise NoTruth(
-                f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: no parabola goes"
-                " there",
+                f"disk {i} slides round the end of wall {-1 - j} at {at:.9g} s: its path there is"
+                " no parabola",
                 at,
             )
 
-    def refuse_crawl(self, until: float) -> None:
-        """`NoTruth` if the last `MOST` events took less time than the scene accounts for, or if too
-        many are to come.
+    def refuse_too_many(self, until: float) -> None:
+        """Raise `NoTruth` if the latest events cover less simulated time than is plausible, or if
+        too many remain up to `until` s.
 
-        While the fastest disk flies its radius, or falls by it, a gas has some ten events a disk,
-        and a disk that flies to and fro in a gap has more as that is narrower: `CROWDED` and
-        `NARROW` are far above both.
+        While the fastest disk moves or falls by its radius, a gas has about ten events per disk; a
+        disk that bounces in a gap has more, the narrower the gap. `PER_DISK` and `IN_ALL` are far
+        above both.
         """
         disks, radius = self.arena.disks, float(self.scene.radius.min())
         now = min(until, float(self.arena.clock[BASE] + self.arena.tree[1].time))
         speed = np.hypot(disks["vx"], disks["vy"]).max()
         acceleration = np.hypot(disks["free_ax"], disks["free_ay"]).max()
         rate, took = (
-            (NARROW + CROWDED * self.scene.n) * (speed / radius + np.sqrt(acceleration / radius)),
+            (IN_ALL + PER_DISK * self.scene.n) * (speed / radius + np.sqrt(acceleration / radius)),
             now - self.since,
         )
-        # What is no number is no progress either.
+        # The negation also catches nan.
         if not (self.spent <= rate * took and self.spent * (until - now) <= MOST_AHEAD * took):
             span = f"{self.spent} events from {self.since:.9g} s to {now:.9g} s"
             raise NoTruth(f"{span} are too many to follow up to {until:.9g} s", now)
         self.spent, self.since = 0, now
 
     def partners(self, i: int, last: int, since: float) -> str:
-        """What disk `i` has struck since a time, in words; `last` was the last of it."""
+        """The partners of disk `i` in collisions since a time, in words; `last`: the latest one."""
         log = np.concatenate([np.empty((0, 4)), *self.kept[-2:]])
         log = log[log[:, 0] >= since * (1 - 1e-12)]
         found = {
@@ -153,33 +156,33 @@ class EventEngine:
         disks, walls = (sorted(j for j in found if j >= 0), sorted(-1 - j for j in found if j < 0))
         return " and ".join([*(f"disk {j}" for j in disks), *(f"wall {w}" for w in walls)])
 
-    def drain(self) -> None:
-        """Keep what is in the log and empty it."""
+    def empty_log(self) -> None:
+        """Move the rows of the log to `kept`."""
         counters = self.arena.counters
         if counters[LOGGED]:
             self.kept.append(self.arena.log[: counters[LOGGED]].copy())
             counters[LOGGED] = 0
 
     def accelerate(self, disk: int, at: float, acceleration: Array, rate: float = 0.0) -> None:
-        """From `at` s on, which `advance` has reached, let a disk that is not static accelerate so,
-        (2,) m/s2, and its spin at `rate` rad/s2, where there is friction."""
+        """Set the acceleration (2,) m/s2 of a disk that is not static, and its angular acceleration
+        `rate` rad/s2, used with friction only; from `at` s on, which `advance` has reached."""
         self.arena = self.arena._replace(rules=self.arena.rules._replace(falling=True, mixed=True))
         self.scenery = (True,)
         ax, ay = acceleration
         event_loop.accelerate(self.arena, self.scenery, disk, at, ax, ay, rate)
 
-    def look(self, at: float) -> tuple[Array, Array]:
-        """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; nothing
-        changes by looking."""
+    def motion_at(self, at: float) -> tuple[Array, Array]:
+        """Position and velocity (n, 2) m, m/s at `at` s, which `advance` has reached; changes
+        nothing."""
         out = np.empty((self.scene.n, 4))
-        event_loop.look(self.arena.disks, self.arena.clock[BASE], at, out)
+        event_loop.motion_at(self.arena.disks, self.arena.clock[BASE], at, out)
         return out[:, :2], out[:, 2:]
 
-    def look_turned(self, at: float) -> tuple[Array, Array]:
+    def rotation_at(self, at: float) -> tuple[Array, Array]:
         """Angle and angular velocity (n,) rad, rad/s at `at` s of a scene with friction, else those
         of the start."""
         out = np.empty((self.scene.n, 2))
-        look_turned(self.arena.spins, self.arena.clock[BASE], at, out)
+        rotation_at(self.arena.spins, self.arena.clock[BASE], at, out)
         return out[:, 0], out[:, 1]
 
     @property
@@ -188,8 +191,8 @@ class EventEngine:
         return np.concatenate([np.empty((0, 4)), *self.kept])
 
     def refuse_pairs(self) -> None:
-        """`NoTruth` if two disks overlap, or touch and close in, judged in rationals: floats cannot
-        tell."""
+        """Raise `NoTruth` if two disks overlap, or touch and approach; decided in rationals,
+        because float64 cannot decide it."""
         disks, found = self.arena.disks, np.empty((8 * self.scene.n, 2), np.int64)
         count = event_loop.near_pairs(disks, self.arena.head, self.arena.grid, WIDER - 1, found)
         for i, j in found[:count]:
@@ -197,7 +200,7 @@ class EventEngine:
 
 
 def refuse_pair(a: Any, b: Any, grid: Grid, i: int, j: int) -> None:
-    """`NoTruth` if disks i and j overlap, or touch and close in."""
+    """Raise `NoTruth` if disks i and j overlap, or touch and approach."""
     apart = [Fraction(b.x) - Fraction(a.x), Fraction(b.y) - Fraction(a.y)]
     if grid.torus:
         apart = [
@@ -217,13 +220,13 @@ def refuse_pair(a: Any, b: Any, grid: Grid, i: int, j: int) -> None:
     if gap == 0 and closing < 0:
         speed = -float(closing) / float(reach)
         raise NoTruth(
-            f"disks {i} and {j} touch and close in at {speed:.3g} m/s at the start: leave a gap"
+            f"disks {i} and {j} touch and approach at {speed:.3g} m/s at the start: leave a gap"
         )
 
 
 def refuse_walls(scene: Scene) -> bool:
-    """Whether a disk that can move touches a wall; `NoTruth` if one overlaps a wall, or touches it
-    and closes in."""
+    """Whether a disk that is not static touches a wall; raises `NoTruth` if one overlaps a wall, or
+    touches it and moves into it."""
     leaning = False
     for w, (start, end) in enumerate(scene.walls):
         along = end - start
@@ -240,7 +243,9 @@ def refuse_walls(scene: Scene) -> bool:
                     " away"
                 )
             if gap == 0 and closing < 0:
-                raise NoTruth(f"disk {i} touches wall {w} and closes in at the start: leave a gap")
+                raise NoTruth(
+                    f"disk {i} touches wall {w} and moves into it at the start: leave a gap"
+                )
             leaning |= gap == 0
     return leaning
 
@@ -248,8 +253,7 @@ def refuse_walls(scene: Scene) -> bool:
 def exact_offset(
     position: Array, velocity: Array, start: Array, end: Array
 ) -> tuple[Fraction, Fraction]:
-    """Squared distance of a point from a segment, and half the rate at which it grows, in
-    rationals."""
+    """Squared distance of a point from a segment, and half its rate of change, in rationals."""
     p, v, a, b = ([Fraction(x) for x in point] for point in (position, velocity, start, end))
     u, d = [b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]
     share = min(
@@ -260,8 +264,8 @@ def exact_offset(
 
 
 def refuse_box(scene: Scene, torus: Array | None) -> None:
-    """`NoTruth` for a box too narrow for its largest disk, `ValueError` for a torus that is no box
-    or has walls."""
+    """Raise `NoTruth` if the box is too narrow for its largest disk, `ValueError` if the torus is
+    no box or the scene has walls."""
     widest = 2 * float(scene.radius.max())
     if torus is not None:
         if scene.wrap is not None or len(scene.walls):
@@ -282,27 +286,29 @@ def refuse_box(scene: Scene, torus: Array | None) -> None:
 def rules_of(scene: Scene, leaning: bool) -> Rules:
     """The scene's physics as the kernels take it; leaning: a disk touches a wall at the start."""
     falling, walled = bool(scene.gravity.any()), len(scene.walls) > 0
-    # What lies on a wall does not fall with the others; at e = 1 nothing comes to rest that did not
-    # begin so.
+    # A disk that rests on a wall does not fall with the others; at e = 1 only a disk that touches a
+    # wall at the start can rest.
     mixed = falling and (
         (walled and (leaning or scene.restitution < 1)) or bool(scene.static.any())
     )
-    # Where a bounce takes less than 1 / (1 - e) units in the last place, rounding the time gives
-    # back what it loses.
-    crowd = 1e3 / (1 - min(scene.restitution, SLOWEST)) if scene.restitution < 1 else 1e3
+    # A bounce shorter than 1 / (1 - e) units in the last place of the time gains as much by
+    # rounding as it loses by restitution.
+    accumulation_ulps = (
+        1e3 / (1 - min(scene.restitution, SLOWEST)) if scene.restitution < 1 else 1e3
+    )
     return Rules(
         float(scene.restitution),
         falling,
         mixed,
         scene.wrap is not None,
         scene.restitution > SLOWEST,
-        crowd,
+        accumulation_ulps,
         float(scene.friction),
     )
 
 
 def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
-    """What stands around, as the kernels take it."""
+    """The wrap box and the walls, as the kernels take them."""
     along = scene.walls[:, 1] - scene.walls[:, 0]
     length = np.hypot(*along.T) if len(along) else np.zeros(0)
     segment = np.column_stack([scene.walls[:, 0], along / length[:, None], length])
@@ -313,14 +319,14 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:
-    """The cell grid and its low corner: over the torus, or over all that is there and a cell around
-    it."""
+    """The cell grid and its low corner: over the torus, or over all disks and walls with a margin
+    of one cell."""
     least = max(2 * scene.radius.max() * WIDER, cell)
     corners = np.empty((0, 2)) if scene.wrap is None else scene.wrap
     points = np.concatenate([scene.position, scene.walls.reshape(-1, 2), corners])
     low, high = (points.min(axis=0), points.max(axis=0)) if torus is None else torus
     extent = high - low
-    # About four cells a disk are enough for the sparsest scene.
+    # At most about four cells per disk, also in a sparse scene.
     side = np.full(
         2, max(least, np.sqrt(extent.prod() / (4 * scene.n)), extent.max() / (4 * scene.n))
     )
@@ -334,15 +340,15 @@ def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array
 
 
 def pair(array: NDArray[Any]) -> Any:
-    """(2,) as the two Python numbers in it."""
+    """An array (2,) as a tuple of two Python numbers."""
     return tuple(array.tolist())
 
 
 def walls_by_cell(
     scene: Scene, low: Array, side: Array, shape: NDArray[np.int64]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """For each cell the walls that a disk in it may touch: where its list begins, (cells + 1,), and
-    all lists."""
+    """The walls that a disk in each cell may touch: the start of each cell's list, (cells + 1,),
+    and all lists."""
     centre = low + side * (
         np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 2) + 0.5
     )
@@ -358,10 +364,10 @@ def walls_by_cell(
 
 
 def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
-    """The disks at t = 0, in no cell yet and without records."""
+    """The disks at t = 0, not yet linked to cells and without records."""
     n, size = scene.n, DISK.itemsize
     room = np.zeros(size * n + 64, np.uint8)
-    skip = -room.ctypes.data % 64  # each then begins a line of the cache
+    skip = -room.ctypes.data % 64  # so that each begins a cache line
     disks = room[skip : skip + size * n].view(DISK)
     disks["x"], disks["y"] = position.T
     disks["vx"], disks["vy"] = scene.velocity.T
@@ -375,8 +381,8 @@ def disks_of(scene: Scene, position: Array, low: Array) -> NDArray[np.void]:
 
 
 def spins_of(scene: Scene) -> NDArray[np.void]:
-    """How the disks turn at t = 0."""
+    """The rotation of the disks at t = 0."""
     spins = np.zeros(scene.n, SPIN)
     spins["angle"], spins["spin"] = scene.angle, scene.angular_velocity
-    spins["turns"] = np.where(scene.static, 0.0, 1 / scene.inertia)
+    spins["inverse_inertia"] = np.where(scene.static, 0.0, 1 / scene.inertia)
     return spins.view(np.recarray)

@@ -1,11 +1,12 @@
-"""Friction in the event engine: the impulse along the tangent of a collision, and what lies on a
-wall slides or rolls.
+"""Friction in the event engine: the tangential impulse of a collision, and the sliding or rolling
+of a disk that rests on a wall.
 
-A collision changes the slip of the contact points by min(mu J_n, |slip| / K) against it, K = 1/m_a
-+ 1/m_b + r_a2/I_a + r_b2/I_b. For disks that is exact: the normal leads through their centres, so
-that the normal impulse changes no slip and that of friction no speed along the normal (Foerster,
-Louge, Chang & Allia, Phys. Fluids 6, 1108, 1994; Stronge, Impact Mechanics, 2000, ch. 3). On a wall
-friction is mu N against the slip until there is none, then what keeps it so, mu N at most.
+In a collision the impulse of friction is min(mu J_n, |slip| / K) against the slip of the contact
+points, K = 1/m_a + 1/m_b + r_a2/I_a + r_b2/I_b. For disks this is exact: the normal passes through
+their centres, so that the normal impulse changes no slip, and the impulse of friction no speed
+along the normal (Foerster, Louge, Chang & Allia, Phys. Fluids 6, 1108, 1994; Stronge, Impact
+Mechanics, 2000, ch. 3). On a wall the force of friction is mu N against the slip; without slip it
+is the force that keeps the slip 0, at most mu N.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from math import sqrt
 from typing import Any
 
 from adapters.event_driven.compiled import kernel
-from adapters.event_driven.disks import GRIP, Arena, Spins
-from adapters.event_driven.rest import across, outward
+from adapters.event_driven.disks import SLIP_END, Arena, Spins
+from adapters.event_driven.rest import normal_component, outward
 from adapters.event_driven.search import ROUNDING, image
 from scenarios.model import Array
 
 
 @kernel
-def turn_to(s: Any, now: float) -> None:
-    """Bring the turning of a disk to `now`."""
+def carry_rotation(s: Any, now: float) -> None:
+    """Carry the rotation of a disk to `now`."""
     t = now - s.t
     s.angle += (s.spin + s.rate * t / 2) * t
     s.spin += s.rate * t
@@ -31,23 +32,25 @@ def turn_to(s: Any, now: float) -> None:
 
 @kernel
 def limited(wanted: float, most: float) -> float:
-    """`wanted`, but no more than `most` either way."""
+    """`wanted`, limited to `most` either way."""
     return min(max(wanted, -most), most)
 
 
 @kernel
-def rub_disks(arena: Arena, i: int, j: int, impulse: float) -> None:
-    """What friction adds to a collision of disks i and j with so many N s along the normal."""
+def apply_disk_friction(arena: Arena, i: int, j: int, impulse: float) -> None:
+    """Apply friction in a collision of disks i and j; impulse: N s along the normal."""
     a, b, s, r = arena.disks[i], arena.disks[j], arena.spins[i], arena.spins[j]
-    turn_to(s, a.t)
-    turn_to(r, a.t)
+    carry_rotation(s, a.t)
+    carry_rotation(r, a.t)
     dx = b.x - a.x + image(b.cx - a.cx, arena.grid.shift[0])
     dy = b.y - a.y + image(b.cy - a.cy, arena.grid.shift[1])
     distance = sqrt(dx * dx + dy * dy)
     tx, ty = -dy / distance, dx / distance
     slip = tx * (b.vx - a.vx) + ty * (b.vy - a.vy) - a.radius * s.spin - b.radius * r.spin
-    softness = a.weight + b.weight + a.radius**2 * s.turns + b.radius**2 * r.turns
-    kick = limited(-slip / softness, arena.rules.friction * impulse)
+    inverse_effective_mass = (
+        a.weight + b.weight + a.radius**2 * s.inverse_inertia + b.radius**2 * r.inverse_inertia
+    )
+    kick = limited(-slip / inverse_effective_mass, arena.rules.friction * impulse)
     apply_impulse(a, s, -kick * tx, -kick * ty, kick)
     apply_impulse(b, r, kick * tx, kick * ty, kick)
     noise = ROUNDING * abs(kick) * (a.weight + b.weight)
@@ -56,10 +59,11 @@ def rub_disks(arena: Arena, i: int, j: int, impulse: float) -> None:
 
 
 @kernel
-def rub_wall(arena: Arena, i: int, w: int, part: int, impulse: float) -> None:
-    """The same of disk i and a wall: part 0 is its face, 1 its start, 2 its end."""
+def apply_wall_friction(arena: Arena, i: int, w: int, part: int, impulse: float) -> None:
+    """Apply friction in a collision of disk i with a wall: part 0 is its face, 1 its start, 2 its
+    end."""
     a, s, walls = arena.disks[i], arena.spins[i], arena.walls
-    turn_to(s, a.t)
+    carry_rotation(s, a.t)
     if part == 0:
         nx, ny = outward(walls, a, w)
     else:
@@ -72,35 +76,36 @@ def rub_wall(arena: Arena, i: int, w: int, part: int, impulse: float) -> None:
     # The disk is on the side of its normal, so that its rim moves at r spin along (ny, -nx).
     tx, ty = ny, -nx
     slip = tx * a.vx + ty * a.vy + a.radius * s.spin
-    softness = a.weight + a.radius**2 * s.turns
-    kick = limited(-slip / softness, arena.rules.friction * impulse)
+    inverse_effective_mass = a.weight + a.radius**2 * s.inverse_inertia
+    kick = limited(-slip / inverse_effective_mass, arena.rules.friction * impulse)
     apply_impulse(a, s, kick * tx, kick * ty, -kick)
     a.noise += ROUNDING * abs(kick) * a.weight
 
 
 @kernel
 def apply_impulse(a: Any, s: Any, jx: float, jy: float, kick: float) -> None:
-    """An impulse (jx, jy) N s on the rim of a disk, which turns it by r `kick`, clockwise."""
+    """Apply an impulse (jx, jy) N s to the rim of a disk; its angular impulse is r `kick`,
+    clockwise."""
     a.vx += a.weight * jx
     a.vy += a.weight * jy
-    s.spin -= a.radius * s.turns * kick
+    s.spin -= a.radius * s.inverse_inertia * kick
 
 
 @kernel
 def slip_on(arena: Arena, i: int) -> tuple[float, float, float]:
-    """The direction of the rim of disk i where it touches the wall it lies on, for a spin above 0;
-    and its slip, m/s."""
+    """The direction in which a positive spin moves the contact point of disk i on its wall; and its
+    slip, m/s."""
     a, s = arena.disks[i], arena.spins[i]
     nx, ny = outward(arena.walls, a, a.wall)
     return ny, -nx, ny * a.vx - nx * a.vy + a.radius * s.spin
 
 
 @kernel
-def drag(arena: Arena, i: int) -> None:
-    """From now on friction acts on disk i if it lies on a wall, which it has begun to do, or where
-    what acts on it has changed."""
+def update_wall_friction(arena: Arena, i: int) -> None:
+    """Update the acceleration of disk i by friction: after it has come to rest on a wall or left
+    it, or when its acceleration has changed."""
     a, s = arena.disks[i], arena.spins[i]
-    turn_to(s, a.t)
+    carry_rotation(s, a.t)
     s.rate, s.sliding = s.free_rate, 0
     if a.wall < 0:
         return
@@ -108,45 +113,45 @@ def drag(arena: Arena, i: int) -> None:
     if abs(slip) > ROUNDING * (abs(a.vx) + abs(a.vy) + a.radius * abs(s.spin)):
         s.sliding = 1 if slip > 0.0 else -1
     along = a.free_ax * tx + a.free_ay * ty
-    most = -arena.rules.friction * across(arena.walls, a, a.wall, a.free_ax, a.free_ay)
+    most = -arena.rules.friction * normal_component(arena.walls, a, a.wall, a.free_ax, a.free_ay)
     if s.sliding == 0:
         driven = along + a.radius * s.free_rate
-        wanted = -driven / (1.0 + a.radius**2 * s.turns / a.weight)
+        wanted = -driven / (1.0 + a.radius**2 * s.inverse_inertia / a.weight)
         force = limited(wanted, most)
         if force != wanted:
             s.sliding = 1 if driven > 0.0 else -1
     else:
         force = -s.sliding * most
     a.ax, a.ay = (along + force) * tx, (along + force) * ty
-    s.rate += a.radius * s.turns * force / a.weight
+    s.rate += a.radius * s.inverse_inertia * force / a.weight
 
 
 @kernel
-def find_grip(arena: Arena, i: int) -> None:
-    """When disk i, which is at its own time, slides no more, if that is what it does next by
-    itself."""
+def predict_slip_end(arena: Arena, i: int) -> None:
+    """Predict the end of the slip of disk i, which is at its own time, if that comes before its
+    other events on its own."""
     a, s = arena.disks[i], arena.spins[i]
     if a.wall < 0 or s.sliding == 0:
         return
-    turn_to(s, a.t)
+    carry_rotation(s, a.t)
     tx, ty, slip = slip_on(arena, i)
     slower = -s.sliding * (a.ax * tx + a.ay * ty + a.radius * s.rate)
     if slower > 0.0 and a.t + abs(slip) / slower < a.own_time:
-        a.own_time, a.own_code = a.t + abs(slip) / slower, GRIP
+        a.own_time, a.own_code = a.t + abs(slip) / slower, SLIP_END
 
 
 @kernel
 def roll(arena: Arena, i: int) -> None:
-    """Disk i has lost its slip on the wall it lies on: it rolls, if friction is enough for that."""
+    """End the slip of disk i on its wall: it rolls, if friction is large enough."""
     a, s = arena.disks[i], arena.spins[i]
-    turn_to(s, a.t)
+    carry_rotation(s, a.t)
     s.spin -= slip_on(arena, i)[2] / a.radius
-    drag(arena, i)
+    update_wall_friction(arena, i)
     a.count += 1
 
 
 @kernel
-def look_turned(spins: Spins, base: float, at: float, out: Array) -> None:
+def rotation_at(spins: Spins, base: float, at: float, out: Array) -> None:
     """Angle and angular velocity of all disks at `at` s, not before the last event, into out (n,
     2); changes nothing."""
     for i in range(len(spins)):

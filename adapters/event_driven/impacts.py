@@ -1,8 +1,8 @@
-"""What a collision does in the event engine: Newton's restitution along the line of centres, and
-its note; what friction adds is in friction.py.
+"""Collisions of the event engine: Newton's restitution along the line of centres. Friction is in
+friction.py.
 
-A collision is logged and counted, so that those without an end are noticed: between which float64
-resolves no time, or between which nothing flies.
+Collisions are logged and counted, to detect accumulation: collisions with less time between them
+than float64 resolves, or without flights between them.
 """
 
 from __future__ import annotations
@@ -16,17 +16,25 @@ from adapters.event_driven.compiled import inlined, kernel
 from adapters.event_driven.disks import (
     ACCUMULATION,
     BASE,
+    END_DISK,
+    END_PARTNER,
     GOES_ON,
     LOGGED,
     NOBODY,
     STOP,
-    WHO,
-    WHOM,
     Arena,
     Walls,
 )
-from adapters.event_driven.friction import drag, rub_wall
-from adapters.event_driven.rest import COLLISIONS, hold, jolt, rattles, rests, second_wall, slow
+from adapters.event_driven.friction import apply_wall_friction, update_wall_friction
+from adapters.event_driven.rest import (
+    COLLISIONS,
+    check_rest,
+    corner_acceleration,
+    rattles,
+    rests,
+    second_wall,
+    slow,
+)
 from adapters.event_driven.search import ROUNDING, image
 
 
@@ -36,8 +44,8 @@ def collide(
 ) -> float:
     """Collision of disks i and j that are in contact; its impulse N s, 0 if they do not close in.
 
-    v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a normal that is made a
-    unit vector by a square root would let the energy drift by 1.5e-17 a collision.
+    v_i -= q w_i dr, v_j += q w_j dr, q = -(1 + e) b / (dr.dr (w_i + w_j)): a unit
+    normal, which needs a square root, would let the energy drift by 1.5e-17 per collision.
     """
     dx, dy = b.x - a.x + image(b.cx - a.cx, shift[0]), b.y - a.y + image(b.cy - a.cy, shift[1])
     ux, uy = b.vx - a.vx, b.vy - a.vy
@@ -57,7 +65,8 @@ def collide(
 
 @kernel
 def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) -> float:
-    """Collision of a disk on a wall it touches, set exactly beside the face; as `collide`."""
+    """Collision of a disk with a wall that it touches, as `collide`; at a face the disk is placed
+    exactly on it."""
     ux, uy = walls.segment[w, 2], walls.segment[w, 3]
     dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
     a.bounces = 0 if part else (a.bounces + 1 if a.last == -1 - w else 1)
@@ -81,39 +90,43 @@ def collide_wall(walls: Walls, a: Any, w: int, part: int, restitution: float) ->
 
 
 @inlined
-def tell(arena: Arena, now: float, i: int, j: int, impulse: float) -> None:
-    """Write a collision into the log."""
+def log_collision(arena: Arena, now: float, i: int, j: int, impulse: float) -> None:
+    """Add a collision to the log."""
     log, k = arena.log, arena.counters[LOGGED]
     log[k, 0], log[k, 1], log[k, 2], log[k, 3] = arena.clock[BASE] + now, i, j, impulse
     arena.counters[LOGGED] += 1
 
 
 @inlined
-def stop(arena: Arena, now: float, i: int, j: int) -> None:
-    """Tell when and for whom the answer ends, should it."""
-    arena.clock[STOP], arena.counters[WHO], arena.counters[WHOM] = arena.clock[BASE] + now, i, j
+def set_end(arena: Arena, now: float, i: int, j: int) -> None:
+    """Set when and for which disks the answer ends, should the status say that it does."""
+    arena.clock[STOP], arena.counters[END_DISK], arena.counters[END_PARTNER] = (
+        arena.clock[BASE] + now,
+        i,
+        j,
+    )
 
 
 @inlined
-def note(arena: Arena, a: Any, i: int, j: int, impulse: float) -> bool:
-    """Count and log a collision; True if collisions of disk `i` follow each other faster than
-    float64 resolves times apart."""
+def count_and_log(arena: Arena, a: Any, i: int, j: int, impulse: float) -> bool:
+    """Count and log a collision; True if the collisions of disk `i` come faster than float64 can
+    resolve their times."""
     a.count += 1
     if impulse > 0.0:
-        tell(arena, a.t, i, j, impulse)
+        log_collision(arena, a.t, i, j, impulse)
     a.mark_collisions += 1
     if a.mark_collisions < COLLISIONS:
         return False
     since, a.mark_collisions, a.mark_time = a.t - a.mark_time, 0, a.t
-    if since > arena.rules.crowd * np.spacing(arena.clock[BASE] + a.t):
+    if since > arena.rules.accumulation_ulps * np.spacing(arena.clock[BASE] + a.t):
         return False
-    stop(arena, a.t - since, i, j)
+    set_end(arena, a.t - since, i, j)
     return True
 
 
 @inlined
-def change(a: Any) -> None:
-    """Make void what others know of a disk, and forget what it struck last."""
+def invalidate(a: Any) -> None:
+    """Make the records of others about a disk stale, and forget its last collision."""
     a.count += 1
     a.last = NOBODY
 
@@ -136,22 +149,22 @@ def rattles_on_disk(
 
 
 @kernel
-def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
-    """Disk `i` bounces off a wall, or comes to rest on its face or in a corner with another one.
+def collide_with_wall(arena: Arena, i: int, w: int, part: int) -> int:
+    """Disk `i` bounces off a wall, or comes to rest on its face or in a corner.
 
-    Bounces to and fro in a corner go on, however many there are at one instant, until they have
-    made it slow.
+    Bounces to and fro in a corner go on, however many there are at one instant, until the disk is
+    slow.
     """
     a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
     changed = a.last != -1 - w
     impulse = collide_wall(walls, a, w, part, arena.rules.restitution)
     rubs = arena.rules.friction > 0.0
     if rubs:
-        rub_wall(arena, i, w, part, impulse)
-    jolt(walls, a)
-    crowded = note(arena, a, i, -1 - w, impulse)
+        apply_wall_friction(arena, i, w, part, impulse)
+    check_rest(walls, a)
+    accumulates = count_and_log(arena, a, i, -1 - w, impulse)
     run.walls += 1
-    walls_only = run.walls >= COLLISIONS  # no other disk has a part in it
+    walls_only = run.walls >= COLLISIONS  # no other disk takes part
     trapped = False
     if arena.rules.falling or arena.rules.restitution < 1.0:
         closing = impulse * a.weight / (1.0 + arena.rules.restitution)
@@ -159,20 +172,20 @@ def collision_wall(arena: Arena, i: int, w: int, part: int) -> int:
         trapped = rattles(run, a, closing, acceleration, changed or arena.rules.lasting)
     mixed, corner = arena.rules.mixed, -1
     # With friction a second contact that lasts is not modelled.
-    if part == 0 and not rubs and (crowded or trapped or (mixed and slow(a))):
+    if part == 0 and not rubs and (accumulates or trapped or (mixed and slow(a))):
         corner = second_wall(walls, arena.grid, a, w)
     may_rest = part == 0 and mixed and (walls_only or not trapped)
-    if may_rest and rests(walls, a, w, corner, crowded, trapped):
-        if impulse == 0.0:  # a contact whose impulses begin without a collision
-            tell(arena, a.t, i, -1 - w, 0.0)
+    if may_rest and rests(walls, a, w, corner, accumulates, trapped):
+        if impulse == 0.0:  # a contact that begins without a collision
+            log_collision(arena, a.t, i, -1 - w, 0.0)
         if rubs:
-            drag(arena, i)
+            update_wall_friction(arena, i)
         return GOES_ON
     if rubs:
-        drag(arena, i)
+        update_wall_friction(arena, i)
     if trapped:
-        stop(arena, run.start, i, -1 - w)
+        set_end(arena, run.start, i, -1 - w)
     to_and_fro = False
     if corner >= 0 and walls_only and (a.free_ax != 0.0 or a.free_ay != 0.0):
-        to_and_fro = not slow(a) or hold(walls, a, w, corner) > 0.0
-    return ACCUMULATION if trapped or (crowded and not to_and_fro) else GOES_ON
+        to_and_fro = not slow(a) or corner_acceleration(walls, a, w, corner) > 0.0
+    return ACCUMULATION if trapped or (accumulates and not to_and_fro) else GOES_ON

@@ -1,5 +1,5 @@
-"""The event engine's loop: take the earliest record, let its event happen, renew the records of who
-took part."""
+"""The event loop: take the earliest record, carry out its event, and predict the next events of the
+disks in it."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from adapters.event_driven.compiled import inlined, kernel, pasted
+from adapters.event_driven.compiled import inlined, inlined_early, kernel
 from adapters.event_driven.disks import (
     ACCUMULATION,
     BASE,
     DONE,
     EDGE,
     END,
+    END_PARTNER,
     GOES_ON,
-    GRIP,
     LEFT,
     LOG_FULL,
     LOGGED,
     NONE,
     REENTRY,
     ROUND_END,
+    SLIP_END,
     WALL,
-    WHOM,
     WRAP,
     Arena,
     Disks,
@@ -36,33 +36,38 @@ from adapters.event_driven.disks import (
     Spins,
     cross,
     fly,
-    settle,
+    link_by_position,
     unlink,
 )
-from adapters.event_driven.friction import drag, find_grip, roll, rub_disks
+from adapters.event_driven.friction import (
+    apply_disk_friction,
+    predict_slip_end,
+    roll,
+    update_wall_friction,
+)
 from adapters.event_driven.impacts import (
-    change,
     collide,
-    collision_wall,
-    note,
+    collide_with_wall,
+    count_and_log,
+    invalidate,
     rattles_on_disk,
-    stop,
+    set_end,
 )
 from adapters.event_driven.queue import Tree, put
-from adapters.event_driven.rest import across, bear, jolt, take_off
+from adapters.event_driven.rest import check_rest, normal_component, take_off, update_support
 from adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
 from scenarios.model import Array
 
-EPOCH = 256.0  # s; the clock starts again after as many, so that its last place stays small
+EPOCH = 256.0  # s after which the clock restarts at 0, so that the last place of times stays small
 
 
 @kernel
 def advance(arena: Arena, scenery: Scenery, until: float) -> int:
-    """Let everything up to `until` s happen.
+    """Carry out all events up to `until` s.
 
     Returns DONE; GOES_ON after counters[LEFT] events, or LOG_FULL, to be called again with
-    counters[LOGGED] = 0; or ACCUMULATION, REENTRY or ROUND_END, with clock[STOP], counters[WHO] and
-    counters[WHOM] when and for whom the answer ends.
+    counters[LOGGED] = 0; or ACCUMULATION, REENTRY or ROUND_END: then clock[STOP],
+    counters[END_DISK] and counters[END_PARTNER] say when and for which disks the answer ends.
     """
     tree, clock = arena.tree, arena.clock
     while arena.counters[LEFT] > 0:
@@ -76,19 +81,19 @@ def advance(arena: Arena, scenery: Scenery, until: float) -> int:
         if now > EPOCH:
             begin_epoch(arena.disks, tree, arena.runs, arena.spins, clock)
             continue
-        status, partner, side = happen(arena, scenery, i, now)
+        status, partner, side = carry_out(arena, scenery, i, now)
         if status != GOES_ON:
             return status
-        renew_both(arena, scenery, i, partner, side)
+        predict_both(arena, scenery, i, partner, side)
     return GOES_ON
 
 
-@pasted
-def happen(arena: Arena, scenery: Scenery, i: int, now: float) -> tuple[int, int, int]:
-    """Let the event in the record of disk `i` happen at `now`.
+@inlined_early
+def carry_out(arena: Arena, scenery: Scenery, i: int, now: float) -> tuple[int, int, int]:
+    """Carry out the event in the record of disk `i` at `now`.
 
-    Returns a status as `advance`; the other disk of a collision, or -1; the side over which the
-    disk came into a cell, its contact still the next, or ALL.
+    Returns a status as `advance`; the other disk of a collision, or -1; and the edge over which the
+    disk entered a cell, if only the cells beyond it need a search, else ALL.
     """
     a = arena.disks[i]
     fly(a, now, scenery)
@@ -102,70 +107,71 @@ def happen(arena: Arena, scenery: Scenery, i: int, now: float) -> tuple[int, int
     if a.own_code < WRAP:
         side = a.own_code - EDGE
         cross(arena.disks, arena.head, arena.grid, i, side)
-        # the contact in the record still holds: three cells are new
+        # the contact in the record is still valid: only three cells are new
         return GOES_ON, -1, ALL if len(scenery) and arena.rules.mixed else side
-    return alone(arena, i) if len(scenery) else GOES_ON, -1, ALL
+    return own_event(arena, i) if len(scenery) else GOES_ON, -1, ALL
 
 
-@pasted
-def renew_both(arena: Arena, scenery: Scenery, i: int, j: int, side: int) -> None:
-    """New records of who took part; in a loop, for one copy of the search in the machine code."""
+@inlined_early
+def predict_both(arena: Arena, scenery: Scenery, i: int, j: int, side: int) -> None:
+    """Make new records for the disks of an event; in a loop, so that the machine code holds one
+    copy of the search."""
     while i >= 0:
         if arena.disks[i].weight > 0.0:
-            renew(arena, scenery, i, side == ALL, side)
+            predict(arena, scenery, i, side == ALL, side)
         i, j = j, -1
 
 
-@pasted
-def renew(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> None:
-    """A new record of disk `i`, which is at the present; fresh: without the contact in the old
-    one."""
+@inlined_early
+def predict(arena: Arena, scenery: Scenery, i: int, fresh: bool, beyond: int) -> None:
+    """Make a new record for disk `i`, which is at the present time; fresh: drop the contact in the
+    old one."""
     a = arena.disks[i]
     if fresh:
         a.pair_time = inf
     find_own(arena, scenery, a)
     if len(scenery) and arena.rules.friction > 0.0:
-        find_grip(arena, i)
+        predict_slip_end(arena, i)
     find_pair(arena, scenery, i, beyond)
     put(arena.tree, i, min(a.pair_time, a.own_time))
 
 
-@pasted
+@inlined_early
 def collision(arena: Arena, scenery: Scenery, i: int, j: int) -> int:
     """Disks i and j collide."""
     a, b = arena.disks[i], arena.disks[j]
     new_to_a, new_to_b = a.last != j, b.last != i
     impulse = collide(a, b, i, j, arena.grid.shift, arena.rules.restitution)
     if len(scenery) and arena.rules.friction > 0.0:
-        rub_disks(arena, i, j, impulse)
+        apply_disk_friction(arena, i, j, impulse)
     if len(scenery) and arena.rules.falling:
-        jolt(arena.walls, a)
-        jolt(arena.walls, b)
+        check_rest(arena.walls, a)
+        check_rest(arena.walls, b)
     if len(scenery) and arena.rules.friction > 0.0:
-        drag(arena, i)
-        drag(arena, j)
+        update_wall_friction(arena, i)
+        update_wall_friction(arena, j)
     if b.weight > 0.0:
         b.count += 1
-    crowded = note(arena, a, i, j, impulse)
+    accumulates = count_and_log(arena, a, i, j, impulse)
     if len(scenery) and (arena.rules.falling or arena.rules.restitution < 1.0):
         e, lasting = arena.rules.restitution, arena.rules.lasting
         if rattles_on_disk(arena.runs[i], a, b, e, impulse, new_to_a or lasting):
-            crowded = True
-            stop(arena, arena.runs[i].start, i, j)
+            accumulates = True
+            set_end(arena, arena.runs[i].start, i, j)
         if rattles_on_disk(arena.runs[j], b, a, e, impulse, new_to_b or lasting):
-            crowded = True
-            stop(arena, arena.runs[j].start, j, i)
-    return ACCUMULATION if crowded else GOES_ON
+            accumulates = True
+            set_end(arena, arena.runs[j].start, j, i)
+    return ACCUMULATION if accumulates else GOES_ON
 
 
 @kernel
-def alone(arena: Arena, i: int) -> int:
-    """What disk `i` does by itself but for changing its cell: it meets a wall, the wrap, the end of
-    its wall, or slides no more."""
+def own_event(arena: Arena, i: int) -> int:
+    """Carry out an event of disk `i` on its own, except a change of cell: a wall, an edge of the
+    wrap, the end of its wall, or the end of its slip."""
     code = arena.disks[i].own_code
     if code >= WALL:
-        return collision_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
-    if code == GRIP:
+        return collide_with_wall(arena, i, (code - WALL) // 3, (code - WALL) % 3)
+    if code == SLIP_END:
         roll(arena, i)
         return GOES_ON
     return leave(arena, i) if code == END else wrap(arena, i, code - WRAP)
@@ -173,37 +179,40 @@ def alone(arena: Arena, i: int) -> int:
 
 @kernel
 def leave(arena: Arena, i: int) -> int:
-    """Disk `i` reaches the end of the wall it lies on: it flies off, unless it is too slow and
-    would turn about it."""
+    """Disk `i` reaches the end of the wall it rests on: it flies off, unless it is so slow that it
+    would turn about the end."""
     a, w = arena.disks[i], int(arena.disks[i].wall)
-    speed2, press = a.vx * a.vx + a.vy * a.vy, -across(arena.walls, a, w, a.free_ax, a.free_ay)
+    speed2, press = (
+        a.vx * a.vx + a.vy * a.vy,
+        -normal_component(arena.walls, a, w, a.free_ax, a.free_ay),
+    )
     take_off(a)
     a.wall, a.count = -2 - w, a.count + 1
     if arena.rules.friction > 0.0:
-        drag(arena, i)
+        update_wall_friction(arena, i)
     a.last, a.noise = -1 - w, ROUNDING * (abs(a.vx) + abs(a.vy))
-    stop(arena, a.t, i, -1 - w)
+    set_end(arena, a.t, i, -1 - w)
     return GOES_ON if speed2 >= press * a.radius else ROUND_END
 
 
 @kernel
 def wrap(arena: Arena, i: int, side: int) -> int:
-    """Disk `i` leaves the wrap box over a side and comes in over the opposite one."""
+    """Disk `i` leaves the wrap box over one side and re-enters over the opposite one."""
     a = arena.disks[i]
     if side < 2:
         a.x = arena.walls.wrap[1 - side, 0]
     else:
         a.y = arena.walls.wrap[3 - side, 1]
-    change(a)
+    invalidate(a)
     unlink(arena.disks, arena.head, arena.grid, i)
-    settle(arena.disks, arena.head, arena.grid, i)
-    stop(arena, a.t, i, covered(arena.disks, i))
-    return REENTRY if arena.counters[WHOM] >= 0 else GOES_ON
+    link_by_position(arena.disks, arena.head, arena.grid, i)
+    set_end(arena, a.t, i, overlapping(arena.disks, i))
+    return REENTRY if arena.counters[END_PARTNER] >= 0 else GOES_ON
 
 
 @kernel
-def covered(disks: Disks, i: int) -> int:
-    """A disk that overlaps disk `i`, -1 if there is none."""
+def overlapping(disks: Disks, i: int) -> int:
+    """The index of a disk that overlaps disk `i`, -1 if there is none."""
     a = disks[i]
     for j in range(len(disks)):
         b = disks[j]
@@ -218,7 +227,7 @@ def covered(disks: Disks, i: int) -> int:
 
 @kernel
 def begin_epoch(disks: Disks, tree: Tree, runs: Runs, spins: Spins, clock: Array) -> None:
-    """Count all times from EPOCH s later."""
+    """Move the origin of all times by EPOCH s."""
     clock[BASE] += EPOCH
     for i in range(len(disks)):
         a = disks[i]
@@ -234,15 +243,15 @@ def begin_epoch(disks: Disks, tree: Tree, runs: Runs, spins: Spins, clock: Array
 
 @kernel
 def begin(disks: Disks, head: Links, tree: Tree, g: Grid) -> None:
-    """Link all disks to their cells; their first records are made as the first events."""
+    """Link all disks to their cells; their first records are made by the first events."""
     for i in range(len(disks)):
-        settle(disks, head, g, i)
-        ask_again(disks[i], tree, i, 0.0)
+        link_by_position(disks, head, g, i)
+        schedule_search(disks[i], tree, i, 0.0)
 
 
 @inlined
-def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
-    """Give disk `i` a void contact at `now`: when its time comes, a new record is made."""
+def schedule_search(a: Any, tree: Tree, i: int, now: float) -> None:
+    """Give disk `i` a stale contact at `now`, so that the loop makes a new record for it."""
     if a.weight > 0.0:
         a.partner, a.partner_count, a.pair_time = i, -1, now
         put(tree, i, now)
@@ -252,21 +261,21 @@ def ask_again(a: Any, tree: Tree, i: int, now: float) -> None:
 def accelerate(
     arena: Arena, scenery: Scenery, i: int, at: float, ax: float, ay: float, rate: float
 ) -> None:
-    """From `at` s on, which must not lie before the last event, let disk `i` accelerate by (ax,
-    ay), and its spin by `rate`, which only friction makes use of."""
+    """Set the acceleration (ax, ay) of disk `i`, and its angular acceleration `rate`, used with
+    friction only, from `at` s on, which must not lie before the last event."""
     a, now = arena.disks[i], at - arena.clock[BASE]
     fly(a, now, scenery)
     a.free_ax, a.free_ay = ax, ay
-    bear(arena.walls, a)
+    update_support(arena.walls, a)
     if arena.rules.friction > 0.0:
         arena.spins[i].free_rate = rate
-        drag(arena, i)
-    change(a)
-    ask_again(a, arena.tree, i, now)
+        update_wall_friction(arena, i)
+    invalidate(a)
+    schedule_search(a, arena.tree, i, now)
 
 
 @kernel
-def look(disks: Disks, base: float, at: float, out: Array) -> None:
+def motion_at(disks: Disks, base: float, at: float, out: Array) -> None:
     """Position and velocity of all disks at `at` s, not before the last event, into out (n, 4);
     changes nothing."""
     for i in range(len(disks)):
@@ -278,8 +287,8 @@ def look(disks: Disks, base: float, at: float, out: Array) -> None:
 
 @kernel
 def near_pairs(disks: Disks, head: Links, g: Grid, slack: float, found: Ints) -> int:
-    """Pairs of disks that overlap, or nearly: rows (i, j) of found, as many as fit; their
-    number."""
+    """Write the pairs of disks that overlap, or nearly, as rows (i, j) into `found`, as many as
+    fit; returns their number."""
     count = 0
     for i in range(len(disks)):
         a = disks[i]

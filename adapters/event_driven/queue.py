@@ -1,4 +1,5 @@
-"""A winner tree: whose next event is the earliest, kept up to date in log n comparisons a change.
+"""A winner tree (tournament tree): finds the disk with the earliest event, with log n comparisons
+per change.
 
 Node k holds the earlier of 2 k and 2 k + 1, and node 1 the earliest of all; disk i is leaf p + i, p
 a power of two.
@@ -11,15 +12,15 @@ from numpy.typing import NDArray
 
 from adapters.event_driven.compiled import inlined
 
-# Time and disk lie in one line of the cache. The disk is a float, so that the processor picks the
-# winner's as it picks the earlier time: by an integer it would branch, guess wrong at every other
-# node, and take twice as long for an event.
+# Time and disk lie in one cache line. The disk is a float, so that the processor selects it without
+# a branch, as it selects the earlier time. With an integer it branches, mispredicts at every other
+# node, and takes twice as long for an event.
 NODE = np.dtype([("time", "f8"), ("who", "f8")])
 Tree = NDArray[np.void]
 
 
 def empty_queue(n: int) -> Tree:
-    """The tree (2 p,) of n disks to which nothing happens."""
+    """The tree (2 p,) of n disks without events."""
     p = 1 << max(n - 1, 1).bit_length()
     tree = np.zeros(2 * p, NODE)
     tree["time"] = np.inf
@@ -31,7 +32,7 @@ def empty_queue(n: int) -> Tree:
 
 @inlined
 def put(tree: Tree, i: int, time: float) -> None:
-    """Set when something happens to disk `i`, and play its matches up to the top."""
+    """Set the time of the next event of disk `i`, and update the nodes above it."""
     node, who = (len(tree) >> 1) + i, np.float64(i)
     tree[node].time = time
     while node > 1:

@@ -1,7 +1,8 @@
-"""The event engine's searches: what a disk meets next by itself, and which other disk.
+"""The searches of the event engine: the next event of a disk on its own, and its next contact with
+another disk.
 
-The search among disks does not branch where the processor could only guess: it copies all
-candidates of the cells around into one list, and works out the contact time of every one, met or
+The search among disks avoids branches that the processor cannot predict: it copies all candidates
+of the neighbouring cells into one list, and computes a contact time for each, whether they meet or
 not.
 """
 
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.event_driven.compiled import inlined, kernel, pasted
+from adapters.event_driven.compiled import inlined, inlined_early, kernel
 from adapters.event_driven.contact_times import curved_time, disk_time, line_time
 from adapters.event_driven.disks import (
     EDGE,
@@ -28,15 +29,15 @@ from adapters.event_driven.disks import (
     Walls,
 )
 
-# relative, of a contact just resolved: squared gap and closing speed are sums of a few roundings
+# relative; the error of squared gap and closing speed of a contact just resolved: a few roundings
 ROUNDING = 1e-14
 # which of the cells around a disk to search: all, or only those beyond the edge it has just crossed
 ALL = -1
 
 
-@pasted
+@inlined_early
 def find_own(arena: Arena, scenery: Scenery, a: Any) -> None:
-    """The next thing a disk, which is at its own time, meets by itself."""
+    """Find the next event on its own of a disk, which is at its own time."""
     if len(scenery):
         best, code = next_own(arena.grid, arena.walls, arena.rules.wrapped, a)
     else:
@@ -46,7 +47,7 @@ def find_own(arena: Arena, scenery: Scenery, a: Any) -> None:
 
 @inlined
 def next_edge(g: Grid, a: Any) -> tuple[float, int]:
-    """When a disk that flies straight leaves its cell, s from its own time, and over which edge."""
+    """When a disk on a straight line leaves its cell, s from its own time, and over which edge."""
     right, top = a.vx > 0.0, a.vy > 0.0
     x = inf if a.vx == 0.0 else max((a.ox + (a.cx + right) * g.side[0] - a.x) / a.vx, 0.0)
     y = inf if a.vy == 0.0 else max((a.oy + (a.cy + top) * g.side[1] - a.y) / a.vy, 0.0)
@@ -55,8 +56,8 @@ def next_edge(g: Grid, a: Any) -> tuple[float, int]:
 
 @kernel
 def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
-    """As `next_edge` on a parabola: also the wrap box, the walls near its cell, the end of the one
-    it lies on."""
+    """As `next_edge`, on a parabola: also the wrap box, the walls near its cell, and the end of the
+    wall it rests on."""
     best, code = inf, EDGE
     for axis in range(2):
         x, v, acceleration = (a.x, a.vx, a.ax) if axis == 0 else (a.y, a.vy, a.ay)
@@ -74,8 +75,7 @@ def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
     for k in range(walls.first[c], walls.first[c + 1]):
         w = walls.of[k]
         for part in range(3):
-            # Its own wall it does not meet; the face of one that it slid off it can only fall away
-            # from.
+            # A disk does not meet the wall it rests on, nor the face of the one that it slid off.
             t = (
                 inf
                 if a.wall == w or (a.wall == -2 - w and part == 0)
@@ -105,7 +105,7 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
     for side in (1.0, -1.0):
         gap, v, p = side * height - a.radius, side * speed, side * acceleration
         if noise > 0.0 and side * height > 0.0:
-            # beside a wall's end it may be far below
+            # beyond the end of the wall it may be far below its line
             if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):
                 gap = 0.0
             if abs(v) < noise:
@@ -116,8 +116,7 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
             if t < first
             else -1.0
         )
-        # At the contact the disk must be beside the wall, and on the side from which it was looked
-        # for.
+        # At the contact the foot of the disk must lie on the wall, and the disk on this side of it.
         if 0.0 <= along <= length and side * height + (v + p * t / 2) * t > 0.0:
             first = t
     return first
@@ -125,7 +124,7 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
 
 @kernel
 def end_time(walls: Walls, a: Any) -> float:
-    """When a disk that slides along a wall reaches its end."""
+    """When a disk that rests on a wall reaches an end of it."""
     ux, uy = walls.segment[a.wall, 2], walls.segment[a.wall, 3]
     along = (a.x - walls.segment[a.wall, 0]) * ux + (a.y - walls.segment[a.wall, 1]) * uy
     speed, acceleration = a.vx * ux + a.vy * uy, a.ax * ux + a.ay * uy
@@ -149,7 +148,7 @@ def meeting(
 ) -> float:
     """When two disks meet, from position, velocity and acceleration of one relative to the other.
 
-    noise: what rounding may have left of their closing speed if these two collide last, else 0.
+    noise: the rounding error of their closing speed if they have just collided, else 0.
     """
     gap, closing, speed2 = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy, ux * ux + uy * uy
     if noise > 0.0:
@@ -163,8 +162,8 @@ def meeting(
 
 
 @inlined
-def three(head: Links, near: Links, m: int, first: int, second: int, third: int) -> int:
-    """Append the first disks of three cells to the m in `near`; how many there are now."""
+def append_three(head: Links, near: Links, m: int, first: int, second: int, third: int) -> int:
+    """Append the first disks of three cells to the m in `near`; returns the new count."""
     near[m] = head[first]
     m += near[m] != NONE
     near[m] = head[second]
@@ -175,25 +174,25 @@ def three(head: Links, near: Links, m: int, first: int, second: int, third: int)
 
 @inlined
 def neighbours(disks: Disks, head: Links, near: Links, g: Grid, a: Any, beyond: int) -> int:
-    """List the disks of the cells around that of disk `a`, or only of the three beyond an edge; how
-    many there are."""
+    """List the disks of the cells around that of disk `a`, or only of the three beyond an edge;
+    returns their number."""
     here, row, ny = a.cy, a.cx * g.shape[1], g.shape[1]
     left = row - ny if a.cx > 0 else row + (g.shape[0] - 1) * ny
     right = row + ny if a.cx < g.shape[0] - 1 else 0
     bottom = here - 1 if here > 0 else ny - 1
     top = here + 1 if here < ny - 1 else 0
     if beyond == ALL:
-        m = three(head, near, 0, left + bottom, left + here, left + top)
-        m = three(head, near, m, row + bottom, row + here, row + top)
-        m = three(head, near, m, right + bottom, right + here, right + top)
+        m = append_three(head, near, 0, left + bottom, left + here, left + top)
+        m = append_three(head, near, m, row + bottom, row + here, row + top)
+        m = append_three(head, near, m, right + bottom, right + here, right + top)
     elif beyond < 2:
         row = right if beyond == 1 else left
-        m = three(head, near, 0, row + bottom, row + here, row + top)
+        m = append_three(head, near, 0, row + bottom, row + here, row + top)
     else:
         here = top if beyond == 3 else bottom
-        m = three(head, near, 0, left + here, row + here, right + here)
+        m = append_three(head, near, 0, left + here, row + here, right + here)
     k = 0
-    while k < m:  # each may head a chain, whose next goes to the end of the list
+    while k < m:  # each may begin a chain; its next disk goes to the end of the list
         near[m] = disks[near[k]].next
         m += near[m] != NONE
         k += 1
@@ -202,15 +201,15 @@ def neighbours(disks: Disks, head: Links, near: Links, g: Grid, a: Any, beyond: 
 
 @inlined
 def image(apart: int, shift: float) -> float:
-    """What to add to a coordinate for the image next door, m: by how far apart the cells are, not
-    by nearness."""
+    """m to add to a coordinate difference in a torus, so that it is that to the image in a
+    neighbouring cell."""
     return -shift if apart > 1 else (shift if apart < -1 else 0.0)
 
 
-@pasted
+@inlined_early
 def find_pair(arena: Arena, scenery: Scenery, i: int, beyond: int) -> None:
-    """Look for an earlier contact of disk `i`, which is at its own time, with those in the cells
-    around its own."""
+    """Look for an earlier contact of disk `i`, which is at its own time, with disks in the
+    neighbouring cells."""
     disks, near, g = arena.disks, arena.near, arena.grid
     a = disks[i]
     x, y, vx, vy, now, radius, cx, cy = a.x, a.y, a.vx, a.vy, a.t, a.radius, a.cx, a.cy
@@ -230,16 +229,16 @@ def find_pair(arena: Arena, scenery: Scenery, i: int, beyond: int) -> None:
             ux, uy = ux - vx, uy - vy
         reach = radius + b.radius
         if len(scenery) and arena.rules.mixed and (b.ax != a.ax or b.ay != a.ay):
-            just_collision = noise if last == j and b.last == i else 0.0
+            noise_of_pair = noise if last == j and b.last == i else 0.0
             until = min(best, a.own_time - now)
-            t = meeting(dx, dy, ux, uy, b.ax - a.ax, b.ay - a.ay, reach, just_collision, until)
+            t = meeting(dx, dy, ux, uy, b.ax - a.ax, b.ay - a.ay, reach, noise_of_pair, until)
             if t < best:
                 best, who = t, np.int64(j)
         else:
             gap, closing = dx * dx + dy * dy - reach * reach, dx * ux + dy * uy
             disc = closing * closing - (ux * ux + uy * uy) * gap
             t = max(gap, 0.0) / (sqrt(max(disc, 0.0)) - closing)
-            # Of a collision just resolved, rounding may have left a little closing speed.
+            # Rounding may leave a small closing speed after a collision just resolved.
             if (closing < (-reach * noise if last == j else 0.0)) & (disc > 0.0) & (t < best):
                 best, who = t, np.int64(j)
     if who >= 0:

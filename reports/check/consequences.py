@@ -51,20 +51,24 @@ def with_consequences(rows: Sequence[CheckRow]) -> list[CheckRow]:
         if row.verdict == "fault" and row.cause not in (FOLLOWS, UNKNOWN):
             for cause in {row.cause}.union(*(same for same in SAME_MISTAKE if row.cause in same)):
                 first.setdefault(cause, row.task)
-    pushed = displaced_velocities(rows)
-    return [followed(row, first, pushed) if row.verdict == "fault" else row for row in rows]
+    velocities_displaced = displaced_velocities(rows)
+    return [
+        followed(row, first, velocities_displaced) if row.verdict == "fault" else row
+        for row in rows
+    ]
 
 
-def followed(row: CheckRow, first: dict[str, str], pushed: bool) -> CheckRow:
+def followed(row: CheckRow, first: dict[str, str], velocities_displaced: bool) -> CheckRow:
     """A fault, or a row that follows from another.
 
-    first: cause -> the first task that has it; pushed: the result of `displaced_velocities`.
+    first: cause -> the first task that has it; velocities_displaced: the result of
+    `displaced_velocities`.
     """
     if row.cause == FOLLOWS:
         return replace(row, verdict="follows")
     if (task := first.get(row.cause, row.task)) != row.task:
         return replace(row, verdict="follows", cause=f"it follows from the fault in {task}")
-    if pushed and row.task in ("2c", "2d") and row.cause.startswith(NOT_EXPLAINED):
+    if velocities_displaced and row.task in ("2c", "2d") and row.cause.startswith(NOT_EXPLAINED):
         cause = "it may follow from the fault in 2b, which changes the velocities, too"
         return replace(row, verdict="follows", cause=cause)
     return row

@@ -37,7 +37,7 @@ RULES: dict[str, Rule] = {
     "the size of B is used twice": lambda x, y, a, b: np.hypot(x, y) < 2 * b,
     "the sizes are subtracted": lambda x, y, a, b: np.hypot(x, y) < abs(a - b),
     "the sizes are multiplied": lambda x, y, a, b: np.hypot(x, y) < a * b,
-    "x and y are compared one by one, as of boxes": lambda x, y, a, b: (
+    "x and y are compared separately, as for boxes": lambda x, y, a, b: (
         abs(x) < a + b and abs(y) < a + b
     ),
     "dx is used for dy, too": lambda x, y, a, b: np.hypot(x, x) < a + b,
@@ -48,7 +48,7 @@ RULES: dict[str, Rule] = {
     "only y is compared": lambda x, y, a, b: abs(y) < a + b,
     "the comparison is the wrong way round": lambda x, y, a, b: np.hypot(x, y) > a + b,
     "nothing is compared: all pairs collide": lambda x, y, a, b: True,
-    "every pair is taken to be apart": lambda x, y, a, b: False,
+    "no pair is taken to collide": lambda x, y, a, b: False,
 }
 
 # As JavaScript reads it: + binds before ^, and ^ truncates its operands to integers.
@@ -95,7 +95,7 @@ XOR |= {
     f"{BITS}: dx ^ 2 + dy ^ 2 > (sizeA + sizeB) ^ 2": lambda x, y, a, b: (
         (int(x) ^ int(2 + y) ^ (a + b < 2) ^ 2) == 0
     ),
-    f"{BITS}: (a < b) ^ 2 is what is asked, and is never zero": lambda x, y, a, b: True,
+    f"{BITS}: the condition is (a < b) ^ 2, which is never zero": lambda x, y, a, b: True,
 }
 
 
@@ -135,7 +135,10 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
     if no_number(answers):
         cause = "the distance is not a number (a field that does not exist, a division by zero?)"
     if cause is None and mixed_up(answers):
-        cause = "the distance is not the one between the centres: positions are added or mixed up"
+        cause = (
+            "the distance is not that of the centres: positions are added, or their components"
+            " confused"
+        )
     if not wrong:
         return judged(
             "overlap", "2a", ASKED, "the pairs that overlap", "the pairs that overlap", True
@@ -154,7 +157,7 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
     )
 
 
-ASKED = "Which pairs are taken to collide?"
+ASKED = "Which pairs collide, according to the file?"
 
 
 def no_number(answers: dict[str, Answer]) -> bool:
@@ -178,7 +181,7 @@ def touch(answer: Answer) -> CheckRow:
     reacts = reacted(QUESTIONS["touch"], answer)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
     sign = "<=" if reacts else "<"
-    said = f"the comparison is the one with {sign}"
+    said = f"the comparison is {sign}"
     got = "yes" if reacts else "no"
     return CheckRow("just touching", "2a", asked, got, "yes or no", "free choice", said)
 
@@ -186,18 +189,18 @@ def touch(answer: Answer) -> CheckRow:
 def same_centre(answer: Answer, others_fail: bool) -> CheckRow:
     """Two spheres at one place have no normal, and the exercise does not define the result; but the
     call must return. `others_fail`: it fails for other pairs, too."""
-    asked = "What becomes of two spheres whose centres are at the same place?"
+    asked = "What happens to two spheres whose centres coincide?"
     if answer.failed and answer.failed.kind == "timeout" and not others_fail:
         cause = f"for two spheres at the same place the function {answer.failed}"
         return judged("same centre", "2a", asked, "the call goes on", "anything", False, cause)
     values = [] if answer.failed else [x for b in answer.last for x in (*b.x, *b.v, b.alpha, b.w)]
     guarded = bool(values) and bool(np.isfinite(values).all())
     said = (
-        "this case has a guard"
+        "the file handles this case"
         if guarded
-        else "the call fails as it does for other pairs, so that a guard cannot be seen"
+        else "the call fails for other pairs, too, so that nothing is known about this case"
         if answer.failed and others_fail
-        else "there is no guard for this case; the direction between the two is 0 / 0"
+        else "the file does not handle this case; the direction between the two is 0 / 0"
     )
     got = (
         "they keep finite numbers"

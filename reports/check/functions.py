@@ -49,7 +49,7 @@ def failure(task: str, part: str, answers: dict[str, Answer]) -> CheckRow:
     failed = failed_calls(answers)
     got = f"it fails in {len(failed)} of {len(answers)} calls"
     why = next(answer.failed for answer in failed.values())
-    asked = f"Does {FUNCTIONS[task]} come back from every call?"
+    asked = f"Does {FUNCTIONS[task]} return from every call?"
     cause = f"{FUNCTIONS[task]}: {why}"
     return judged("implemented", part, asked, got, "yes", False, cause)
 
@@ -74,11 +74,12 @@ def same_again(
         judged(
             SAME_AGAIN,
             "1" if function == "integrate" else changed_part(answers, mine),
-            f"Does {function} do the same to the same spheres, whatever it was called with before?",
-            f"{len(mine)} of {len(answers)} answers depend on what was asked before",
+            f"Does {function} give the same result for the same spheres, whatever the earlier"
+            " calls?",
+            f"{len(mine)} of {len(answers)} answers depend on earlier calls",
             "none does",
             False,
-            f"{function} keeps a value{where} from one call to the next, so each other question was"
+            f"{function} keeps a value{where} from one call to the next, so every question was"
             " asked in a fresh world",
         )
     ]

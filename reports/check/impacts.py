@@ -33,7 +33,7 @@ def along(normal: Callable[[PairCollision], Array]) -> Impulse:
 
 
 def unit(vector: Array) -> Array:
-    """The unit vector along it; NaN for a zero vector."""
+    """The unit vector along a vector; NaN for a zero vector."""
     direction: Array = vector / np.hypot(*vector)
     return direction
 
@@ -44,14 +44,16 @@ def tangent(h: PairCollision) -> Array:
 
 
 ONES: Array = np.ones(2)
-NEVER = "the velocities never change: not implemented, or the function returns before"
+NEVER = (
+    "the velocities never change: not implemented, or the function returns before it changes them"
+)
 BACKWARDS = (
     "the normal has the wrong direction: with the signs of this file it must point from B to A"
 )
 HALF_TURNED = (
     "the normal points the wrong way where xA < xB: atan gives half of the directions, atan2 all"
 )
-APPROACH = "the test for approach has the wrong sign: only pairs that part get an impulse"
+APPROACH = "the test for approach has the wrong sign: only pairs that move apart get an impulse"
 # Formulas for J n, N s: the right one and wrong ones
 IMPULSES: dict[str, Impulse] = {
     "": scaled(lambda h, e: 1.0),
@@ -70,7 +72,7 @@ IMPULSES: dict[str, Impulse] = {
     "brackets are missing: -1 - e vn instead of -(1 + e) vn": lambda h, e: (
         (-1 - e * h.vn * h.mu) * h.n
     ),
-    "a bracket closes late: -(1 + e vn) instead of -(1 + e) vn": lambda h, e: (
+    "a closing bracket is in the wrong place: -(1 + e vn) instead of -(1 + e) vn": lambda h, e: (
         (-1 - e * h.vn) * h.mu * h.n
     ),
     "the masses are missing: J = -(1 + e) vn": scaled(lambda h, e: 1 / h.mu),
@@ -162,16 +164,18 @@ class Update(NamedTuple):
 
 UPDATES: dict[str, Update] = {
     "": Update(lambda h, P, e: (P / h.ma, -P / h.mb)),
-    "B gets the sign of A": Update(lambda h, P, e: (P / h.ma, P / h.mb)),
-    "B is divided by the mass of A": Update(lambda h, P, e: (P / h.ma, -P / h.ma)),
-    "A is divided by the mass of B": Update(lambda h, P, e: (P / h.mb, -P / h.mb)),
+    "the impulse on B has the sign of that on A": Update(lambda h, P, e: (P / h.ma, P / h.mb)),
+    "the impulse on B is divided by the mass of A": Update(lambda h, P, e: (P / h.ma, -P / h.ma)),
+    "the impulse on A is divided by the mass of B": Update(lambda h, P, e: (P / h.mb, -P / h.mb)),
     "the masses are exchanged": Update(lambda h, P, e: (P / h.mb, -P / h.ma)),
-    "B gets the sign and the mass of A": Update(lambda h, P, e: (P / h.ma, P / h.ma)),
+    "the impulse on B has the sign of that on A and is divided by the mass of A": Update(
+        lambda h, P, e: (P / h.ma, P / h.ma)
+    ),
     "B is not changed": Update(lambda h, P, e: (P / h.ma, 0 * P)),
     "A is not changed": Update(lambda h, P, e: (0 * P, -P / h.mb)),
     "the impulse is not divided by the masses": Update(lambda h, P, e: (P, -P)),
-    "A is not divided by its mass": Update(lambda h, P, e: (P, -P / h.mb)),
-    "B is not divided by its mass": Update(lambda h, P, e: (P / h.ma, -P)),
+    "the impulse on A is not divided by its mass": Update(lambda h, P, e: (P, -P / h.mb)),
+    "the impulse on B is not divided by its mass": Update(lambda h, P, e: (P / h.ma, -P)),
     "the impulse is multiplied by the masses, not divided by them": Update(
         lambda h, P, e: (P * h.ma, -P * h.mb)
     ),
@@ -183,14 +187,14 @@ UPDATES: dict[str, Update] = {
     ),
     "only x is changed": Update(lambda h, P, e: (P / h.ma * [1, 0], -P / h.mb * [1, 0])),
     "only y is changed": Update(lambda h, P, e: (P / h.ma * [0, 1], -P / h.mb * [0, 1])),
-    "y gets the x part of the normal": Update(
+    "the x component of the impulse is used for y, too": Update(
         lambda h, P, e: (P[0] / h.ma * ONES, -P[0] / h.mb * ONES)
     ),
-    "x gets the y part of the normal": Update(
+    "the y component of the impulse is used for x, too": Update(
         lambda h, P, e: (P[1] / h.ma * ONES, -P[1] / h.mb * ONES)
     ),
     "the velocities are exchanged": Update(lambda h, P, e: (-h.u, h.u)),
-    "each bounces off the other as off a wall": Update(
+    "each sphere bounces off the other as off a wall": Update(
         lambda h, P, e: (-(1 + e) * (h.va @ h.n) * h.n, -(1 + e) * (h.vb @ h.n) * h.n)
     ),
     "each velocity is reversed and multiplied by e": Update(
@@ -209,11 +213,11 @@ UPDATES: dict[str, Update] = {
 # only for a file that states an e other than 1, because a file may be written for e = 1
 ELASTIC: dict[str, Impulse] = {
     "e is not used: the collision is elastic": scaled(lambda h, e: 2 / (1 + e)),
-    "x and y are treated as two collisions on a line, and without e": (
+    "x and y are treated as two one-dimensional collisions, without e": (
         lambda h, e: -2 * h.u * h.mu
     ),
 }
-SLIPS = IMPULSES | scalar_products() | ELASTIC
+MISTAKES = IMPULSES | scalar_products() | ELASTIC
 
 
 @dataclass(frozen=True)
@@ -249,7 +253,7 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
     ]
     if not finite(answers, "v"):
         return None
-    slipped = [name for name in SLIPS if restitution.read.stated or name not in ELASTIC]
+    slipped = [name for name in MISTAKES if restitution.read.stated or name not in ELASTIC]
     impulses = [name for name in slipped if name in IMPULSES | ELASTIC]
     for e in restitution.candidates:
         one = chain(((impulse, "") for impulse in slipped), (("", update) for update in UPDATES))
@@ -258,7 +262,7 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
         ) is not None:
             found = Finding("", slips[0], "2d", e, IMPULSES[""], slips[1])
         if found := found or fitting(product(impulses, UPDATES), seen, e):
-            wrong_way = found.impulse == NEVER and follows_print(answers, e)
+            wrong_way = found.impulse == NEVER and impulse_if_separating(answers, e)
             return replace(found, impulse=APPROACH) if wrong_way else found
     return None
 
@@ -269,17 +273,18 @@ def fitting(
     """The first impulse and update of `pairs` that reproduce every collision."""
     with np.errstate(all="ignore"):
         for impulse, update in pairs:
-            law, row = SLIPS[impulse], UPDATES[update]
+            law, row = MISTAKES[impulse], UPDATES[update]
             right = [near(row.change(h, law(h, e), e), came, 0.1) for h, came in seen]
-            # By a wrong law some of these pairs separate; a test for approach then skips them.
+            # A wrong law makes some pairs separate during the search for n; files that test for
+            # approach then leave them unchanged.
             ended = [impulse != "" and near(came, 0.0) for _, came in seen]
             if any(right) and all(np.logical_or(right, ended)):
                 return Finding(impulse, update, row.task, e, law, row.change)
     return None
 
 
-def follows_print(answers: dict[str, Answer], e: float) -> bool:
-    """Whether pairs that part get the impulse of the printed formula."""
+def impulse_if_separating(answers: dict[str, Answer], e: float) -> bool:
+    """Whether pairs that move apart get the impulse of the printed formula."""
     for name in SEPARATING:
         h, came = (
             collision_of(QUESTIONS[name].balls, answers[name].last),

@@ -17,11 +17,11 @@ from scenarios.model import Array
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A collision computed by a file, and its known mistakes.
+class CollisionCase:
+    """A collision computed by a file, with the mistakes found in it.
 
     Attributes:
-        pair: before the collision; of all collisions asked, one that shows the fault.
+        pair: before the collision; one of the collisions asked that shows the fault.
         after: velocities of A and B after it, (2, 2) m/s.
         found: the impulse and the update that reproduce all collisions, None if none do.
         e: the restitution by which it is judged.
@@ -87,22 +87,23 @@ def impulse_rows(
 ) -> list[CheckRow]:
     """The rows of (c) and (d)."""
     if not finite(answers, "v"):
-        return [*no_number(answers, restitution.own), bystanders(answers)]
-    seen = seen_in(answers, restitution, found)
-    spoilt = "2d" if seen.right_c else "2c"  # the part that makes energy and restitution wrong
+        return [*no_number(answers, restitution.own), quantities_kept(answers)]
+    case = case_to_show(answers, restitution, found)
+    # the part whose mistake makes energy and restitution wrong
+    spoilt = "2d" if case.right_c else "2c"
     return [
-        normal_impulse(seen),
-        tangential_impulse(seen),
-        *([] if spoilt == "2d" else spoilt_rows(seen, restitution, spoilt)),
-        restitution.speeds(seen.mistake),
-        separating(answers, found, seen.e),
-        new_velocity(seen, 0),
-        new_velocity(seen, 1),
-        momentum(seen),
+        normal_impulse(case),
+        tangential_impulse(case),
+        *([] if spoilt == "2d" else energy_rows(case, restitution, spoilt)),
+        restitution.speeds(case.mistake),
+        separating(answers, found, case.e),
+        new_velocity(case, 0),
+        new_velocity(case, 1),
+        momentum(case),
         # A mistake in (d) shows more clearly in the velocities than in the energy.
-        *(spoilt_rows(seen, restitution, spoilt) if spoilt == "2d" else []),
-        symmetry(answers, seen),
-        bystanders(answers),
+        *(energy_rows(case, restitution, spoilt) if spoilt == "2d" else []),
+        symmetry(answers, case),
+        quantities_kept(answers),
     ]
 
 
@@ -133,13 +134,15 @@ def asked_of_impulse(pair: PairCollision) -> str:
     )
 
 
-def seen_in(answers: dict[str, Answer], restitution: Restitution, found: Finding | None) -> Seen:
-    """The collision to show, and the mistakes in it."""
+def case_to_show(
+    answers: dict[str, Answer], restitution: Restitution, found: Finding | None
+) -> CollisionCase:
+    """The collision to show, with the mistakes in it."""
     e = found.e if found else restitution.own
     wrong = [] if found else wrong_collisions(answers, e)
     name = next(iter(wrong or COLLISIONS))
     balls, after = QUESTIONS[name].balls, answers[name].last
-    return Seen(
+    return CollisionCase(
         collision_of(balls, after),
         np.array([b.v for b in after]),
         found,
@@ -164,37 +167,37 @@ def swapped(name: str) -> str:
     return name.replace("collision/", "swapped/")
 
 
-def normal_impulse(seen: Seen) -> CheckRow:
+def normal_impulse(case: CollisionCase) -> CheckRow:
     """The row on J, the impulse along the normal."""
     return judged(
         "impulse",
         "2c",
-        asked_of_impulse(seen.pair),
-        f"{shown(seen.shown_impulse @ seen.pair.n)} N s along the normal",
-        f"{shown(seen.right_impulse @ seen.pair.n)} N s",
+        asked_of_impulse(case.pair),
+        f"{shown(case.shown_impulse @ case.pair.n)} N s along the normal",
+        f"{shown(case.right_impulse @ case.pair.n)} N s",
         # the next row judges the tangential part
-        seen.right_c or near(seen.received @ seen.pair.n, seen.right_impulse @ seen.pair.n),
-        seen.impulse,
+        case.right_c or near(case.received @ case.pair.n, case.right_impulse @ case.pair.n),
+        case.impulse,
     )
 
 
-def tangential_impulse(seen: Seen) -> CheckRow:
+def tangential_impulse(case: CollisionCase) -> CheckRow:
     """The row on the tangential impulse, which is 0 because there is no friction."""
-    across = float(seen.shown_impulse @ tangent(seen.pair))
+    across = float(case.shown_impulse @ tangent(case.pair))
     return judged(
         "tangential part",
         "2c",
-        "What impulse does A get across the normal?",
+        "What impulse does A get along the tangent?",
         f"{shown(across)} N s",
         "0 N s",
-        near(across, 0.0) or seen.right_c,
-        seen.impulse,
+        near(across, 0.0) or case.right_c,
+        case.impulse,
     )
 
 
-def spoilt_rows(seen: Seen, restitution: Restitution, task: str) -> list[CheckRow]:
+def energy_rows(case: CollisionCase, restitution: Restitution, task: str) -> list[CheckRow]:
     """The rows on energy and restitution, in the task whose mistake they show."""
-    added = energy(seen.pair, seen.change)
+    added = energy(case.pair, case.change)
     kept = bool(added <= 1e-9)  # J; any loss is explained by the rows on the impulse
     return [
         judged(
@@ -204,34 +207,34 @@ def spoilt_rows(seen: Seen, restitution: Restitution, task: str) -> list[CheckRo
             "no" if kept else f"yes, {shown(added)} J",
             "no",
             kept,
-            seen.mistake,
+            case.mistake,
         ),
         replace(
-            restitution.row(seen.mistake),
-            task="2c" if near(restitution.came, seen.e) else task,
+            restitution.row(case.mistake),
+            task="2c" if near(restitution.came, case.e) else task,
         ),
     ]
 
 
-def new_velocity(seen: Seen, k: int) -> CheckRow:
+def new_velocity(case: CollisionCase, k: int) -> CheckRow:
     """The row on the velocity of A (k = 0) or B (k = 1), for the impulse that the file computes."""
-    before, mass = ((seen.pair.va, seen.pair.ma), (seen.pair.vb, seen.pair.mb))[k]
-    change = (1 - 2 * k) * seen.computed_impulse / mass
+    before, mass = ((case.pair.va, case.pair.ma), (case.pair.vb, case.pair.mb))[k]
+    change = (1 - 2 * k) * case.computed_impulse / mass
     return judged(
         f"velocity of {'AB'[k]}",
         "2d",
         f"What is the velocity of {'AB'[k]} after the collision, by the impulse that the file"
         " computes?",
-        f"{shown(seen.after[k])} m/s",
+        f"{shown(case.after[k])} m/s",
         f"{shown(before + change)} m/s",
-        seen.right_d or near(seen.change[k], change),
-        seen.update or seen.impulse,
+        case.right_d or near(case.change[k], change),
+        case.update or case.impulse,
     )
 
 
-def momentum(seen: Seen) -> CheckRow:
+def momentum(case: CollisionCase) -> CheckRow:
     """The row on the total momentum, which no collision changes."""
-    added = seen.pair.ma * seen.change[0] + seen.pair.mb * seen.change[1]
+    added = case.pair.ma * case.change[0] + case.pair.mb * case.change[1]
     return judged(
         "momentum",
         "2d",
@@ -239,7 +242,7 @@ def momentum(seen: Seen) -> CheckRow:
         f"{shown(added)} kg m/s",
         "(0, 0) kg m/s",
         near(added, 0.0),
-        seen.update or seen.impulse,
+        case.update or case.impulse,
     )
 
 
@@ -376,11 +379,11 @@ def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(CO
     )
 
 
-def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
+def symmetry(answers: dict[str, Answer], case: CollisionCase) -> CheckRow:
     """The velocities must not depend on which sphere is A. If both get opposite impulses, (d) is
     right, and the impulse depends on it."""
     first = next((name for name in COLLISIONS if not alike_if_swapped(answers, [name])), FIRST)
-    task, mistake = ("2c", seen.impulse) if seen.opposite else ("2d", seen.update)
+    task, mistake = ("2c", case.impulse) if case.opposite else ("2d", case.update)
     return judged(
         "A and B exchanged",
         task,
@@ -388,11 +391,11 @@ def symmetry(answers: dict[str, Answer], seen: Seen) -> CheckRow:
         f"the same sphere has {shown(answers[swapped(first)].last[0].v)} m/s",
         f"{shown(answers[first].last[0].v)} m/s, as before the exchange",
         alike_if_swapped(answers),
-        mistake or seen.mistake or UNALIKE,
+        mistake or case.mistake or UNALIKE,
     )
 
 
-def bystanders(answers: dict[str, Answer]) -> CheckRow:
+def quantities_kept(answers: dict[str, Answer]) -> CheckRow:
     """The row on force, angle, spin, mass and size, which a collision without friction does not
     change."""
     words = {

@@ -162,7 +162,7 @@ def assigned(statement: str) -> list[str]:
     return [name for side in sides for name in re.findall(r"\w+(?=\s*(?:,|\]|$))", side)]
 
 
-def detecting(seen: Sequence[Access]) -> list[int]:
+def detection_lines(seen: Sequence[Access]) -> list[int]:
     """The lines that first read the size of either sphere, before any write."""
     first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
     sizes = [a for a in seen[:first_write] if a.field == "size"]
@@ -170,7 +170,7 @@ def detecting(seen: Sequence[Access]) -> list[int]:
     return [a.line for a in sizes[:both]]
 
 
-def displacing(seen: Sequence[Access], cause: str) -> list[int]:
+def displacement_lines(seen: Sequence[Access], cause: str) -> list[int]:
     """The lines that write positions, of both spheres or of the one at fault. If the cause is in
     the overlap, the line that computes it comes first: the last that reads sizes."""
     who = re.match(r"(?:only )?([AB])\b", cause)
@@ -180,7 +180,7 @@ def displacing(seen: Sequence[Access], cause: str) -> list[int]:
     return [*(overlap if re.search(r"size|overlap|bracket", cause) else []), *writes]
 
 
-def impelling(seen: Sequence[Access], cause: str) -> list[int]:
+def impulse_lines(seen: Sequence[Access], cause: str) -> list[int]:
     """The lines that compute the impulse: those that read velocities or masses, depending on the
     cause. If there are none, the lines that write velocities."""
     displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
@@ -238,13 +238,13 @@ class Source:
             seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
             numbers = [seen[-1].line] if seen else []
         elif row.name == SAME_AGAIN:
-            numbers = self.assigning(re.findall(r"global (\w+)", row.cause))
+            numbers = self.assignment_lines(re.findall(r"global (\w+)", row.cause))
         else:
-            numbers = self.accessing(row)
+            numbers = self.access_lines(row)
         shown = sorted([k for k in dict.fromkeys(numbers) if k][:MOST])
         return [(k, cut(self.lines[k - 1].strip())) for k in shown if k <= len(self.lines)]
 
-    def accessing(self, row: CheckRow) -> list[int]:
+    def access_lines(self, row: CheckRow) -> list[int]:
         """The lines that read or write the numbers that a row of the two tasks judges."""
         seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
         if row.name in WRITTEN:
@@ -254,19 +254,22 @@ class Source:
                 for a in seen
                 if a.kind == "w" and a.field in WRITTEN[row.name] and a.sphere in who
             ]
-        made = self.making(seen, row.cause)
+        made = self.normal_lines(seen, row.cause)
         if row.task == "2a":
-            return [*made, *detecting(seen)]
+            return [*made, *detection_lines(seen)]
         if row.task == "2b":
-            return made or displacing(seen, row.cause)
+            return made or displacement_lines(seen, row.cause)
         if row.task == "2c" and SIGN_OF_J in row.cause:
             # The displacement has the same normal, and is judged by itself: J comes first.
-            return [*impelling(seen, "mass"), *(a.line for a in seen if is_write(a, "velocity"))]
+            return [
+                *impulse_lines(seen, "mass"),
+                *(a.line for a in seen if is_write(a, "velocity")),
+            ]
         if row.task == "2c":
-            return made or impelling(seen, row.cause)
+            return made or impulse_lines(seen, row.cause)
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
 
-    def making(self, seen: Sequence[Access], cause: str) -> list[int]:
+    def normal_lines(self, seen: Sequence[Access], cause: str) -> list[int]:
         """The lines that compute the normal or the distance, if the cause is about these.
 
         They are lines that read positions and write none; later lines that change the result before
@@ -317,7 +320,7 @@ class Source:
         head = re.compile(rf"\b(?:function|def|const|let|var)\s+{function}\b")
         return [k for k, line in enumerate(self.lines, 1) if head.search(line)]
 
-    def assigning(self, names: Sequence[str]) -> list[int]:
+    def assignment_lines(self, names: Sequence[str]) -> list[int]:
         """The lines that change one of these variables."""
         change = re.compile(rf"\b(?:{'|'.join(names)})\s*(?:[-+*/]?=(?!=)|\+\+|--)")
         code = code_of(self.text).splitlines()

@@ -205,7 +205,7 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
     cause = (
         "a loop of performSimStep leaves pairs out"
         if silent
-        else "performSimStep lets spheres collide that are apart"
+        else "performSimStep lets spheres collide that do not overlap"
     )
     return judged(
         "pairs",
@@ -248,13 +248,13 @@ def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
     wrong = [k for k, (a, b) in enumerate(zip(came.last, alone.last)) if not near(a.x, b.x)]
     got = f"{name_of(wrong[0])} is at {shown(came.last[wrong[0]].x)} m" if wrong else "yes"
     expected = (
-        f"at {shown(alone.last[wrong[0]].x)} m, where projectObjects sets it" if wrong else "yes"
+        f"at {shown(alone.last[wrong[0]].x)} m, where projectObjects puts it" if wrong else "yes"
     )
     stayed = all(near(a.x, b.x) for b, a in zip(question.balls, came.last))
     return judged(
         "edges in a step",
         "loop",
-        "Is a sphere beyond an edge where projectObjects sets it, after a step?",
+        "After a step, is a sphere beyond an edge where projectObjects puts it?",
         got,
         expected,
         not wrong,
@@ -282,12 +282,12 @@ def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool)
             "it stays",
         )
         cause = "projectObjects moves spheres that are inside"
-    asked = "Is an asteroid beyond an edge set onto the opposite one?"
+    asked = "Is an asteroid beyond an edge moved to the opposite edge?"
     rows = [judged("edges", "loop", asked, got, expected, not cause, cause)]
     if ufo:
         home, place = start[0][:2], came.last[0].x
-        asked = "Is a ufo that leaves set back to its start?"
-        cause = "projectObjects does not set it back"
+        asked = "Is a ufo that leaves the box moved back to its start?"
+        cause = "projectObjects does not move it back"
         got, expected = f"it is at {shown(place)} m", f"at {shown(home)} m"
         rows.append(judged("ufo", "loop", asked, got, expected, near(place, home), cause))
     return rows
@@ -301,7 +301,7 @@ def wrong_at_edge(
     (name, onto), (before, after) = edge, pair
     if not near(after.x, onto):
         got = f"one beyond the {name} edge, at {shown(before.x)} m, is set to {shown(after.x)} m"
-        return got, f"it is set to {shown(onto)} m", "projectObjects sets it onto the wrong place"
+        return got, f"it is set to {shown(onto)} m", "projectObjects puts it in the wrong place"
     if not near(after.v, before.v):
         got = f"one beyond the {name} edge flies on at {shown(after.v)} m/s"
         return got, f"at {shown(before.v)} m/s, as it came", "projectObjects changes its velocity"

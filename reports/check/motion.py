@@ -236,7 +236,7 @@ def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
     law: Law = lambda v, f, m, _o, dt: factor * (v + f / m * dt)  # noqa: E731
     late: Law = lambda v, f, m, _o, dt: factor * v + f / m * dt  # noqa: E731
     if follows({"after": law, "before": late}, given, came):
-        return f"it is multiplied by {factor:.4g} in every step: the exercise has no damping"
+        return f"it is also multiplied by {factor:.4g} in every step: the exercise has no damping"
     return None
 
 
@@ -250,12 +250,12 @@ def turning(answers: dict[str, Answer]) -> CheckRow:
     turns = [(came - right) / (2 * np.pi) for right, came in ways]
     whole = [near(turn, np.round(turn)) for turn in turns]
     right, came = ways[whole.index(False) if False in whole else 0]
-    asked = "What is the angle of a sphere that is turned by more than half a turn?"
+    asked = "What is the angle of a sphere that has turned by more than half a turn?"
     got, expected = f"{shown(came)} rad", f"{shown(right)} rad, or whole turns more or less"
     if all(whole) and not near(turns, 0.0):
-        said = "it is set back by whole turns, which leaves the direction as it is"
+        said = "it is reduced by whole turns, which does not change the direction"
         return CheckRow("turns", "1", asked, got, expected, "free choice", said)
-    cause = f"it is set back by {shown(abs(came - right))} rad, which is no whole turn of 2 pi"
+    cause = f"it is changed by {shown(abs(came - right))} rad, which is not a multiple of 2 pi"
     return judged("turns", "1", asked, got, expected, all(whole), cause)
 
 
@@ -265,11 +265,11 @@ def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:
     return judged(
         "coasting",
         "1",
-        "Does a sphere keep its velocity and spin where nothing acts on it?",
+        "Does a sphere without force and torque keep its velocity and spin?",
         f"v = {shown(after.v)} m/s, w = {shown(after.w)} rad/s",
         f"v = {shown(before.v)} m/s, w = {shown(before.w)} rad/s",
         near(after.v, before.v) and near(after.w, before.w),
-        mistake or "something acts on it, though force and torque are zero",
+        mistake or "its velocity or spin changes, though force and torque are zero",
     )
 
 
@@ -286,7 +286,7 @@ def lasting(answer: Answer) -> CheckRow:
         f"F = {shown(before.F)} N, torque = {shown(before.torque)} N m",
         right,
         (
-            "they are cleared: a key that is held would act for one step only"
+            "they are set to 0: a key that is held would act for one step only"
             if cleared
             else "integrate changes them"
         ),

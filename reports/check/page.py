@@ -32,7 +32,7 @@ GROUPS: dict[Verdict, tuple[str, str]] = {
     ),
     "follows": (
         "Follows from the faults",
-        "These answers are wrong because of the faults above. Mend those first.",
+        "These answers are wrong because of the faults above. Correct those first.",
     ),
     "free choice": (
         "Free choices",

@@ -31,7 +31,7 @@ WRONG_SIGN = "the sign is wrong: they are moved into each other"
 TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the positions are never changed: not implemented": lambda s, a, b: 0.0,
     WRONG_SIGN: lambda s, a, b: -s.overlap,
-    "only half of the overlap is taken out: it is halved twice": lambda s, a, b: s.overlap / 2,
+    "only half of the overlap is corrected: it is halved twice": lambda s, a, b: s.overlap / 2,
     "the overlap is counted twice: each is moved by all of it": lambda s, a, b: 2 * s.overlap,
     HALF_TURNED: lambda s, a, b: s.overlap * np.sign(a.x[0] - b.x[0]),
     "the sign is wrong, and the overlap is counted twice": lambda s, a, b: -2 * s.overlap,
@@ -52,8 +52,8 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "the overlap is multiplied by e, which belongs to the velocities": lambda s, a, b: (
         EXERCISE * s.overlap
     ),
-    "the overlap is taken of squares": lambda s, a, b: s.sizes**2 - s.distance**2,
-    "the overlap is size plus distance": lambda s, a, b: s.sizes + s.distance,
+    "the overlap is computed from squares": lambda s, a, b: s.sizes**2 - s.distance**2,
+    "the overlap is computed as sizes plus distance": lambda s, a, b: s.sizes + s.distance,
     "the squared distance is used as the distance": lambda s, a, b: (
         (s.sizes - s.distance**2) / s.distance
     ),
@@ -89,7 +89,7 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
 
 
 DISPLACED = ("at rest to each other", "separate", *COLLISIONS)  # the questions that (b) needs
-TAKEN_TO_BE_APART = "the overlapping pairs of these questions are taken to be apart"
+TAKEN_TO_BE_APART = "the file takes the overlapping pairs of these questions not to collide"
 
 
 def reacts(answers: dict[str, Answer]) -> bool:
@@ -336,8 +336,8 @@ def split(balls: tuple[Ball, ...], shift: Shift) -> CheckRow:
 
 
 ONE = (
-    "only {0} is moved. The task asks to displace the two until they meet in one point and does not"
-    " say by how much each: all for {0} and nothing for {1} is read as one way to share it"
+    "only {0} is moved, by the whole overlap. The task asks to displace the two until they meet in"
+    " one point and does not say how far each one moves, so {1} may stay where it is"
 )
 
 

@@ -23,12 +23,12 @@ class Restitution:
 
     Attributes:
         read: e in its text, and e of a pair that closes at 2 m/s.
-        absurd: whether that is outside 0 to 1, and the text assigns it to a name such as e.
+        out_of_range: whether that is outside 0 to 1, and the text assigns it to a name such as e.
         slow, fast: e of pairs that close at 2 mm/s and at 200 m/s.
     """
 
     read: OwnRestitution
-    absurd: bool
+    out_of_range: bool
     slow: float
     fast: float
 
@@ -51,14 +51,14 @@ class Restitution:
         return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
 
     @property
-    def played(self) -> float | None:
+    def for_scenes(self) -> float | None:
         """The e for judging whole scenes: the measured one if that is right or a free choice, else
         the one that the file should have; None if none is from 0 to 1."""
-        came = [self.came] if self.meant else []
+        came = [self.came] if self.as_stated else []
         return next((e for e in (*came, self.own) if 0 <= e <= 1), None)
 
     @property
-    def meant(self) -> bool:
+    def as_stated(self) -> bool:
         """Whether the file's collisions have the restitution that the file states."""
         right = near(self.came, EXERCISE) or near(self.came, self.own)
         return right or len(self.candidates) > 1
@@ -68,7 +68,7 @@ class Restitution:
         """What is wrong with the number in the file; "" if nothing is."""
         return (
             f"e = {shown(self.came)} is written into the file; it must be from 0 to 1"
-            if self.absurd
+            if self.out_of_range
             else ""
         )
 
@@ -84,7 +84,7 @@ class Restitution:
         )
         if near(self.came, EXERCISE):
             return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
-        if self.meant:
+        if self.as_stated:
             note = (
                 f"the file has e = {shown(self.came)}, the exercise 0.9; all is judged with the"
                 " file's"
@@ -112,8 +112,8 @@ class Restitution:
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     """The `Restitution` from the file's text and its collisions."""
     came, slow, fast = (restitution_in(answers[name], name) for name in ("even", "slow", "fast"))
-    absurd = not 0 <= came <= 1 and any(near(e, came) for e in named_in(text))
-    return Restitution(own_restitution(text, came), absurd, slow, fast)
+    out_of_range = not 0 <= came <= 1 and any(near(e, came) for e in named_in(text))
+    return Restitution(own_restitution(text, came), out_of_range, slow, fast)
 
 
 def restitution_in(answer: Answer, name: str) -> float:

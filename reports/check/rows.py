@@ -15,7 +15,7 @@ Verdict = Literal["right", "fault", "follows", "free choice", "not asked"]
 TOLERANCE = 1e-6
 FOLLOWS = "it follows from the faults above"
 SAME_AGAIN = "same answer again"  # the row on state that a file keeps between calls
-UNKNOWN = "unknown: none of the known mistakes gives these numbers"
+UNKNOWN = "unknown: no known mistake gives these numbers"
 TASKS = {
     "file": "the file",
     "1": "1 integrate",
@@ -54,8 +54,8 @@ FORMULAS = {
     "pairs": "every asteroid with the ufo; for i < j the pair of asteroids i and j",
     "itself": "for i < j the pair of asteroids i and j: j begins at i + 1",
     "edges in a step": "projectObjects ends the step",
-    "edges": "a centre beyond an edge is set onto the opposite edge",
-    "ufo": "a ufo that leaves the box is set back to its start",
+    "edges": "a centre beyond an edge is moved to the opposite edge",
+    "ufo": "a ufo that leaves the box is moved back to its start",
 }
 WITHOUT_FORMULA = ("implemented", "input only", SAME_AGAIN, "rest kept", "sphere kept")
 

@@ -278,7 +278,7 @@ def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str
 
 
 # question, duration s, a row x, y, vx, vy (m, m/s) for every sphere, radii m, masses kg
-MET: dict[str, tuple[Any, ...]] = {
+COLLISION_SCENES: dict[str, tuple[Any, ...]] = {
     "head_on": (
         "Where are two unequal spheres after they meet head-on?",
         1.0,
@@ -333,7 +333,7 @@ def scenes(e: float) -> tuple[tuple[Scenario, TruthRecord | None], ...]:
         thrusts=[Thrust(0, 0.0, 1.0, np.array([0.5, 0.9]), 0.02)],
     )
     found: list[tuple[Scenario, TruthRecord | None]] = [(forced, None)]
-    for name, (asks, duration, rows, radius, mass) in MET.items():
+    for name, (asks, duration, rows, radius, mass) in COLLISION_SCENES.items():
         scenario = Scenario(
             name=name,
             asks=asks,

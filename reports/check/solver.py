@@ -87,7 +87,7 @@ def rows_of(
         rows.append(not_asked("step", "loop", "a call did not return"))
     else:
         rows += loop_rows(process, faulty)
-    e = restitution.played if restitution is not None else None
+    e = restitution.for_scenes if restitution is not None else None
     rows = with_consequences([*rows, *scene_rows(process, rows, e)])
     rows = hinted(rows, text) if process.kind == "javascript" else rows
     return with_lines(rows, source), e

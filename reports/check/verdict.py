@@ -14,7 +14,7 @@ from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, wo
 from reports.check.solver import examine
 
 ENGINE = "is an engine (create, step, read), and check is for solvers of the exercise"
-RATHER = "to judge it: crosscheck run bouncing_ball_e09 --engine"
+RUN_INSTEAD = "to judge it: crosscheck run bouncing_ball_e09 --engine"
 MOST = 3  # sentences
 NONE = "holds no .js and no .py file"
 NAMED = 3  # files that are none
@@ -167,7 +167,7 @@ def check_of(path: Path) -> FileCheck:
     try:
         solver = read_solver(path)
         if is_engine(solver):
-            raise NotASolver(f"{path}: {ENGINE}; {RATHER} {shlex.quote(str(path))}")
+            raise NotASolver(f"{path}: {ENGINE}; {RUN_INSTEAD} {shlex.quote(str(path))}")
         rows, restitution = examine(solver)
         return FileCheck(path, rows, restitution=restitution, solver=solver)
     except NotASolver as refusal:

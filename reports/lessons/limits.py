@@ -25,7 +25,7 @@ from reports.lessons.lesson import (
 )
 from reports.page.style import TRUTH, number
 from reports.stability.cases import CASES
-from reports.stability.explain import explained, tried_out
+from reports.stability.explain import explained, with_replays
 from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
 from reports.stability.overview import bracket, why
 from reports.stability.search import Search
@@ -82,7 +82,7 @@ def limits_of(name: str) -> list[Limit]:
     one change test."""
     case = CASES[name]
     searches = [Search(case, engine, QUICK) for engine in engines_of(case)]
-    return explained([tried_out(search, search.limit()) for search in searches])
+    return explained([with_replays(search, search.limit()) for search in searches])
 
 
 def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]:

@@ -1,5 +1,6 @@
-"""The cheapest engine and step size that keep a given error in one scene, and what that scene does
-not need: all from runs of the scene itself."""
+"""The cheapest engine and step size that keep a given error in one scene, and the engine options
+that
+the scene does not need: all measured in runs of the scene itself."""
 
 from __future__ import annotations
 
@@ -38,14 +39,15 @@ from scenarios.no_truth import NoTruth
 
 PATIENCE, ALL_ROUNDS = 60.0, 600.0  # s that a run, and all timings together, may take
 ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
-# steps times disks of one run: some seconds of the slowest engine; of less than `FEW` disks a step
-# costs no less
+# steps times disks of one run, some seconds of the slowest engine; fewer than `FEW` disks count as
+# `FEW`, as a step with them costs no less
 MOST_WORK, FEW = 1_000_000, 10
 TOO_FAR_OFF, SAVES_TIME, NEARER, NO_GAIN = "too far off", "saves time", "more accurate", "no gain"
-# Noise, and cores kept busy by others, beyond which times are not compared. An option is timed in
-# runs of its own, so that less than a tenth is not told from none on a quiet machine either.
+# Times are not compared if the noise, or the number of cores kept busy by others, is above these.
+# An option is timed in separate runs, so that less than a tenth cannot be resolved on a quiet
+# machine.
 LOUD, BUSY = 0.1, 0.5
-HALF = 0.5  # of the error is left: more accurate
+HALF = 0.5  # with at most this part of the error an option counts as more accurate
 
 
 class NoAdvice(Exception):
@@ -91,7 +93,8 @@ class Attempt:
 
 
 class Change(NamedTuple):
-    """An engine with one thing changed beside the engine as it is, at the same step size."""
+    """An engine with one option changed, and the engine without the change, at the same step
+    size."""
 
     plain: Attempt
     changed: Attempt
@@ -107,8 +110,8 @@ class Change(NamedTuple):
         return NEARER if self.changed.error <= HALF * self.plain.error else NO_GAIN
 
 
-class Short(NamedTuple):
-    """An engine that keeps the error at no step size: its best attempt, and why it is no better."""
+class OutOfReach(NamedTuple):
+    """An engine that keeps the error at no step size: its best attempt, and the reason."""
 
     best: Attempt
     why: str
@@ -122,11 +125,11 @@ class Advice:
         scene: the name of the scene.
         until, duration: s, how far the exact answer goes and how long the scene is.
         step_sizes: s, those that were tried, coarse to fine.
-        keeping: of every engine that keeps the error its coarsest step size that does, as does
-            every finer one; cheapest first.
-        short: the engines that do not.
-        changes: options of the engines that keep it, one changed at a time.
-        noise: by how much an engine against itself differs from 1 in three of four pairs.
+        keeping: for every engine that keeps the error the coarsest step size at which it does, as
+            at every finer one; cheapest first.
+        short: the engines that do not keep it.
+        changes: options of the engines that keep it, changed one at a time.
+        noise: the upper quartile of |log(cost / cost of its own copy)| over the engines.
         busy: cores that others kept busy when the timing began; nan where unknown.
     """
 
@@ -135,7 +138,7 @@ class Advice:
     duration: float
     step_sizes: Sequence[float]
     keeping: Sequence[Attempt]
-    short: Sequence[Short]
+    short: Sequence[OutOfReach]
     changes: Sequence[Change]
     noise: float
     busy: float
@@ -170,7 +173,7 @@ def advise(
         NoAdvice: the scene has no exact answer, or the timing failed.
     """
     run = partial(attempts, scene, seed, purpose, workers, progress)
-    scenario = held_by(scene, seed)
+    scenario = scored_scenario(scene, seed)
     step_sizes = ladder_of(scenario)
     tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
     found = [(ladder, those_that_keep(ladder, bound)) for ladder in by_engine(tried)]
@@ -192,10 +195,10 @@ def advise(
     )
 
 
-def held_by(scene: str, seed: int) -> Scenario:
+def scored_scenario(scene: str, seed: int) -> Scenario:
     """The scenario up to the horizon of its exact answer; raises `NoAdvice` if it has none."""
     try:
-        return ladder.held(scene, seed).scenario
+        return ladder.scored(scene, seed).scenario
     except NoTruth as refusal:
         raise NoAdvice(
             f"no exact answer: {refusal}. To compare the engines with each other and with the laws"
@@ -241,7 +244,7 @@ def attempts(
     asked: Iterable[tuple[str, str, int]],
 ) -> list[Attempt]:
     """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
-    dt = held_by(scene, seed).dt
+    dt = scored_scenario(scene, seed).dt
     wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
     tasks = {one.task: partial(error_of, scene, seed, purpose, one) for one in wanted}
     outcomes = dict(done(tasks, workers, progress, "playing", PATIENCE))
@@ -255,7 +258,7 @@ def attempts(
 
 def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, str]:
     """The error of one run up to the horizon; inf and the reason if it failed."""
-    scenario, truth = ladder.held(scene, seed)
+    scenario, truth = ladder.scored(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
     if run.status != "ok" or run.trajectory is None:
         return inf, f"{run.status}: {run.reason}"
@@ -266,8 +269,8 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
 def timed(
     scene: str, seed: int, played: Sequence[Attempt], progress: Progress
 ) -> tuple[list[Attempt], dict[tuple[str, int], float], float]:
-    """The attempts with their costs, by how much each engine at each step size differs from itself,
-    |log(cost / cost of its copy)|, and how many cores other programs used."""
+    """The attempts with their costs; for each engine and step size the difference of two timings of
+    the same engine, |log(cost / cost of its copy)|; and the number of cores that others used."""
     if not played:
         return [], {}, nan
     makes = {
@@ -299,7 +302,7 @@ def reasons(
     finest: int,
     workers: int,
     progress: Progress,
-) -> list[Short]:
+) -> list[OutOfReach]:
     """The largest contribution to the error of each engine at the finest step, from the error
     budget."""
     tasks = {
@@ -309,7 +312,7 @@ def reasons(
     }
     budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
     measure = "energy" if purpose == "energy" else "position_radii"
-    return [Short(one, one.reason or largest(budgets.get(one.task), measure)) for one in short]
+    return [OutOfReach(one, one.reason or largest(budgets.get(one.task), measure)) for one in short]
 
 
 def played_as(name: str) -> str:

@@ -1,5 +1,5 @@
-"""`crosscheck advise`: the cheapest engine and step size that keep an error in one scene, and what
-the scene does not need."""
+"""`crosscheck advise`: the cheapest engine and step size that keep an error in one scene, and the
+engine options that it does not need."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def give_advice(
 
 
 def bound_of(error: str) -> float:
-    """The number that "1%" or "0.01" stands for; exits 2 on what is no positive number."""
+    """The number that "1%" or "0.01" stands for; exits 2 unless it is a positive number."""
     text, scale = (error[:-1], 0.01) if error.endswith("%") else (error, 1.0)
     try:
         bound = float(text) * scale
@@ -100,8 +100,8 @@ def finite(value: float) -> float | None:
 
 
 def print_advice(advice: Advice, purpose: str, bound: float) -> None:
-    """What to take, what does not get there, what the scene does not need, how sure the times
-    are."""
+    """Print the engines that keep the error, those that do not, the options, and how reliable the
+    times are."""
     console = Console()
     console.print(
         f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)},"
@@ -114,7 +114,7 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     if advice.keeping:
         print_choices(console, advice)
     else:
-        console.print("None of the engines keeps it at any step size that was tried.", style="bold")
+        console.print("No engine keeps this error at any step size tried.", style="bold")
     if advice.short:
         console.print()
         print_short(console, advice)
@@ -139,7 +139,7 @@ def print_choices(console: Console, advice: Advice) -> None:
 
 
 def print_short(console: Console, advice: Advice) -> None:
-    """Those that keep the error at no step size."""
+    """Print the engines that keep the error at no step size."""
     coarse, *_, fine = advice.step_sizes
     title = f"Not within it at any step size from {number(coarse * 1e3)} to {number(fine * 1e3)} ms"
     rows = [
@@ -152,7 +152,7 @@ def print_short(console: Console, advice: Advice) -> None:
 
 
 def print_changes(console: Console, advice: Advice, bound: float) -> None:
-    """What each option of the engines above costs and does here."""
+    """Print the effect of each option of the engines that keep the error."""
     title = "What the scene does not need: one option changed, at the same step size"
     rows = [
         [
@@ -167,8 +167,8 @@ def print_changes(console: Console, advice: Advice, bound: float) -> None:
 
 
 def sentence_on_times(advice: Advice) -> str:
-    """How far the times can be trusted."""
-    said = f"An engine against itself differs by {advice.noise:.0%}."
+    """A sentence on the noise of the times."""
+    said = f"Two timings of the same engine differ by {advice.noise:.0%}."
     if advice.quiet:
         return f"{said} Costs that differ by less than {advice.floor:.0%} are the same."
     return (

@@ -1,8 +1,7 @@
-"""What an engine's error consists of: its mechanisms are enabled in the reference one at a time,
-and what remains is the residual.
+"""The error budget of an engine: its mechanisms are enabled in the reference one at a time, and
+what they do not explain is the residual.
 
-As vectors, for each disk and sample, the contributions close: engine - truth = contributions +
-interplay + residual.
+For each disk and sample, as vectors: engine - truth = contributions + interplay + residual.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from adapters.run import Run
 from reports.compare import laws, scales
 from reports.compare.view import View, cut
 from reports.run.scenes import open_scene
-from reports.speed.ladder import held
+from reports.speed.ladder import scored
 from scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
@@ -56,8 +55,7 @@ COLUMNS = [
     "closed_deviation_radii",
     "note",
 ]
-# radii by which end-of-step detection alone may put a disk off: where all is far off, no
-# contribution adds up to anything
+# radii, the largest error by end-of-step detection alone: beyond it contributions do not add up
 LIMIT = 0.5
 
 
@@ -66,8 +64,8 @@ class NotPlayed(Exception):
 
 
 class Offset(NamedTuple):
-    """What one cause changes: of positions (k, m, 2) in radii of the disks that move, of the energy
-    (k,) over all."""
+    """The change by one cause: of the positions (k, m, 2) of the disks that move, in radii, and of
+    the energy (k,), over the energy at hand."""
 
     position: Array
     energy: Array
@@ -96,8 +94,8 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """A row a contribution of what puts engine `name` of `MECHANISMS` off in a scene, at this many
-    steps a sample interval.
+    """The error budget of engine `name` of `MECHANISMS` in a scene, at `substeps` steps a sample
+    interval: a row for each contribution.
 
     Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer
     goes, and duration_s, the scene itself; position_radii and energy, the root mean square of what
@@ -119,7 +117,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         "profile": profile,
         "dt_s": dt,
         "until_s": scenario.duration,
-        "horizon_s": held(scene, seed).scenario.duration,
+        "horizon_s": scored(scene, seed).scenario.duration,
         "duration_s": open_scene(scene, seed).duration,
     }
     try:
@@ -152,7 +150,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
 
 def window_of(scene: str, seed: int, substeps: int) -> Window:
     """The scene up to where end-of-step detection alone puts a disk farther off than `LIMIT`."""
-    scenario, truth = held(scene, seed)
+    scenario, truth = scored(scene, seed)
     whole = Window(scenario, truth, scenario.dt(substeps))
     late = whole.played(partial(with_mechanisms, [])).trajectory
     assert late is not None
@@ -183,8 +181,8 @@ class Window:
         return run
 
     def offset(self, run: Run) -> Offset:
-        """How far it is from the truth; energies where no collision is near, as a step late is a
-        whole collision late."""
+        """The error of a run; of energies in collision-free samples only, as a collision found a
+        step late changes the whole energy."""
         scene, truth, played = self.scenario.scene, self.truth, run.trajectory
         assert played is not None
         position = (
@@ -209,15 +207,14 @@ class Window:
 
 
 class Budget:
-    """The offset of one engine, and its mechanisms, each of which is played once with the same
-    others."""
+    """The error of one engine, and its mechanisms; each set of mechanisms is played only once."""
 
     def __init__(self, at: Window, mechanisms: Sequence[Mechanism], total: Offset) -> None:
         self.at, self.mechanisms, self.total = at, mechanisms, total
         self.known: dict[tuple[str, ...], Offset] = {}
 
     def contributions(self) -> dict[str, Offset]:
-        """What each mechanism changes, then interplay, the residual, the sum, all together, and the
+        """The contribution of each mechanism, then interplay, residual, sum, all together, and the
         engine.
 
         Each is enabled by itself in the reference with end-of-step detection, or on top of
@@ -269,7 +266,7 @@ class Budget:
         return found
 
     def reference(self, mechanisms: Sequence[Mechanism]) -> Offset:
-        """How far the reference with these mechanisms is from the truth."""
+        """The error of the reference with these mechanisms."""
         names = tuple(mechanism.name for mechanism in self.mechanisms if mechanism in mechanisms)
         if names not in self.known:
             self.known[names] = self.at.offset(self.at.played(partial(with_mechanisms, mechanisms)))

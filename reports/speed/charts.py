@@ -21,8 +21,8 @@ from scenarios.model import Array
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"
 EDGE = 0.55  # decades between the last gridline and what is drawn at the edge
-# radii: what is smaller stands below a break of the axis, as a tenth of the finest accuracy that is
-# asked for is as good as exact
+# radii; smaller errors, below a tenth of the finest accuracy asked for, are drawn below a break of
+# the axis
 LOWEST = 1e-7
 TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
@@ -71,8 +71,8 @@ def at_the_edge(
     y_axis: dict[str, Any],
     floor: float,
 ) -> list[dict[str, Any]]:
-    """What failed, on the upper edge, and what was not timed, at its error; at the cost it has or
-    would have by its other dts, else at the right edge. `floor`: of `error_axis`.
+    """Points without an error, on the upper edge, and without a cost, at their error: at the cost
+    extrapolated from the engine's other dts, else at the right edge. `floor`: of `error_axis`.
     """
     if lost.empty:
         return []
@@ -84,7 +84,7 @@ def at_the_edge(
             float((others.cost / 2.0**others.step_size).median()) if len(others) else np.nan
         )
         cost = group.cost.where(group.cost.notna(), per_step_size * 2.0**group.step_size)
-        corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside: what is outside is not drawn
+        corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside the range
         x = cost.fillna(corner).clip(upper=corner)
         y = lifted(group.error, floor).where(np.isfinite(group.error), top)
         trace = line(engine, profile, x, y, [hover_text(row) for row in records(group)])
@@ -95,8 +95,8 @@ def at_the_edge(
 def fronts(
     drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any], floor: float
 ) -> list[dict[str, Any]]:
-    """Behind everybody, the front of all and, narrow, that of those who take steps; together where
-    they are one."""
+    """The Pareto front of all engines and, narrower, that of the engines that take steps; drawn
+    behind the points."""
     steps = drawn[~drawn.engine.isin(KINDS)]
     return [
         front_of(drawn, FRONT, 9, x_axis, y_axis, floor),
@@ -112,10 +112,10 @@ def front_of(
     y_axis: dict[str, Any],
     floor: float,
 ) -> dict[str, Any]:
-    """The edge of what the points that nobody beats beat: all above and right of it is slower or
-    worse than one.
+    """The Pareto front as steps: every point above and right of it is slower and less accurate than
+    a point on it.
 
-    What stands at `floor`, below `LOWEST`, counts as equal.
+    Errors drawn at `floor`, below `LOWEST`, count as equal.
     """
     cost, error = drawn.cost.to_numpy(float), lifted(drawn.error, floor).to_numpy(float)
     best = front(cost, error)
@@ -143,10 +143,10 @@ def front_of(
 
 
 def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
-    """Error against cost, a line for each sweep over its values, and one its engine over a ladder
-    of dt.
+    """Error against cost: a line for each sweep over its values, and a line for its engine over a
+    ladder of dt.
 
-    relative: both are over those of the engine as it is matched, at the dt at which the parameter
+    relative: both are divided by those of the matched engine, at the dt at which the parameter
         is swept.
     """
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
@@ -158,7 +158,7 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
     traces = []
     for engine, profile, group in by_engine(drawn):
         what = profile.partition("+")[2]
-        text = [turned(what, row, relative) for row in records(group)]
+        text = [sweep_hover(what, row, relative) for row in records(group)]
         error = group.error if relative else lifted(group.error, floor)
         trace = line(engine, profile, group.cost, error, text)
         if what:  # the first and the last are named
@@ -176,8 +176,8 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
     return figure(traces, x_axis, y_axis, TALLEST if relative else TALL, floor)
 
 
-def turned(what: str, row: dict[str, Any], relative: bool) -> str:
-    """What hovering over a point of a sweep says."""
+def sweep_hover(what: str, row: dict[str, Any], relative: bool) -> str:
+    """The hover text of a point of a sweep."""
     value = (
         f"{what} {row['change']}<br>"
         if what
@@ -193,7 +193,7 @@ def turned(what: str, row: dict[str, Any], relative: bool) -> str:
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
-    """What each accuracy costs, a mark an engine; above, who never gets there."""
+    """The cost of each accuracy, a mark an engine; at the top, engines that do not reach it."""
     names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
     y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
     not_down = edge(y_axis, "not yet")
@@ -314,7 +314,7 @@ def line(
     text: Sequence[str],
     more: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """A trace in the look of its engine, with what is said of each point."""
+    """A trace in the style of its engine, with the hover text of each point."""
     look = style.look(engine, profile)
     return {
         "type": "scatter",
@@ -351,7 +351,7 @@ def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
 
 
 def hover_text(row: dict[str, Any]) -> str:
-    """What hovering over a point says."""
+    """The hover text of a point."""
     if row["failed"] and not np.isfinite(row["error"]):
         why = f": {row['status']}, {row['reason']}" if row["reason"] else ""
         return f"{at(row)}failed in {row['failed']} of {row['seeds']}{why}"
@@ -364,7 +364,7 @@ def hover_text(row: dict[str, Any]) -> str:
     lines = [f"{at(row)}error {error} radii".strip()]
     lines.append(f"{spread(row)} µs/s" if np.isfinite(row["cost"]) else "not timed")
     if np.isfinite(row["idle"]):
-        lines.append(f"as many steps without anything to do {style.number(row['idle'])} µs/s")
+        lines.append(f"as many steps of an empty world {style.number(row['idle'])} µs/s")
     if row["wrapping"] > 0:
         lines.append(f"besides, {style.number(row['wrapping'])} µs/s of wrapping in Python")
     return "<br>".join(lines)

@@ -1,4 +1,4 @@
-"""`crosscheck speed`: measure, write the tables and the page, say what came out."""
+"""`crosscheck speed`: measure, write the tables and the page, print a summary."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def run_speed(
     """Measure and report into `out`, or go on with what was interrupted there; exits 0, 1 (no
     result), 2 or 130."""
     effort = FULL if full else QUICK
-    # none named: all that the effort has, sizes and options besides
+    # without named scenes: all scenes of the effort, the sizes and the options
     named = checked_scenes(scenes, [], False, seed)
     effort = replace(effort, scenes=tuple(named)) if named else effort
     plan = SpeedPlan(
@@ -86,7 +86,7 @@ def run_speed(
 
 
 def nothing_measured(part: Path, results: Results) -> NoReturn:
-    """Leave nothing behind, and say why there is no answer to set a time against; exits 1."""
+    """Delete the unfinished folder, and print why no error can be measured; exits 1."""
     discard(part, SPEED)
     for what, why in results.left_out:
         say(f"{what}: {why}")
@@ -118,7 +118,7 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume
 def carry_out(
     plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool
 ) -> tuple[Results, dict[str, Any]]:
-    """All that was measured, and the header that tables and page carry."""
+    """The results, and the header of tables and page."""
     with Progress() as progress:
         if resume:
             progress.note(f"Kept from the interrupted run: {counted(len(kept), 'task')}.")
@@ -139,7 +139,7 @@ def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None
 
 
 def print_summary(results: Results, page: str) -> None:
-    """What each accuracy costs, pooled, the noise floor, and where the page is."""
+    """Print the pooled cost of each accuracy, the noise floor, and the path of the page."""
     console = Console()
     scenes = len(results.scenes)
     rows = [

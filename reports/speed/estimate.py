@@ -15,9 +15,9 @@ from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
 from reports.terminal.counts import counted
 from scenarios.model import Scenario
 
-# s, means over the measurements: of a step, of each disk in it, of applying forces in Python, of
-# wrapping each disk there; of reading all and each disk once; of making ready for a sample. On the
-# machine of `figures.csv`; elsewhere half or twice as much.
+# s, means over the measurements: a step, each disk in it, applying forces in Python, wrapping a
+# disk in Python; a read-out, each disk in it; preparing a sample. On the machine of `figures.csv`;
+# on others half or twice as much.
 STEP, STEP_DISK, FORCE, WRAP_DISK = 1.0e-6, 0.17e-6, 16e-6, 0.75e-6
 READ, READ_DISK, READY = 20e-6, 1.5e-6, 1.5e-3
 LISTENING = 1.5  # times a step where collisions are logged, too

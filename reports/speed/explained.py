@@ -1,5 +1,5 @@
-"""How much of the errors the error budget explains, and for how much of the scenes: what is cut
-off is stated too."""
+"""The share of the errors that the error budget explains, and the share of the scenes that is
+evaluated."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pandas as pd
 from reports.speed.budget import LIMIT, RESIDUAL, TOTAL, WHOSE
 from reports.terminal.counts import counted
 
-LEAST = 1e-9  # radii: a smaller error is rounding, and nothing to explain
-TO = (0.01, 0.001)  # of an error: what may be left over
+LEAST = 1e-9  # radii; smaller errors are rounding and need no explanation
+TO = (0.01, 0.001)  # of an error: an error with a smaller residual counts as explained
 COLUMNS = [*WHOSE, "error_radii", "residual_radii", "note"]
 
 

@@ -16,14 +16,14 @@ from reports.speed.results import Results
 from reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
-# of the same run: errors alone
+# of the same run, errors only
 ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 YARDSTICK = ("reference", "exercise")
 AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
-# times as dear or as cheap as kept: compilers and processors differ by less, a lost optimisation by
-# more
+# the largest factor by which a ratio may differ from the kept one: compilers and processors differ
+# by less, a lost optimisation by more
 LOOSE = 3.0
 
 

@@ -29,7 +29,7 @@ TEXT = frozenset(
         "stopped",
         "task",
     )
-)  # columns of results that hold words
+)  # columns of results that hold text
 
 
 class Kept:

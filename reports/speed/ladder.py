@@ -21,16 +21,16 @@ from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import NoTruth
 
 
-class Held(NamedTuple):
-    """A scenario cut at the last sample before the horizon of its exact answer, and the answer
-    up to there."""
+class Scored(NamedTuple):
+    """A scenario cut at the last sample before the horizon of its exact answer, and the answer up
+    to there."""
 
     scenario: Scenario
     truth: Trajectory
 
 
 @cache
-def held(scene: str, seed: int) -> Held:
+def scored(scene: str, seed: int) -> Scored:
     """The part of a scene that has an exact answer.
 
     Raises:
@@ -42,13 +42,13 @@ def held(scene: str, seed: int) -> Held:
     truth = scenario.truth(scenario.times)
     if len(truth) < 2:
         raise NoTruth(f"its exact answer ends at {truth.horizon:.3g} s, before the first sample")
-    return Held(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
+    return Scored(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
 
 
 def reach_of(scene: str, seed: int) -> tuple[int, str]:
-    """How many sample intervals have an exact answer, 0 with the reason if none has."""
+    """The number of sample intervals with an exact answer; 0 and the reason if there are none."""
     try:
-        return held(scene, seed).scenario.intervals, ""
+        return scored(scene, seed).scenario.intervals, ""
     except NoTruth as refusal:
         return 0, str(refusal)
 
@@ -64,7 +64,7 @@ def errors_of(
     change_radii the largest distance from the run at the next coarser step size, nan if either
     failed. An engine that converges to a wrong motion has a small change and a large error.
     """
-    scenario, truth = held(scene, seed)
+    scenario, truth = scored(scene, seed)
     whole = open_scene(scene, seed).duration
     radius, before, rows = scenario.scene.radius, None, []
     engine_name, profile = name.split(":")
@@ -106,10 +106,13 @@ def times_of(
     budget: float,
     also: Mapping[str, Make] = MappingProxyType({}),
 ) -> list[Sample]:
-    """Samples, s per simulated second, of engines by (who, substeps, copy) over the whole length of
-    the scene; of those in `also` by (name, what) what is measured beside it, s each, see
-    `stepping.overheads`, but what the engine refuses."""
-    scenario = held(scene, seed).scenario
+    """Timing samples, s per simulated second, of `engines`, by (who, substeps, copy), over the
+    whole scored scene.
+
+    also: engines of which the overheads are timed in the same rounds, by (name, what), s each, see
+    `stepping.overheads`; those that an engine refuses are left out.
+    """
+    scenario = scored(scene, seed).scenario
     what = [
         Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
         for key, make in engines.items()

@@ -24,7 +24,7 @@ from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
 from reports.terminal.progress import Progress
 
-# s a ladder and a timing may take: against what hangs, no limit of what is measured
+# s, limits for a ladder and for a timing: they only stop engines that hang
 HANGS, ALL_ROUNDS = 600.0, 3600.0
 SIZE, TRUTH = "size", "truth"
 WORDS = ("kind", "engine", "profile", "scenario", "change")
@@ -82,7 +82,7 @@ def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Me
 def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach:
     """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
     have none are reported."""
-    # In workers, which can be stopped whatever they are doing.
+    # In workers, which can be stopped at any time.
     asked = {seeded: partial(ladder.reach_of, *seeded) for seeded in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
@@ -143,7 +143,7 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
                     "substeps": k,
                     "status": result.status,
                     "reason": result.reason,
-                    "until_s": ladder.held(measurement.scene, measurement.seed).scenario.duration,
+                    "until_s": ladder.scored(measurement.scene, measurement.seed).scenario.duration,
                     "duration_s": scenario.duration,
                     "error_radii": float("inf"),
                     "change_radii": float("nan"),
@@ -163,7 +163,7 @@ def measure_budget(
         for name in plan.engines
         if name in KNOWN and reach[scene, plan.seed]
     }
-    results = dict(done(tasks, plan.workers, progress, "parts of the error", kept=kept))
+    results = dict(done(tasks, plan.workers, progress, "error budget", kept=kept))
     for task, result in results.items():
         if isinstance(result, Failure):
             measured.left_out.append(
@@ -208,17 +208,17 @@ def timings(
 ) -> dict[tuple[Any, ...], Callable[[], Any]]:
     """The tasks of the second pass: all measurements of one kind in one scene are one task,
     because they are compared with each other."""
-    often: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
+    repeats: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
     makes = {name: row_of(name).make for name in plan.engines}
     tasks: dict[tuple[Any, ...], Callable[[], Any]] = {}
     for (kind, scene), group in groupby(played, key=lambda one: one[:2]):
         tasks["time", kind, scene] = partial(
-            scene_rows, kind, scene, plan.seed, in_turns(list(group)), often
+            scene_rows, kind, scene, plan.seed, in_turns(list(group)), repeats
         )
         if kind == SCENE:
             tasks["time", TRUTH, scene] = partial(models.closed_form, scene, plan.seed)
     if plan.whole:
-        tasks["time", SIZE] = partial(size_rows, makes, plan, often)
+        tasks["time", SIZE] = partial(size_rows, makes, plan, repeats)
     return tasks
 
 
@@ -242,13 +242,13 @@ def in_turns(
 
 
 def scene_rows(
-    kind: str, scene: str, seed: int, measurements: Mapping[Any, Any], often: Mapping[str, Any]
+    kind: str, scene: str, seed: int, measurements: Mapping[Any, Any], repeats: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
     """Rows of `Measured.samples` of measurements as `in_turns` gives them; where these are of a
     scene's ladders, of what is measured beside their steps, too."""
     scenario, rows = open_scene(scene, seed), []
     also = {who[0]: make for (who, _, _), make in measurements.items()} if kind == SCENE else {}
-    for sample in ladder.times_of(scene, seed, measurements, **often, also=also):
+    for sample in ladder.times_of(scene, seed, measurements, **repeats, also=also):
         if len(sample.key) == 2:
             name, what = sample.key
             rows.append(sample_row(what, name, sample, scenario=scenario.name))
@@ -265,12 +265,12 @@ def scene_rows(
 
 
 def size_rows(
-    makes: Mapping[str, Callable[..., Any]], plan: SpeedPlan, often: Mapping[str, Any]
+    makes: Mapping[str, Callable[..., Any]], plan: SpeedPlan, repeats: Mapping[str, Any]
 ) -> dict[str, list[Any]]:
     """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks,
     why)."""
     found, stopped = sizes.costs(
-        makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **often
+        makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **repeats
     )
     rows = [sample_row(SIZE, sample.key[0], sample, n=sample.key[1]) for sample in found]
     return {"samples": rows, "stopped": [(name, n, why) for (name, n), why in stopped.items()]}

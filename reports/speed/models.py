@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from reports.compare.order import FINEST
-from reports.speed.ladder import held
+from reports.speed.ladder import scored
 from scenarios.truth.exact import CLOSED_FORM, answered_by
 
 KINDS = {"event_driven": "collision to collision, float64"}
@@ -24,7 +24,7 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
     An answer computed in many digits is cached on disk, so its cost cannot be measured by asking
     again.
     """
-    scenario = held(scene, seed).scenario
+    scenario = scored(scene, seed).scenario
     if (model := answered_by(scenario)) != CLOSED_FORM or scenario.truth is None:
         return {"scenario": scenario.name, "truth": model, "closed_us": np.nan}
     best, ends = np.inf, scenario.times[[0, -1]]  # an engine is not read on the way either

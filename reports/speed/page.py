@@ -1,4 +1,4 @@
-"""Writes speed.html: one file that holds everything it shows and asks nothing of anywhere."""
+"""Writes speed.html, a single file that loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from reports.page.links import neighbours
 from reports.run.scenes import open_scene
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
-from reports.speed.ladder import held
+from reports.speed.ladder import scored
 from reports.speed.results import Results
 from reports.speed.versus import OWN
 from reports.terminal.counts import counted
@@ -30,7 +30,7 @@ FLAGGED = (ELSEWHERE, UNSTEADY)
 
 
 class SpeedSection(NamedTuple):
-    """A group of charts under one legend, and a table of what they say."""
+    """A group of charts under one legend, with a table."""
 
     key: str
     title: str
@@ -98,7 +98,7 @@ def situated(results: Results) -> dict[str, list[str]]:
     seed, found = results.plan.seed, {}
     for scene in results.plan.scenes:
         if (name := open_scene(scene, seed).name) in results.asks:
-            found[name] = situations.situations_of(*held(scene, seed))
+            found[name] = situations.situations_of(*scored(scene, seed))
     return found
 
 
@@ -212,7 +212,7 @@ def sizes_section(results: Results) -> SpeedSection | None:
 
 
 def budget_section(results: Results) -> dict[str, Any] | None:
-    """What the errors are made of."""
+    """The error budget."""
     budget = results.measured.budget
     if budget.empty:
         return None
@@ -232,19 +232,19 @@ def budget_section(results: Results) -> dict[str, Any] | None:
 
 
 def options_section(results: Results) -> SpeedSection | None:
-    """What each unneeded option costs and breaks."""
+    """The cost and the effect of each option that the scenes do not need."""
     table = results.options
     if table.empty:
         return None
     many = np.isfinite(table.cost_ratio).any()
     drawings = {
         "cost": Drawing(
-            "What it costs",
+            "Its cost",
             "Time over that of the matched profile; right of the dotted line it costs more.",
             charts.options(table, "cost_ratio", "time / time unchanged") if many else None,
         ),
         "error": Drawing(
-            "What it breaks, or mends",
+            "Its effect on the error",
             "Error over that of the matched profile; right of the dotted line it is worse.",
             charts.options(table, "error_ratio", "error / error unchanged"),
         ),
@@ -253,7 +253,7 @@ def options_section(results: Results) -> SpeedSection | None:
 
 
 def sweep_sections(results: Results) -> list[SpeedSection]:
-    """What more iterations and substeps buy, and what smaller steps buy for the same time."""
+    """The effect of more iterations and substeps, and that of smaller steps for the same time."""
     if results.sweeps.empty:
         return []
     count = results.sweeps.scenario.nunique()

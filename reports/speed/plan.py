@@ -42,7 +42,7 @@ class Measurement(NamedTuple):
 
     @property
     def errors(self) -> Callable[[], list[dict[str, Any]]]:
-        """How to find how far off it is."""
+        """A function that computes its errors."""
         return partial(
             ladder.errors_of, self.scene, self.seed, self.name, self.make, self.step_sizes
         )
@@ -112,10 +112,10 @@ class SpeedPlan:
             if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)
             if scene in self.sweep_scenes:
-                yield from self.turned(scene, seed)
+                yield from self.swept(scene, seed)
 
     def changed(self, scene: str) -> Iterator[Measurement]:
-        """Every changed engine, after those they are set against, at the dt the report shows."""
+        """The engines with one option changed, after those without, at the dt the report shows."""
         step_sizes = (middle(scene),)
         for name in dict.fromkeys(option.engine for option in self.options):
             yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, step_sizes)
@@ -124,9 +124,9 @@ class SpeedPlan:
                 OPTION, scene, self.seed, one.engine, one.change, one.make, step_sizes
             )
 
-    def turned(self, scene: str, seed: int) -> Iterator[Measurement]:
-        """Every sweep at every value at the dt the report shows, and its engine over a ladder of dt
-        beside it."""
+    def swept(self, scene: str, seed: int) -> Iterator[Measurement]:
+        """Every sweep at every value at the dt the report shows, after its engine over a ladder of
+        dt."""
         here = middle(scene)
         for sweep in self.sweeps:
             yield Measurement(

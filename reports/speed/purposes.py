@@ -1,4 +1,4 @@
-"""What a scene can be played for, and the error of a run for that purpose."""
+"""The purposes for which a scene is played, and the error of a run for each."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from scenarios.model import Scene, Trajectory
 
 
 class Purpose(NamedTuple):
-    """What a scene is played for.
+    """A purpose.
 
     Attributes:
         error: of a run beside the exact answer; nan where too little of it can be judged.
-        what: what the error is, in words, with its unit.
+        what: the error in words, with its unit.
     """
 
     error: Callable[[View], float]
@@ -25,7 +25,7 @@ class Purpose(NamedTuple):
 
 
 def of_trajectory(view: View) -> float:
-    """Largest distance of any disk from where it truly is, in radii of that disk."""
+    """Largest distance of any disk from its exact position, in radii of that disk."""
     return float((view.deviation / view.scenario.scene.radius).max())
 
 
@@ -62,7 +62,7 @@ def averages(trajectory: Trajectory, scene: Scene) -> tuple[float, float, float]
 
 
 PURPOSES: dict[str, Purpose] = {
-    "trajectory": Purpose(of_trajectory, "distance of a disk from where it truly is, in radii"),
+    "trajectory": Purpose(of_trajectory, "distance of a disk from its exact position, in radii"),
     "energy": Purpose(of_energy, "error of the energy, over the energy at hand"),
     "statistics": Purpose(
         of_statistics, "error of averages over time: energies, distance from the start"

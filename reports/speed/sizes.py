@@ -1,4 +1,4 @@
-"""What a step of a gas costs against the number of disks."""
+"""The cost of a step of a gas against the number of disks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from scenarios.model import Array, Scene
 
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3
-# of one sample: as many steps as fill 2 ms, less than a time slice
+# a sample has as many steps as fill 2 ms, less than a time slice of the system
 WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3
-# steps, after which a gas is begun again: where collisions take energy it falls asleep, and costs
+# steps after which a gas starts again: where collisions lose energy, disks fall asleep and cost
 # nothing
-FRESH = 400
-FIT_FROM = 100  # disks: below it the fixed cost of a step hides how it grows
+RESTART_AFTER = 400
+FIT_FROM = 100  # disks; with fewer the fixed cost of a step hides the growth
 STOPPED = "stopped: a step would take longer than {:g} s"
 
 
@@ -28,7 +28,7 @@ def gas(n: int, seed: int) -> Scene:
     """`n` equal disks that cover `COVERED` of a square box, on a lattice, with normal velocities; e
     = 1."""
     across = int(np.ceil(np.sqrt(n)))
-    # so that an unfilled lattice covers as much
+    # also an incomplete lattice covers `COVERED`
     pitch = RADIUS * np.sqrt(np.pi / COVERED) * np.sqrt(n) / across
     place = (np.stack(np.divmod(np.arange(n), across), axis=-1) + 0.5) * pitch
     side = across * pitch
@@ -60,13 +60,13 @@ def costs(
     left_out: dict[tuple[str, int], str] = {}
     course: dict[str, list[tuple[int, float]]] = {name: [] for name in engines}
     for n in sizes:
-        awake: dict[str, _Going] = {}
+        awake: dict[str, RunningGas] = {}
         for name, make in engines.items():
-            if foreseen(course[name], n) > patience:
+            if extrapolated_cost(course[name], n) > patience:
                 left_out[name, n] = STOPPED.format(patience)
                 continue
             try:
-                awake[name] = _Going(make(), gas(n, seed))
+                awake[name] = RunningGas(make(), gas(n, seed))
             except Unsupported as refusal:
                 left_out[name, n] = f"refused: {refusal}"
         what = [Timed((name, n), going, going.steps) for name, going in awake.items()]
@@ -78,11 +78,11 @@ def costs(
     return samples, left_out
 
 
-class _Going:
+class RunningGas:
     """A gas in motion: every sample continues where the last one ended, or starts again."""
 
     def __init__(self, engine: Engine, scene: Scene) -> None:
-        """Find out how many steps fill a sample."""
+        """Load the gas, and determine how many steps fill a sample."""
         self.engine, self.scene = engine, scene
         engine.listening = False
         self.begin()
@@ -97,7 +97,8 @@ class _Going:
         self.taken = 1
 
     def __call__(self) -> Spent:
-        if self.taken + self.steps > FRESH + WARM_STEPS:
+        """Take the steps of one sample; only they are timed."""
+        if self.taken + self.steps > RESTART_AFTER + WARM_STEPS:
             self.begin()
         started = perf_counter()
         self.engine.step(self.steps)
@@ -106,7 +107,7 @@ class _Going:
         return Spent(seconds)
 
 
-def foreseen(course: Sequence[tuple[int, float]], n: int) -> float:
+def extrapolated_cost(course: Sequence[tuple[int, float]], n: int) -> float:
     """s a step with `n` disks, extrapolated from the last two sizes; 0 if fewer are known."""
     if len(course) < 2:
         return 0.0

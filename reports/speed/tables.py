@@ -51,7 +51,7 @@ def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
     change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
     part in it.
     """
-    both = found.merge(beside(found), on=["scenario", "engine"], suffixes=("", "_here"))
+    both = found.merge(at_matched(found), on=["scenario", "engine"], suffixes=("", "_here"))
     both = both[measurable(both)]
     for of in ("cost", "error"):
         both[of] /= both[f"{of}_here"]
@@ -65,12 +65,12 @@ def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
 def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:
     """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right
     to the last bit."""
-    here = beside(found)
+    here = at_matched(found)
     lost = here[~measurable(here)]
     return list(zip(lost.engine, lost.scenario))
 
 
-def beside(found: pd.DataFrame) -> pd.DataFrame:
+def at_matched(found: pd.DataFrame) -> pd.DataFrame:
     """scenario, engine, cost_here and error_here: each matched engine at the dt at which its
     parameter is swept."""
     dt = found[found.change != PLAIN].groupby("scenario").dt_s.first()
@@ -244,7 +244,7 @@ def bindings(measured: Measured) -> pd.DataFrame:
     samples = measured.samples[measured.samples.kind.isin([EMPTY, CALL, READ])]
     if samples.empty:
         return pd.DataFrame(columns=["scenario", *WHO, "step_us", "call_us", "read_us"])
-    # The fastest: a difference of medians of a busy machine may be of either sign.
+    # The fastest samples: on a busy machine a difference of medians may have either sign.
     wide = in_us(summed_up(samples, ["scenario", *WHO, "kind"])).pivot(
         index=["scenario", *WHO], columns="kind", values="best"
     )
@@ -295,7 +295,7 @@ def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
     costs = in_order(costs.reset_index(drop=True))
     rows = []
     timed = (costs.engine + ":" + costs.profile).tolist()
-    # some have not even the fewest disks
+    # some engines were stopped at the smallest number of disks
     for name in dict.fromkeys([*timed, *(name for name, _ in measured.stopped)]):
         engine, profile = name.split(":")
         group = costs[(costs.engine == engine) & (costs.profile == profile)]

@@ -36,8 +36,8 @@ from scenarios.model import Scenario
 
 END_OF_STEP = "end-of-step detection"  # the ablation without any mechanism
 ACTS_AT_END = "a collision takes effect at the end of the step in which it is found"
-MOST = 300  # disks: the ablated reference asks all pairs
-# where an engine works nowhere, its ablation must read as much as it does, to this factor
+MOST = 300  # disks: the ablated reference tests all pairs
+# where an engine works nowhere, the reading of its ablation must be the same within this factor
 NEAR = 2.0
 
 B2_SETTINGS, B2_TYPES = "Box2D 2.3 Common/b2Settings.h: ", "Box2D 3.1 src/types.c: "
@@ -48,15 +48,15 @@ THRESHOLDS = {
 }
 PRODUCT = "the elasticities of the two shapes are multiplied: e on every shape gives e²"
 OF_PYMUNK = "Munk2D src/cpArbiter.c, cpArbiterUpdate"
-TOGETHER = "the contacts of a step get their impulses together, in the engine's own order of stages"
+TOGETHER = "the contacts of a step are solved together, in the engine's own order of stages"
 OWN_ORDER = "adapters/mechanisms/ablated.py, from the engine's own step"
-AT_ONCE = "an overlap is undone at once, so that disks move that have struck nothing yet"
+AT_ONCE = "an overlap is corrected at once, which moves disks before they collide"
 SENTENCES = (
     (END_OF_STEP, "*", ACTS_AT_END, "contacts are detected once per step"),
     (
         FLIGHT,
         "*",
-        "under a force a step moves a disk by other than v dt + a dt² / 2",
+        "under a force the displacement in a step is not v dt + a dt² / 2",
         "alpha of ENGINES",
     ),
     (RESTITUTION, "pymunk:*", PRODUCT, OF_PYMUNK),
@@ -69,14 +69,14 @@ SENTENCES = (
     (
         POSITION_CORRECTION,
         "*",
-        "overlaps are corrected gradually, apart from the motion",
+        "overlaps are corrected gradually, separately from the velocities",
         OWN_ORDER,
     ),
-    (FRICTION, "*", "friction takes speed along the contact", "the engine's default"),
-    (SKIN, "*", "walls are thicker than they are drawn", B2_SETTINGS + "b2_polygonRadius"),
+    (FRICTION, "*", "friction reduces the speed along the contact", "the engine's default"),
+    (SKIN, "*", "walls are thicker than the scene states", B2_SETTINGS + "b2_polygonRadius"),
     (DIGITS, "*", "numbers are float32", "IEEE 754"),
 )
-"""Mechanism, engines, what it does, and where that stands."""
+"""Mechanism, engines, what it does, and the source."""
 
 
 def sufficient_mechanisms(search: Search, limit: Limit) -> str:
@@ -100,11 +100,11 @@ def sufficient_mechanisms(search: Search, limit: Limit) -> str:
 @dataclass(frozen=True)
 class Ablations:
     """A case with the scenarios that fail and work next to a limit, the engine's mechanisms, and
-    what is read off its run.
+    the reading of its failing run.
 
     Attributes:
         bad: the first run that failed.
-        good: all runs next to it, none of which failed; none where the engine works nowhere.
+        good: all runs at the nearest value that works; empty if the engine works nowhere.
     """
 
     case: Case
@@ -173,7 +173,7 @@ class Ablations:
 
 
 def reason_by_ablation(limit: Limit) -> tuple[str, str, str]:
-    """The reason that the ablation gives, where it stands, and how it was tested."""
+    """The reason that the ablation gives, its source, and how it was tested."""
     names = limit.mechanisms.split(", ")
     rows = [
         next(row for row in SENTENCES if row[0] == name and fnmatch(limit.engine, row[1]))

@@ -11,14 +11,14 @@ from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from scenarios.model import Scenario
 
 FAMILY = "The largest dt of the suite's scenes"
-SEEN = 300  # samples at most
+MOST_SAMPLES = 300  # samples at most
 
 
 def in_steps(whole: Scenario, dt: float) -> Scenario:
-    """The scenario with a step as near to `dt` s as its duration allows, sampled at most `SEEN`
-    times."""
+    """The scenario with a step as near to `dt` s as its duration allows, sampled at most
+    `MOST_SAMPLES` times."""
     steps = max(1, round(whole.duration / dt))
-    every = -(-steps // SEEN)
+    every = -(-steps // MOST_SAMPLES)
     samples = -(-steps // every)
     return replace(whole, sample_interval=whole.duration / samples, substeps=(every,))
 

@@ -49,14 +49,14 @@ SEE = (
     " --vary see --help"
 )
 MARKS = {
-    "–": "does not fail as far as was tried",
+    "–": "did not fail at any value tried",
     "everywhere": "fails at every value",
-    "refused": "the engine does not take such a scene",
+    "refused": "the engine does not play the scene",
     "≤": "fails at this value and below, works above",
     "≥": "fails at this value and above, works below",
-    "*": "works again at some harsher value, or fails at the gentlest as well",
+    "*": "works again at a harsher value, or also fails at the gentlest value",
 }
-"""What stands in the table of limits -> what it means."""
+"""Mark in the table of limits -> its meaning."""
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
 PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in [*ENGINES, *FETCHED])
 STABILITY = Kind(

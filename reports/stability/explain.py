@@ -12,19 +12,17 @@ from dataclasses import replace
 
 from reports.stability.ablations import END_OF_STEP, reason_by_ablation, sufficient_mechanisms
 from reports.stability.cases import CASES
-from reports.stability.interventions import SAYS_SO, intervention_of, why_played
+from reports.stability.interventions import SAYS_SO, intervention_of, reason_by_intervention
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.reasons import Reason, reason_of
 from reports.stability.search import Search
 
-NEAR = (
-    # a prediction may be off by this factor: the quick form's bracket is as wide, and a collision
-    # lost by degrees
-    1.05
-)
+# the factor by which a prediction may be off: the width of the quick form's bracket; and collisions
+# are not all lost at one value
+NEAR = 1.05
 
 
-def tried_out(search: Search, limit: Limit) -> Limit:
+def with_replays(search: Search, limit: Limit) -> Limit:
     """The limit with what was found by playing its failing run again: the mechanisms that are
     enough to produce it, or an intervention that removes it.
 
@@ -63,7 +61,7 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
         varied = (
             CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
         )
-        text, source, tested = why_played(limit, varied)
+        text, source, tested = reason_by_intervention(limit, varied)
         return replace(limit, reason=text, source=source, tested=tested)
     tests = tests_of(limit, reason, by_name)
     if limit.mechanisms:
@@ -79,7 +77,7 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
 
 
 def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Limit]) -> list[str]:
-    """What confirms the reason, apart from an ablation."""
+    """The tests that confirm the reason, apart from an ablation."""
     tests = []
     if reason.predicts is not None and brackets(limit, reason.predicts):
         tests.append(f"predicts {reason.predicts:.4g}")

@@ -22,7 +22,7 @@ BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
 
 def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
-    """Save the first failing run of a search and the trajectory it is shown beside, if there is
+    """Save the first failing run of a search, and the trajectory that is shown with it, if there is
     one."""
     failing, seen = limit.failing, search.failure(limit)
     if failing is None or seen is None or seen[1].trajectory is None:
@@ -42,15 +42,15 @@ def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
 def kept_failure(
     limit: Limit, folder: Path, scenario: Scenario
 ) -> tuple[Trajectory, Trajectory | None] | None:
-    """The saved failing run and the one beside it; None if nothing was saved, or the file does
-    not fit the scenario."""
+    """The saved failing run and the trajectory shown with it; None if nothing was saved, or the
+    file does not fit the scenario."""
     path = file_of(limit, folder)
     if not path.exists() or limit.failing is None:
         return None
     beside = beside_file(path)
     try:
         found = load_trajectory(path), load_trajectory(beside) if beside.exists() else None
-    except UNREADABLE:  # torn by a crash: what it was found from is not
+    except UNREADABLE:  # damaged by a crash; the limit itself is in the journal
         return None
     most = len(near(limit.failing, scenario))
     return found if all(one is None or of_scenario(one, scenario, most) for one in found) else None
@@ -83,7 +83,7 @@ def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
 def file_of(limit: Limit, folder: Path) -> Path:
     """The file of the failing run."""
     name = f"{limit.case}.{limit.engine}"
-    if "/" in name or len(name) > 200:  # two folders may have a file of one name
+    if "/" in name or len(name) > 200:  # files in two folders may have the same name
         digest = hashlib.sha256(name.encode()).hexdigest()[:8]
         name = f"{Path(limit.case).name}.{Path(limit.engine).name}-{digest}"[-200:]
     name = name.replace(":", "-")
@@ -91,7 +91,7 @@ def file_of(limit: Limit, folder: Path) -> Path:
 
 
 def beside_file(path: Path) -> Path:
-    """The file of the other run."""
+    """The file of the trajectory shown with it."""
     return path.with_name(f"beside.{path.name}")
 
 

@@ -1,5 +1,5 @@
-"""What the literature says of a gas of equal hard disks: pressure and rate of collisions, in the
-bulk and between walls."""
+"""A gas of equal hard disks in the literature: pressure and collision rate, in the bulk and between
+walls."""
 
 from __future__ import annotations
 
@@ -72,13 +72,13 @@ class Gas(NamedTuple):
 def gas_in_box(
     n: int, radius: float, size: np.ndarray, temperature: float, mass: float = 1.0
 ) -> Gas:
-    """What `n` equal disks in a box of `size` (2,) m do at kT = `temperature` J, e = 1.
+    """The `Gas` of `n` equal disks in a box of `size` (2,) m at kT = `temperature` J, e = 1.
 
-    Across a cut through the box acts the pressure of the bulk, less the line tension of the two
-    walls that are cut (scaled particle theory: Helfand, Frisch & Lebowitz, J. Chem. Phys. 34, 1037,
-    1961). The virials of walls and collisions add up to 2 N kT, whatever the gas is like, and a
-    collision has the mean impulse sqrt(pi m kT): this gives the rate, which is Enskog's, 4 /
-    sqrt(pi) (Z - 1) a disk, where there are no walls.
+    The force on a cut through the box is that of the bulk pressure, less the line tension of the
+    two walls that are cut (scaled particle theory: Helfand, Frisch & Lebowitz, J. Chem. Phys. 34,
+    1037, 1961). The virials of walls and collisions add up to 2 N kT in any gas, and a collision
+    has the mean impulse sqrt(pi m kT): this gives the rate, which is Enskog's, 4 / sqrt(pi) (Z - 1)
+    a disk, where there are no walls.
     """
     bulk = bulk_packing(n * pi * radius**2 / size.prod(), radius, size)
     density = bulk / (pi * radius**2)

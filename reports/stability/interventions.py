@@ -1,4 +1,4 @@
-"""Explains failures that have no written reason: the failing run is played with one thing
+"""Explains failures without a reason in the table: the failing run is played with one thing
 changed, until it works."""
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
 
 FINER = 8
-# a power of two: what knows no unit plays the same to the last bit, so that no change helps by
-# chance
+# a power of two: an engine without length and time scales of its own plays the same to the last
+# bit, so that no change helps by chance
 UNITS = 32.0
 
 
@@ -69,7 +69,7 @@ class Intervention(NamedTuple):
         reason: why it failed, if it works with the change.
         how: the change in words.
         change: what is done to the scene.
-        engine: who plays it instead; "" is the same.
+        engine: the engine that plays it instead; "": the same.
     """
 
     engines: str
@@ -84,15 +84,19 @@ class Intervention(NamedTuple):
         return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
 
 
-SAYS_SO = "it says so"
+SAYS_SO = "the engine's message says so"
 INTERVENTIONS = {
     "at_home": Intervention(
-        "box2d*", "offset", "positions are float32, too coarse so far out", "at the origin", at_home
+        "box2d*",
+        "offset",
+        "positions are float32, too coarse so far from the origin",
+        "at the origin",
+        at_home,
     ),
     "faster": Intervention(
         "[pb]*",
         "*",
-        "too slow for a time of the engine's own (threshold of restitution, rate of position"
+        "too slow for a time scale of the engine (threshold of restitution, rate of position"
         " correction)",
         "32 times as fast",
         faster,
@@ -100,29 +104,29 @@ INTERVENTIONS = {
     "slower": Intervention(
         "[pb]*",
         "*",
-        "too fast for a time of the engine's own (cap on speed, rate of position correction)",
+        "too fast for a time scale of the engine (cap on speed, rate of position correction)",
         "32 times as slow",
         slower,
     ),
     "larger": Intervention(
         "[pb]*",
         "*",
-        "too small for a length of the engine's own (slop, margin, skin)",
+        "too small for a length scale of the engine (slop, margin, skin)",
         "32 times as large, at the same speeds",
         larger,
     ),
     "smaller": Intervention(
         "[pb]*",
         "*",
-        "too large for a length of the engine's own (cap on the way in a step, slop)",
+        "too large for a length scale of the engine (limit on displacement in a step, slop)",
         "32 times as small, at the same speeds",
         smaller,
     ),
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
     ),
-    # Of matter a smaller step does not say what is at fault: its friction, its air and its resting
-    # threshold go with the step, too.
+    # For matter a smaller step is ambiguous: its friction, its friction of the air and its resting
+    # threshold depend on the step, too.
     "finer_matter": Intervention(
         "matter:*",
         "[!d]*",
@@ -159,10 +163,10 @@ INTERVENTIONS = {
         if {f"{engine}:shipped", f"{engine}:matched"} <= {*ENGINES, *FETCHED}
     },
 }
-"""In the order in which they are tried: what shows one thing alone comes first, a finer step where
-nothing finer does.
+"""In the order in which they are tried: changes of one thing only come first, a finer step comes
+later.
 
-Where the step itself is varied, a finer one is no news.
+Where the step itself is varied, a finer one is not tried.
 """
 
 
@@ -188,7 +192,7 @@ def intervention_of(search: Search, limit: Limit) -> str:
     return ""
 
 
-def why_played(limit: Limit, varied: str) -> tuple[str, str, str]:
+def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
     """The reason for a failure that has none in the table, its source, and how it was tested, or
     ""."""
     failing = limit.failing

@@ -41,9 +41,9 @@ class Form:
     whole: bool
 
 
-# A gas comes upon a bad cluster of contacts sooner or later: one in 20 of pymunk's is off by 1 %
-# from v dt = 0.25 R on, half of them at none up to 2 R. The first of them is a matter of the seed;
-# that more than a quarter are is not.
+# A gas meets a bad cluster of contacts sooner or later: one in 20 of pymunk's gases is off by 1 %
+# from v dt = 0.25 R on, half of them not up to 2 R. The first failure depends on the seed; the
+# value at which more than a quarter of the seeds fail does not.
 RARELY = 1 / 4
 ALL = 10**6  # runs: more than any case has
 QUICK = Form("quick", few=4, ratio=1.05, whole=False)
@@ -68,7 +68,7 @@ class Case:
         values: to scan, from gentle to harsh.
         scene: (value, number of the run from 0) -> the scenario; it is played at its only step
             size. Fewer runs are the first of more.
-        predicate: what failing means.
+        predicate: decides whether a run fails.
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
             seeds.
         whole: whether the parameter counts something.

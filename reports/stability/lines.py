@@ -220,8 +220,8 @@ KINDS = Kinds(
 
 
 def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """Why there is no such case or engine, as the end of a sentence; "" if there is. `files`:
-    the scene files of the header."""
+    """SharedReason there is no such case or engine, as the end of a sentence; "" if there is.
+    `files`: the scene files of the header."""
     if isinstance(one, Limit):
         path, _, what = one.case.rpartition(":")
         if one.case not in CASES and (path not in files or what not in VARIES):
@@ -233,7 +233,8 @@ def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 
 
 def impossible(limit: Limit, case: Case) -> str:
-    """Why no search of the case can end like this, as the end of a sentence; "" if one can."""
+    """SharedReason no search of the case can end like this, as the end of a sentence; "" if one
+    can."""
     if limit.status != "ok":
         lost = (
             isnan(limit.works_at)
@@ -269,8 +270,8 @@ def impossible(limit: Limit, case: Case) -> str:
 
 
 def miscounted(trial: Trial, case: Case, at_the_limit: bool) -> str:
-    """Why no runs at a value of the case can give this, as the end of a sentence; "" if they
-    can."""
+    """SharedReason no runs at a value of the case can give this, as the end of a sentence; "" if
+    they can."""
     if trial.runs > case.runs or trial.failed > trial.runs or trial.allowed > case.runs:
         return (
             f"runs = {trial.runs}, failed = {trial.failed}: must be at most {case.runs}, as the"

@@ -18,7 +18,7 @@ from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.terminal.counts import counted
 
 WITH_FRICTION = {case.name for case in FRICTION}
-EVERYWHERE = {"never": "everywhere"}  # a cell says where it fails, not when it works
+EVERYWHERE = {"never": "everywhere"}  # the table shows where an engine fails, not where it works
 
 
 class LimitCell(NamedTuple):
@@ -31,8 +31,8 @@ class LimitCell(NamedTuple):
     failed: bool = False
 
 
-class Why(NamedTuple):
-    """A reason in words, its source, how it was tested, and the engines it is given for."""
+class SharedReason(NamedTuple):
+    """A reason in words, its source, how it was tested, and the engines with this reason."""
 
     text: str
     source: str
@@ -70,13 +70,13 @@ def why(limit: Limit) -> str:
     return f"{limit.why[0].upper()}{limit.why[1:]}."
 
 
-def reasons(limits: Sequence[Limit]) -> list[Why]:
-    """Every reason once, with the engines it is given for, in the order of first appearance."""
+def reasons(limits: Sequence[Limit]) -> list[SharedReason]:
+    """Every reason once, with its engines, in the order of first appearance."""
     found: dict[tuple[str, str, str], list[str]] = {}
     for limit in limits:
         if limit.verdict != NEVER_FAILS:
             found.setdefault((why(limit), limit.source, limit.tested), []).append(limit.engine)
-    return [Why(*key, engines) for key, engines in found.items()]
+    return [SharedReason(*key, engines) for key, engines in found.items()]
 
 
 def bracket(limit: Limit) -> tuple[str, str]:
@@ -107,7 +107,7 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     refused = sum(limit.word == "refused" for limit in mine)
     found = [
         f"{counted(len(mine), 'search', 'searches')} in {counted(len(cases), 'case')}:"
-        f" {len(mine) - len(failing)} found no failure as far as was tried,"
+        f" {len(mine) - len(failing)} found no failure at any value tried,"
         f" {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} found a limit,"
         f" {sum(limit.verdict == NEVER_WORKS for limit in mine) - refused} failed at every value,"
         f" and in {refused} the engine refused to play."
@@ -149,15 +149,17 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
     if cases < 2 or not any(fails.values()):
         return []
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
-    said = f"In {these} the fewest failures are those of {those(fails, min)}, the most those of"
-    said += f" {those(fails, max)}; a refusal counts as one."
+    said = (
+        f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most those of"
+    )
+    said += f" {engines_with(fails, max)}; a refusal counts as one."
     libraries = {engine: fails[engine] for engine in grouped(fails).get(ENGINE, [])}
     if libraries and min(libraries.values()) > min(fails.values()):
-        said += f" Of the libraries the fewest are those of {those(libraries, min)}."
+        said += f" Of the libraries the fewest are those of {engines_with(libraries, min)}."
     return [said]
 
 
-def those(fails: Mapping[str, int], extreme: Callable[[Iterable[int]], int]) -> str:
+def engines_with(fails: Mapping[str, int], extreme: Callable[[Iterable[int]], int]) -> str:
     """The engines that fail in the fewest or in the most cases, with the number of these."""
     count = extreme(fails.values())
     names = [engine for engine, number in fails.items() if number == count]

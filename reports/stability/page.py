@@ -48,7 +48,7 @@ class CaseSection:
     case: Case
     limits: list[Limit]
     replays: list[Replay]
-    reasons: list[overview.Why]
+    reasons: list[overview.SharedReason]
     drawing: Drawing
     charts: str
 

@@ -1,5 +1,5 @@
-"""What failing means: each predicate reads one number with a unit from a run and has a bound
-above which the run fails."""
+"""The predicates: each computes one number with a unit from a run, and has a bound above which the
+run fails."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from scenarios.model import Array, Scenario, Trajectory
 
 
 class Reading(NamedTuple):
-    """A number in the predicate's unit; if it broke: when (s), how, at which disk (-1: all), and
-    which predicate."""
+    """A number in the predicate's unit; for a failure its time (s), a sentence, the disk (-1: all),
+    and the name of the predicate."""
 
     value: float
     at: float = np.nan
@@ -25,7 +25,7 @@ class Reading(NamedTuple):
 
 
 class Predicate(NamedTuple):
-    """A run fails where the number it reads is above `bound`, or none.
+    """A run fails if its number is above `bound`, or is not a number.
 
     Attributes:
         name: as it stands in limits.csv.
@@ -50,7 +50,7 @@ def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
         outcome = "refused" if run.status == "unsupported" else run.status
         at = float(run.trajectory.t[-1]) if run.trajectory is not None else 0.0
         return Reading(np.nan, at, run.reason, outcome, True)
-    # what was thrown far enough overflows, and fails
+    # positions that overflow make the run fail
     with np.errstate(over="ignore", invalid="ignore"):
         reading = predicate.read(scenario, run.trajectory)
     if reading.value <= predicate.bound:
@@ -72,7 +72,7 @@ def truth_of(scenario: Scenario) -> Trajectory:
 
 
 def gain(trajectory: Trajectory) -> Array:
-    """(n,) m/s, by how much each disk's velocity changes between start and end."""
+    """(n,) m/s, the change of each disk's velocity from start to end."""
     change: Array = np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
     return change
 
@@ -89,7 +89,7 @@ def _collisions_spurious(scenario: Scenario, played: Trajectory) -> Reading:
     change = np.linalg.norm(played.velocity - played.velocity[0], axis=2).max(axis=1)
     share = change / np.linalg.norm(scenario.scene.velocity, axis=1).max()
     at = first_above(played.t, share, 1e-3)
-    return Reading(float(share.max()), at, "a collision that never was: the disks do not touch")
+    return Reading(float(share.max()), at, "a spurious collision: the disks do not touch")
 
 
 def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
@@ -101,7 +101,7 @@ def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         off,
         float(truth_of(scenario).collisions.t[0]),
-        f"the collision is played with e = {e + 0.0:.3g}",
+        f"the collision has e = {e + 0.0:.3g}",
     )
 
 
@@ -114,7 +114,7 @@ def _strays(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(off[worst]),
         float(played.t[-1]),
-        f"disk {worst} has gone {way[worst] / ought[worst]:.4g} of its way",
+        f"disk {worst} has moved {way[worst] / ought[worst]:.4g} times the right distance",
     )
 
 
@@ -127,7 +127,7 @@ def _velocity_off(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(share[worst]),
         float(true.collisions.t[0]),
-        f"disk {worst} leaves with another velocity",
+        f"disk {worst} leaves with a wrong velocity",
     )
 
 
@@ -139,7 +139,7 @@ def _scaled_deviation(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(off.max()),
         first_above(played.t, off, 0.25),
-        "here it leaves the path it has at scale 1",
+        "from here the path differs from that at scale 1",
     )
 
 
@@ -156,13 +156,13 @@ def _angle_off(scenario: Scenario, played: Trajectory) -> Reading:
 def _spring_grows(_: Scenario, played: Trajectory) -> Reading:
     energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2  # of 1 kg on 1 N/m
     quarter = len(energy) // 4
-    # Means over a quarter: a bounded method swings within a period, and comes back.
+    # Means over a quarter of the run: the energy of a stable method oscillates within a period.
     factor = float(energy[-quarter:].mean() / energy[:quarter].mean())
     at = first_above(played.t, np.abs(np.log2(energy / energy[0])), SPRING_GROWS.bound)
     return Reading(
         abs(float(np.log2(factor))),
         at,
-        f"the energy is {factor:.3g} of what it was, after 300 steps",
+        f"after 300 steps the energy is {factor:.3g} times that at the start",
     )
 
 
@@ -181,8 +181,8 @@ def _bounces_off(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(np.abs(changes[worst])),
         first_bounce(scenario),
-        f"bounce {worst + 1} comes {abs(changes[worst]):.3g} of the height {word}, the mean of all"
-        f" is {mean:.3g}",
+        f"after bounce {worst + 1} it reaches {abs(changes[worst]):.3g} drop heights {word} than"
+        f" before; the mean over all bounces is {mean:.3g}",
     )
 
 
@@ -219,35 +219,41 @@ COLLISIONS_SPURIOUS = Predicate(
     "spurious collisions",
     "of the speed",
     1e-3,
-    "a disk is deflected that touches nothing",
+    "a disk that touches nothing is deflected",
     _collisions_spurious,
 )
 RESTITUTION_OFF = Predicate(
-    "restitution off", "1", 0.01, "the collision is not played with the scene's e", _restitution_off
+    "restitution off", "1", 0.01, "the collision does not have the scene's e", _restitution_off
 )
-STRAYS = Predicate("strays", "of the way", 0.01, "a free disk has not gone its way", _strays)
+STRAYS = Predicate(
+    "strays", "of the way", 0.01, "a free disk has not moved the right distance", _strays
+)
 VELOCITY_OFF = Predicate(
     "velocity off",
     "of the speed",
     1e-3,
-    "a disk leaves the collision with another velocity",
+    "a disk leaves the collision with a wrong velocity",
     _velocity_off,
 )
 SCALED_DEVIATION = Predicate(
     "deviation",
     "radii",
     0.25,
-    "the path, scaled back, is not the one that the scene has at scale 1",
+    "the path, scaled back, differs from that at scale 1",
     _scaled_deviation,
 )
 ANGLE_OFF = Predicate(
-    "angle off", "of the angle", 0.02, "a free disk does not turn as fast as it spins", _angle_off
+    "angle off",
+    "of the angle",
+    0.02,
+    "the angle of a free disk does not follow its spin",
+    _angle_off,
 )
 BOUNCES_OFF = Predicate(
     "bounce off",
     "of the height",
     0.01,
-    "after a bounce the ball does not come as high as before it",
+    "a bounce changes the height that the ball reaches",
     _bounces_off,
 )
 SPRING_GROWS = Predicate(

@@ -1,4 +1,4 @@
-"""What failing means for stacks, piles and overlaps."""
+"""The predicates for stacks, piles and overlaps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _stands(scenario: Scenario, played: Trajectory) -> Reading:
     jitters = Reading(
         jitter / MOST_JITTER,
         float(played.t[len(played) // 2]),
-        f"trembles at {jitter:.3g} sqrt(g R)",
+        f"jitters at {jitter:.3g} sqrt(g R)",
         "jitters",
         disk=-1,
     )
@@ -35,7 +35,7 @@ def _stands(scenario: Scenario, played: Trajectory) -> Reading:
 
 
 def own_speed(scenario: Scenario) -> float:
-    """sqrt(g R) m/s, of a disk that falls by half its radius."""
+    """sqrt(g R) m/s, the speed after a fall of half a radius."""
     return float(np.sqrt(np.linalg.norm(scenario.scene.gravity) * scenario.scene.radius.min()))
 
 
@@ -44,7 +44,7 @@ def _ejected(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(speed[-1]),
         first_above(played.t, speed, EJECTED.bound),
-        f"thrown at {speed[-1]:.3g} radii/s",
+        f"the disks separate at {speed[-1]:.3g} radii/s",
     )
 
 
@@ -94,10 +94,12 @@ STANDS = Predicate(
     "does not stand",
     "of the bound",
     1.0,
-    "a disk sinks by 0.1 radii, or trembles at 0.02 sqrt(g R)",
+    "a disk sinks by 0.1 radii, or jitters at 0.02 sqrt(g R)",
     _stands,
 )
-EJECTED = Predicate("thrown apart", "radii/s", 0.1, "two disks at rest are given energy", _ejected)
+EJECTED = Predicate(
+    "thrown apart", "radii/s", 0.1, "two disks at rest are pushed apart at a speed", _ejected
+)
 STILL_OVERLAP = Predicate(
     "still overlap", "radii", 0.02, "an overlap is left after a second", _still_overlap
 )
@@ -105,5 +107,5 @@ BURSTS = Predicate(
     "bursts", "of the bound", 1.0, "a disk leaves the box, or flies at 10 radii/s", _bursts
 )
 NOT_AT_REST = Predicate(
-    "not at rest", "sqrt(g R)", 0.05, "what should lie still moves", _not_at_rest
+    "not at rest", "sqrt(g R)", 0.05, "a disk that should be at rest moves", _not_at_rest
 )

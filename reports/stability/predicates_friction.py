@@ -1,5 +1,5 @@
-"""What failing means where there is friction: a disk is slowed, turned or moved in another way
-than Coulomb's law says."""
+"""The predicates for friction: a disk is slowed, turned or moved in another way than by Coulomb's
+law."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from reports.stability.predicates import Predicate, Reading, first_above, truth_of
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
-SETTLED = 0.1  # of a run: by then a disk has been moved out of what the engine takes for an overlap
+SETTLED = 0.1  # of a run; in this time the engine corrects what it takes for an overlap
 
 
 def _friction_off(scenario: Scenario, played: Trajectory) -> Reading:
@@ -21,7 +21,7 @@ def _friction_off(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(off[way, disk]),
         float(true.collisions.t[0]),
-        f"friction changes the {what} of disk {disk} by {share + 0.0:.3g} of what it should",
+        f"friction changes the {what} of disk {disk} by {share + 0.0:.3g} times the right amount",
         disk=int(disk),
     )
 
@@ -82,14 +82,14 @@ FRICTION_OFF = Predicate(
     "friction off",
     "of the impulse",
     0.1,
-    "friction changes a speed or a spin by other than Coulomb's law",
+    "the impulse of friction is not that of Coulomb's law",
     _friction_off,
 )
 ROLLING_OFF = Predicate(
     "rolling off",
     "of the start speed",
     0.01,
-    "a disk that has slid does not roll at its speed of rolling",
+    "a disk does not roll at the right speed after it has slid",
     _rolling_off,
 )
 SLIPS = Predicate(

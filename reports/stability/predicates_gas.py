@@ -1,5 +1,5 @@
-"""What failing means for gases at e = 1: a conserved quantity drifts, or a statistic departs
-from the literature."""
+"""The predicates for gases at e = 1: a conserved quantity drifts, or a statistic differs from the
+literature."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from reports.stability.predicates import Predicate, Reading, first_above, truth_
 from scenarios.model import Array, Scenario, Trajectory
 
 BLOCKS = 10
-# block errors: of ten blocks a mean is farther off by chance in 3 of 1000 readings (Student's t)
+# block errors; with ten blocks the mean is farther off by chance in 3 of 1000 readings (Student's
+# t)
 ERRORS = 4.0
-MOST_OFF = 0.05  # of what the literature says, besides
-RANGES = 5  # of speed, each of which holds as many disks as the others
+MOST_OFF = 0.05  # relative to the literature, in addition
+RANGES = 5  # of speed, with equal numbers of disks
 
 
 def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
@@ -25,7 +26,9 @@ def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     off = np.abs(energy / energy[0] - 1)
     factor = energy[-1] / energy[0]
     at = first_above(played.t, off, ENERGY_DRIFTS.bound)
-    return Reading(float(off.max()), at, f"the energy is {factor:.4g} of what it was", disk=-1)
+    return Reading(
+        float(off.max()), at, f"the energy is {factor:.4g} times that at the start", disk=-1
+    )
 
 
 def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
@@ -37,7 +40,7 @@ def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(off.max()),
         at,
-        f"momentum of {off.max():.3g} of all there is came from nowhere",
+        f"the momentum has changed by {off.max():.3g} of the sum of all momenta",
         disk=-1,
     )
 
@@ -52,14 +55,14 @@ def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
     return Reading(
         float(off.max()),
         first_above(played.t, off, GAS_PARTS.bound),
-        f"disk {worst} is somewhere else",
+        f"disk {worst} is at another position",
         disk=worst,
     )
 
 
 def in_blocks(series: Array) -> Array:
-    """(`BLOCKS`, ...) means of a series (k, ...) over as many stretches of it; the first tenth is
-    left out."""
+    """(`BLOCKS`, ...) means of a series (k, ...) over blocks of equal length, without the first
+    tenth."""
     settled = series[len(series) // 10 :]
     return np.array([block.mean(axis=0) for block in np.array_split(settled, BLOCKS)])
 
@@ -86,7 +89,7 @@ def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
     ought = literature(scenario)
     parts = _speeds(played)
     parts.append(
-        _beside(
+        _deviation(
             "rate",
             counted(played, collisions.j >= 0, np.ones(len(collisions))),
             ought.rate,
@@ -96,13 +99,13 @@ def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
     if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
         exchanged = counted(played, collisions.j < 0, collisions.impulse)
         parts.append(
-            _beside("pressure", exchanged, ought.force, "the pressure of the virial series")
+            _deviation("pressure", exchanged, ought.force, "the pressure of the virial series")
         )
     return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))
 
 
 def literature(scenario: Scenario) -> Gas:
-    """What the literature says of the scenario's gas of equal disks, at its initial temperature."""
+    """The `Gas` of the literature for the scenario's equal disks, at their initial temperature."""
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
     temperature = scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n
@@ -112,27 +115,27 @@ def literature(scenario: Scenario) -> Gas:
 
 
 def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Array:
-    """(`BLOCKS`,) sums of the weights of some collisions, a second, in as many stretches after the
-    first tenth."""
+    """(`BLOCKS`,) sums of the weights of some collisions, per second, in blocks after the first
+    tenth."""
     edges = np.linspace(0.1 * played.t[-1], played.t[-1], BLOCKS + 1)
     return np.histogram(played.collisions.t[which], edges, weights=weights[which])[0] / np.diff(
         edges
     )
 
 
-def _beside(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) -> Reading:
-    """A mean beside what it should be, in `MOST_OFF`, less what chance may do."""
+def _deviation(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) -> Reading:
+    """The relative error of a mean, less `ERRORS` block errors, in units of `MOST_OFF`."""
     ratio, error = float(blocks.mean()) / ought, block_error(blocks) / ought
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
     return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=disk)
 
 
 def _speeds(played: Trajectory) -> list[Reading]:
-    """How many disks have each range of speed, beside Maxwell's law."""
+    """The share of the disks in each range of speed, compared with Maxwell's law."""
     shares = in_blocks(shares_of_speeds(played))
     words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
     return [
-        _beside(
+        _deviation(
             "not Maxwell", shares[:, k], 1 / RANGES, f"the share that {words[k]} fifth should be"
         )
         for k in range(RANGES)
@@ -140,8 +143,8 @@ def _speeds(played: Trajectory) -> list[Reading]:
 
 
 def shares_of_speeds(played: Trajectory) -> Array:
-    """(k, `RANGES`) share of the disks in each of the ranges of speed that should hold equally
-    many.
+    """(k, `RANGES`) share of the disks in each of the ranges of speed that should hold equal
+    shares.
 
     Velocities of n equal disks at a given energy are spread evenly over a sphere in 2n dimensions:
     a disk has more than the share s of the energy with the probability (1 - s)^(n - 1), which is
@@ -157,28 +160,30 @@ def shares_of_speeds(played: Trajectory) -> Array:
 
 
 ENERGY_DRIFTS = Predicate(
-    "energy drifts", "of the energy", 0.01, "energy comes or goes at e = 1", _energy_drifts
+    "energy drifts", "of the energy", 0.01, "the energy changes at e = 1", _energy_drifts
 )
 MOMENTUM_DRIFTS = Predicate(
     "momentum drifts",
     "of all momenta",
     1e-5,
-    "momentum comes from nowhere: more than a hundred roundings in float32",
+    "the momentum changes by more than a hundred roundings of float32",
     _momentum_drifts,
 )
-GAS_PARTS = Predicate("parts", "radii", 1e-3, "the same gas is somewhere else", _gas_parts)
+GAS_PARTS = Predicate(
+    "parts", "radii", 1e-3, "the disks of the two runs are at different positions", _gas_parts
+)
 TEMPERATURES_PART = Predicate(
     "temperatures part",
     "doublings",
     0.5,
-    "one kind of disk is hotter by half a doubling and 4 block errors",
+    "the temperatures of light and heavy disks differ by half a doubling plus 4 block errors",
     _temperatures_part,
 )
 WRONG_GAS = Predicate(
     "wrong gas",
     "of the bound",
     1.0,
-    "Maxwell's speeds, Enskog's rate or the virial series' wall pressure are missed by 5 % and 4"
-    " block errors",
+    "the speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series"
+    " by 5 % plus 4 block errors",
     _wrong_gas,
 )

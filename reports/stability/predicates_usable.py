@@ -1,5 +1,4 @@
-"""Whether a scene as a whole can be used as it was played: the run is complete, and no collision
-is wrong."""
+"""The predicate for whole scenes: the run is complete, plausible, and has no wrong collision."""
 
 from __future__ import annotations
 
@@ -12,8 +11,8 @@ from reports.stability.predicates import Predicate, Reading, first_above
 from scenarios.model import Collisions, Scenario, Trajectory
 from scenarios.no_truth import answered
 
-MOST_RISE, MOST_OVERLAP, MOST_LOST = 0.05, 0.1, 0.5  # of the energy at hand; radii; of a way
-LEAST_WAY = 0.01  # radii between two samples, less of which is rounding
+MOST_RISE, MOST_OVERLAP, MOST_LOST = 0.05, 0.1, 0.5  # of the energy at hand; radii; of a distance
+LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding
 
 
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
@@ -28,7 +27,7 @@ def _usable(scenario: Scenario, played: Trajectory) -> Reading:
         )
         if part is not None
     ]
-    # a disk alone can do nothing wrong
+    # for a single free disk nothing is checked
     return max(parts, key=lambda part: part.value, default=Reading(0.0))
 
 
@@ -41,7 +40,7 @@ def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
     return Reading(
         float(rise.max()) / MOST_RISE,
         at,
-        f"energy grows by {rise.max():.3g} of what is at hand",
+        f"energy grows by {rise.max():.3g} of the energy at hand",
         "energy",
         disk=-1,
     )
@@ -76,11 +75,11 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
 
 
 def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
-    """The largest part of its way that a disk loses in a sample interval although it keeps its
-    velocity, because the last digit of its position is too coarse.
+    """The largest part of its distance that a disk loses in a sample interval although it keeps its
+    velocity, because its position has too few digits.
 
-    Read before the first collision of a disk only: two collisions between two samples may leave
-    it with the velocity it had.
+    Only before the first collision of a disk: two collisions between two samples may restore its
+    velocity.
     """
     scene, v, collisions = scenario.scene, played.velocity, played.collisions
     if len(played) < 2 or scene.wrap is not None:
@@ -93,7 +92,7 @@ def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
     went = np.linalg.norm(np.diff(played.position, axis=0), axis=2) / scene.radius
     lost = np.where(steady & (ought > LEAST_WAY), 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
-    event = f"disk {disk} goes {max(1 - float(lost[k, disk]), 0.0):.3g} of its way"
+    event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
     return Reading(
         float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk)
     )
@@ -140,7 +139,7 @@ USABLE = Predicate(
     "unusable",
     "of the bound",
     1.0,
-    "not finite, through a wall, 5 % more energy, an overlap of a tenth of a radius, half a way"
-    " lost, a wrong collision",
+    "a number is not finite, a disk goes through a wall, energy grows by 5 %, disks overlap by a"
+    " tenth of a radius, a disk moves by half its distance only, or a collision is wrong",
     _usable,
 )

@@ -1,5 +1,5 @@
-"""The table of reasons: why an engine fails where it does, a sentence and its source, and what must
-bear it out."""
+"""The table of reasons: why an engine fails at its limit, in a sentence with its source, and how
+the reason is tested."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Reason(NamedTuple):
     Attributes:
         cases, engines: patterns of names, as of files.
         text: the sentence.
-        source: where it is written down.
+        source: of the sentence.
         predicts: the limit that follows from it.
-        variant: an engine that differs in this thing only, or in little else, and must get farther.
-        mechanism: of `adapters.mechanisms.table`, or `END_OF_STEP`: what it speaks of; an ablation
-            that has the limit must have it.
+        variant: an engine that differs in this alone, or in little else, and must get farther.
+        mechanism: the one that the sentence is about, of `adapters.mechanisms.table`, or
+            `END_OF_STEP`; an ablation that has the limit must have it.
     """
 
     cases: str
@@ -56,20 +56,20 @@ DISCRETE = (
 )
 GEOMETRY = "geometry: (v dt)² = (2R)² - b² between disks, v dt = R at a thin wall"
 EULER_OUT = (
-    "the force is that of a position other than the new one: with x' = x + v dt the oscillator's"
-    " map grows by 1 + (w dt)²"
+    "explicit Euler: x' = x + v dt with the old v, and the force at the old x; the oscillator's map"
+    " grows by 1 + (w dt)²"
 )
-QUARTER = "nothing turns by more than pi/2 a step"
-EIGHTH = "nothing turns by more than pi/4 a step"
+QUARTER = "rotation is limited to pi/2 a step"
+EIGHTH = "rotation is limited to pi/4 a step"
 PLANCK, RAPIER = "planck Settings.maxRotation", "a probe of it: 300 rad/s after 4 steps"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = (
-    "restitution is one sweep after the substeps, so a disk that touches two others in a step loses"
-    " energy"
+    "restitution is applied in one pass after the substeps, so a disk that touches two others in a"
+    " step loses energy"
 )
 NO_CONE = (
-    "restitution is one sweep after the substeps and allows no more friction: that is mu times what"
-    " the substeps have pressed, not mu (1 + e) m v"
+    "restitution is applied in one pass after the substeps, without further friction: its limit is"
+    " mu times the normal impulse of the substeps, not mu (1 + e) m v"
 )
 ROUGH_PRODUCT = "the frictions of the two shapes are multiplied: mu on every shape gives mu²"
 IN_TURN = (
@@ -84,6 +84,14 @@ OF_FRICTION = (
     "slide_to_roll",
     "critical_slope",
     "creep_at_rest",
+)
+GASES = (
+    "dense_gas",
+    "fast_gas",
+    "long_gas",
+    "heavy_in_gas",
+    "equipartition",
+    "thermometer",
 )
 FOUND_LATE = "a collision is detected up to a step late, and lasts about a step too long"
 
@@ -132,7 +140,7 @@ REASONS = (
     Reason(
         "near_miss",
         "box2d_v3:*",
-        "a contact counts from a gap of four slops on, with a normal fixed before the step",
+        "a contact begins at a gap of four slops, with a normal fixed before the step",
         "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE",
         None,
         "box2d_v3:matched",
@@ -141,7 +149,7 @@ REASONS = (
     Reason(
         "near_miss",
         "rapier2d:*",
-        "a contact counts from a gap within the prediction distance on",
+        "a contact begins at a gap of the prediction distance",
         "Rapier IntegrationParameters: normalizedPredictionDistance",
         None,
         "rapier2d:matched",
@@ -166,7 +174,7 @@ REASONS = (
         Reason(
             "bounce_drift",
             engine,
-            "the position correction out of the floor adds height",
+            "the position correction at the floor adds height",
             "Munk2D src/cpSpaceStep.c, collision_bias",
             None,
             "pymunk:matched",
@@ -196,8 +204,8 @@ REASONS = (
     Reason(
         "bounce_drift",
         "reference:exercise",
-        "what gravity adds until a collision is found, up to a step late, is reflected with it: up"
-        " to |v| dt of height",
+        "a collision is found up to a step late, and the speed that gravity adds until then is"
+        " reflected, too: up to |v| dt of height",
         "order of operations in a step: gravity, flight, then restitution",
         0.005,
         "",
@@ -206,7 +214,7 @@ REASONS = (
     Reason(
         "bounce_drift",
         "box2d_v3:shipped",
-        "the soft contact takes about |v| dt of height a bounce",
+        "the soft contact loses about |v| dt of height a bounce",
         "Box2D 3.1 src/contact_solver.c, soft step",
         None,
         "box2d_v3:matched",
@@ -215,7 +223,7 @@ REASONS = (
     Reason(
         "bounce_drift",
         "box2d_v3:matched*",
-        "the soft contact takes up to |v| dt / substeps of height a bounce",
+        "the soft contact loses up to |v| dt / substeps of height a bounce",
         "Box2D 3.1 src/contact_solver.c, soft step",
         None,
         "box2d_v3:matched+16_substeps",
@@ -224,7 +232,7 @@ REASONS = (
     Reason(
         "scale_up",
         "box2d:shipped",
-        "nothing moves by more than 2 units a step: the velocity is cut",
+        "displacement is limited to 2 units a step: the velocity is reduced",
         B2_SETTINGS + "b2_maxTranslation",
         30.0,
         "box2d:matched",
@@ -233,7 +241,7 @@ REASONS = (
     Reason(
         "scale_up",
         "box2d_v3:shipped",
-        "nothing is faster than 400 m/s: the velocity is cut",
+        "speed is limited to 400 m/s: the velocity is reduced",
         B2_TYPES + "maximumLinearSpeed",
         100.0,
         "box2d_v3:matched",
@@ -241,7 +249,8 @@ REASONS = (
     Reason(
         "far_from_origin",
         "box2d*",
-        "positions are float32: beyond 4096 m a step of 1/240 m is 9 last places, not 8.5",
+        "positions are float32: beyond 4096 m a displacement of 1/240 m is 9 units in the last"
+        " place, not 8.5",
         "IEEE 754",
         4096.0,
         "",
@@ -255,14 +264,14 @@ REASONS = (
     Reason(
         "spin",
         "box2d_v3:shipped",
-        "nothing turns by more than pi/4 a step, and a substep turns by atan(w h) only",
+        "rotation is limited to pi/4 a step, and a substep rotates by atan(w h) only",
         "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
         4 * atan(pi / 16) / 0.98,
     ),
     Reason(
         "spin",
         "box2d_v3:matched*",
-        "nothing turns by more than pi/4 a step; refused",
+        "rotation is limited to pi/4 a step; refused",
         "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
         pi / 4,
     ),
@@ -276,7 +285,7 @@ REASONS = (
     Reason(
         "stiff_force",
         "box2d:matched",
-        "the swing reaches 2 units of length a step, where the engine cuts it; refused",
+        "the swing reaches 2 units a step, the engine's limit of displacement; refused",
         B2_SETTINGS + "b2_maxTranslation",
     ),
     *(
@@ -300,11 +309,12 @@ REASONS = (
         )
         for engine in ("event_driven:*", "reference:ordered")
     ),
-    # What every exact method refuses.
+    # Refused by every exact method.
     Reason(
         "*",
         "event_driven:*",
-        "it refuses what has no single continuation: overlaps, and collisions that accumulate",
+        "it refuses motions without a single continuation: overlaps, and collisions that"
+        " accumulate",
         "adapters/event_driven/events.py",
     ),
     # Friction.
@@ -356,7 +366,7 @@ REASONS = (
             ("planck:shipped", pi / 2, QUARTER, PLANCK),
             ("rapier2d:*", pi / 4, EIGHTH, RAPIER),
         )
-        # the disk comes to roll at 2/3 of its speed
+        # the disk rolls at 2/3 of its initial speed
         for case, limit in (("spin_in_bounce", most), ("slide_to_roll", 1.5 * most))
     ),
     Reason("creep_at_rest", "reference:*", IN_TURN, "reference_impl/coulomb.py"),
@@ -365,7 +375,7 @@ REASONS = (
         Reason(
             case,
             "reference:ordered",
-            "the collisions of a step are bounded, and what is left shows as overlap",
+            "the number of collisions a step is limited, and unresolved ones show as overlap",
             "reference_impl/ordered.py",
         )
         for case in ("column", "heavy_on_light", "pile_comes_to_rest")
@@ -373,7 +383,7 @@ REASONS = (
     Reason(
         "dt_*",
         "reference:ordered",
-        "the collisions of a step are bounded, and what is left shows as overlap",
+        "the number of collisions a step is limited, and unresolved ones show as overlap",
         "reference_impl/ordered.py",
     ),
     Reason(
@@ -415,14 +425,14 @@ REASONS = (
     Reason(
         "heavy_on_light",
         "*",
-        "sequential impulses converge as slowly as the masses are unequal",
+        "sequential impulses converge slowly if the masses are unequal",
         "Catto, Iterative dynamics with temporal coherence, 2005",
         mechanism=IMPULSE,
     ),
     Reason(
         "column",
         "*",
-        "every contact may keep its slop, and soft ones give way as the load grows",
+        "every contact may keep an overlap of a slop, and soft contacts yield as the load grows",
         "Box2D, b2_linearSlop; contact softness in 3.1",
         mechanism=POSITION_CORRECTION,
     ),
@@ -454,14 +464,14 @@ REASONS = (
     Reason(
         "overfull_box",
         "*",
-        "disks are moved beyond a wall, and from there on outwards",
+        "position correction moves disks beyond a wall, and from there further outwards",
         "walls have two sides",
         mechanism=POSITION_CORRECTION,
     ),
     Reason(
         "*_comes_to_rest",
         "box2d:matched",
-        "without a threshold a lying disk chatters at e g dt / (1 - e)",
+        "without a threshold a resting disk chatters at e g dt / (1 - e)",
         "fixed point of v' = e (v + g dt)",
         None,
         "box2d:shipped",
@@ -475,7 +485,7 @@ REASONS = (
     Reason(
         "*_comes_to_rest",
         "reference:*",
-        "gravity is added before the bounce, so a lying disk chatters",
+        "gravity is added before the bounce, so a resting disk chatters",
         "fixed point of v' = e (v + g dt)",
     ),
     # Gases.
@@ -489,14 +499,7 @@ REASONS = (
             f"{box}:matched",
             RESTITUTION,
         )
-        for case in (
-            "dense_gas",
-            "fast_gas",
-            "long_gas",
-            "heavy_in_gas",
-            "equipartition",
-            "thermometer",
-        )
+        for case in GASES
         for box, source in THRESHOLDS.items()
     ),
     *(
@@ -507,14 +510,7 @@ REASONS = (
             "Box2D 3.1 src/contact_solver.c: b2ApplyRestitutionTask",
             mechanism=IMPULSE,
         )
-        for case in (
-            "dense_gas",
-            "fast_gas",
-            "long_gas",
-            "heavy_in_gas",
-            "equipartition",
-            "thermometer",
-        )
+        for case in GASES
     ),
     Reason(
         "dense_gas",
@@ -540,14 +536,14 @@ REASONS = (
     Reason(
         "long_wrapped_gas",
         "box2d*",
-        "impulses are rounded to float32, and what is left over adds up",
+        "impulses are rounded to float32, and the rounding errors add up",
         "IEEE 754",
         mechanism=DIGITS,
     ),
     Reason(
         "*_gas",
         "box2d:matched",
-        "separating contacts aim at 0 and closing ones at e v in one solve",
+        "one solve has the target velocity 0 for separating contacts and e v for closing ones",
         "Box2D 2.3 Dynamics/Contacts/b2ContactSolver.cpp",
         mechanism=IMPULSE,
     ),
@@ -574,7 +570,7 @@ REASONS = (
     Reason(
         "insertion_order",
         "*",
-        "sums and contacts are taken in the order of insertion, and chaos magnifies it",
+        "sums and contacts follow the order of insertion, and chaos magnifies the difference",
         "Lyapunov exponent of the gas",
     ),
     Reason(

@@ -26,7 +26,7 @@ from reports.run.made import digest_of, writing
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.stability.cases import CASES
-from reports.stability.explain import explained, tried_out
+from reports.stability.explain import explained, with_replays
 from reports.stability.failures import keep_failure
 from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, engines_of
 from reports.stability.lines import KINDS, impossible, unknown_engine
@@ -134,7 +134,7 @@ def found_limit(task: Task, folder: Path) -> Limit:
     """Search, and save the first failing run next to the limit."""
     started = process_time()
     search = Search(case_named(task.name), task.engine, FORMS[task.form])
-    limit = tried_out(search, replace(search.limit(), case=task.name))
+    limit = with_replays(search, replace(search.limit(), case=task.name))
     keep_failure(search, limit, folder)
     return replace(limit, seconds=process_time() - started)
 

@@ -42,7 +42,7 @@ class Search:
         first = next(
             (k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan)
         )
-        # the few runs on the way did not show it
+        # the scan plays few runs at a value; all runs there may show a failure
         while first and not self.trial(scan[first - 1]).works:
             first -= 1
         works = [True] * first + [self.trial(value).works for value in scan[first:]]

@@ -1,8 +1,8 @@
-"""Which law an engine follows when touching disks are hit, and how large the gaps must be until
-the question disappears.
+"""Which law an engine follows in a collision with touching disks, and how large gaps must be until
+the laws agree.
 
-The law is named, never scored: where disks touch, the limit of small gaps does not decide
-between laws; where there are gaps, the exact answer does.
+The law is named, never scored: for touching disks the limit of small gaps does not decide between
+the laws; with gaps the exact answer does.
 """
 
 from __future__ import annotations
@@ -20,13 +20,11 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
 from scenarios.truth.exact import with_oracle
 
-# of the incoming speed: an engine whose velocities are farther from every law follows none of them
+# of the incoming speed; an engine whose velocities differ by more from every law follows none
 NEAR = 0.02
-SPEED, DT = (
-    8.0,
-    1 / 1024,
-)  # a radius in 32 steps: where a collision is found late, its normal is off; above any threshold
-AFTER = 24  # steps after the collision: an engine may take a step a contact
+# m/s, s: a radius in 32 steps, as a late detection tilts the normal; above any threshold
+SPEED, DT = 8.0, 1 / 1024
+AFTER = 24  # steps after the collision: an engine may need a step for each contact
 PAIRS, AT_ONCE = "pair after pair", "all contacts at once"
 
 
@@ -54,12 +52,11 @@ class Touching:
 
 
 class AtGap(NamedTuple):
-    """What an engine did at a gap in radii: the law it is nearest to, how far it is, and what it
-    made of the start's.
+    """The result of an engine at one gap, in radii.
 
-    `law` is "none" if it is farther than `NEAR` from every one; momentum: by how much it changed,
-    of all there is;
-    energy: what is left of it; velocity: of the disks, over the incoming speed.
+    law: the nearest one, "none" if all are farther off than `NEAR`; off: the distance to it.
+    momentum: its change, over the initial momentum. energy: over the initial energy. velocity: of
+    the disks, over the incoming speed.
     """
 
     gap: float
@@ -81,7 +78,7 @@ class LawOf:
 
     @property
     def law(self) -> str:
-        """That it follows where the disks touch."""
+        """The law that the engine follows for touching disks."""
         return self.gaps[0].law if self.gaps else self.status
 
     @staticmethod
@@ -116,8 +113,7 @@ def cradle(n: int) -> Touching:
         row,
         apart,
         {PAIRS: [last], AT_ONCE: [together]},
-        "equal masses swap velocities pair by pair; or e = 1 is asked of every contact in one"
-        " solve",
+        "equal masses swap velocities pair by pair; or e = 1 holds for every contact in one solve",
     )
 
 
@@ -134,7 +130,7 @@ TOUCHING = {
             PAIRS: [BREAK, MIRRORED],
             AT_ONCE: [np.array([[-1 / 5, 0], [3 / 5, sqrt(3) / 5], [3 / 5, -sqrt(3) / 5]])],
         },
-        "the two limits of small gaps; or e = 1 is asked of every contact in one solve",
+        "the two limits of small gaps; or e = 1 holds for every contact in one solve",
     ),
 }
 

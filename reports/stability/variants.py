@@ -70,8 +70,8 @@ VARIANTS: dict[str, Variant] = {
 
 @contextmanager
 def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
-    """Within it engines' own files, `PATH:own`, and rows of `FETCHED` are put to the test in this
-    process, as the rows of `ENGINES` are."""
+    """In this context engines' own files, `PATH:own`, and rows of `FETCHED` are tested in this
+    process like the rows of `ENGINES`."""
     ENGINES.update(rows)
     VARIANTS.update({name: Variant(name, row.make) for name, row in rows.items()})
     try:

@@ -1,5 +1,5 @@
-"""Truth records kept on disk under a hash of what was asked, in the user's cache folder; never
-needed, only faster."""
+"""A cache of truth records on disk, in the user's cache folder. It only saves time: every record
+can be computed again."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def folder() -> Path | None:
 
 
 def key_of(scenario: Scenario, certifying: bool) -> str:
-    """A hash over all that decides a record: scene, thrusts, duration, the oracle's source and what
-    it can prove."""
+    """A hash of everything a record depends on: scene, thrusts, duration, the oracle's source, and
+    whether it works with intervals (`certifying`)."""
     scene, hashed = scenario.scene, hashlib.sha256()
     parts = [
         scene.position,
@@ -56,7 +56,7 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
         scenario.duration,
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
     ]
-    if scene.friction:  # without it nothing asks how a disk turns
+    if scene.friction:  # without friction, rotation does not affect the motion
         torques = [p.torque for p in scenario.thrusts]
         parts += [scene.friction, scene.inertia, scene.angular_velocity, torques]
     hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
@@ -67,22 +67,22 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
 
 @cache
 def source_hash(folder: Path = HERE) -> str:
-    """A hash over the source in this folder, so that a changed oracle never answers with what it
-    said before."""
+    """A hash of the source in this folder, so that records of another version of the oracle are
+    never used."""
     files = sorted(folder.rglob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def look_up(key: str) -> dict[str, Any] | None:
-    """The fields of the record kept under `key`; None where there is none that can be read in
-    full."""
+    """The fields of the record cached under `key`; None if there is none, or if it cannot be read
+    in full."""
     where = folder()
     return None if where is None else unpacked(where / f"{key}.npz")
 
 
-# What reading a torn or foreign archive raises: it is as good as none. One bit makes an unknown
-# compression (NotImplementedError), an encrypted file (RuntimeError), or an array larger than any
-# memory.
+# Raised when an archive is damaged or not one of ours; the record then counts as missing. One wrong
+# bit can look like an unknown compression (NotImplementedError), an encrypted file (RuntimeError),
+# or an array larger than the memory (MemoryError).
 UNREADABLE = (
     OSError,
     ValueError,
@@ -107,22 +107,22 @@ def packed(fields: dict[str, Any]) -> bytes:
 
 
 def unpacked(path: Path) -> dict[str, Any] | None:
-    """The fields of the record in a file that holds what `packed` gave; None if it cannot be read
-    in full."""
+    """The fields of the record in a file written from `packed` bytes; None if it cannot be read in
+    full."""
     try:
         with opened(path) as file, np.load(file, allow_pickle=False) as saved:
             arrays = {name: frozen(saved[name]) for name in ARRAYS}
             numbers = json.loads(str(saved["numbers"]))
     except UNREADABLE:
         return None
-    fits = all(arrays[name].shape[1:] == (width,) for name, width in ARRAYS.items()) and is_said(
-        numbers
-    )
+    fits = all(
+        arrays[name].shape[1:] == (width,) for name, width in ARRAYS.items()
+    ) and has_valid_types(numbers)
     return arrays | numbers | {"remains": tuple(numbers["remains"])} if fits else None
 
 
-def is_said(numbers: Any) -> bool:
-    """Whether they are what `NUMBERS` are: anybody may have edited the file."""
+def has_valid_types(numbers: Any) -> bool:
+    """Whether `numbers` has the names and types of `NUMBERS`: the file may have been edited."""
     if not isinstance(numbers, dict) or set(numbers) != set(NUMBERS):
         return False
     of = {type(numbers[name]) for name in ("horizon", "error_bound", "float64_horizon")}
@@ -137,8 +137,8 @@ def is_said(numbers: Any) -> bool:
 
 
 def keep(key: str, fields: dict[str, Any]) -> bool:
-    """Write the fields of a record under `key`, whole or not at all; False where the folder cannot
-    be written to."""
+    """Write the fields of a record under `key`, all or nothing; False if the folder cannot be
+    written to."""
     where = folder()
     if where is None:
         return False
@@ -148,8 +148,8 @@ def keep(key: str, fields: dict[str, Any]) -> bool:
         handle, temporary = tempfile.mkstemp(dir=where, suffix=".part")
         with os.fdopen(handle, "wb") as file:
             file.write(packed(fields))
-        # Another process may write the same record at the same time: the last rename wins, both are
-        # whole.
+        # Another process may write the same record at the same time: the last rename wins, and both
+        # files are complete.
         os.replace(temporary, where / f"{key}.npz")
     except OSError:
         if temporary:

@@ -35,9 +35,8 @@ def answer(
     """An exact motion as the `Trajectory` of `scene` at the times t (k,) s, cut at `horizon` s.
 
     motion: position and velocity (k, n, 2) m, m/s. turning: angle and angular velocity (k, n) rad,
-    rad/s; left out where nothing turns a disk: it keeps its spin. collisions: those after the last
-    sample are dropped.
-    reason: why it is valid no longer.
+    rad/s; default: every disk keeps its spin. collisions: those after the last sample are dropped.
+    reason: why the answer ends at the horizon.
     """
     angle, angular_velocity = turning or flight(t[:, None], scene.angle, scene.angular_velocity)
     kept = t <= horizon
@@ -110,15 +109,16 @@ def geometric(ratio: float, count: Array) -> Array:
 
 
 def bouncing(height: float, gravity: float, restitution: float, until: float) -> Legs:
-    """The gap m under a ball dropped from rest over a floor, to rest (e < 1) or `until` s (e = 1).
+    """The gap, m, under a ball dropped from rest: until it rests (e < 1), or to `until` s (e = 1).
 
     Bounce k leaves with u e^k at t_k = t_1 (1 + 2 e (1 - e^(k-1)) / (1 - e)), t_1 = sqrt(2 h / g),
     u = sqrt(2 g h); they accumulate at t_1 (1 + e) / (1 - e), after which the ball lies still
-    (any textbook of mechanics, under "bouncing ball"). The last leg is the rest. 0 < e <= 1.
+    (any textbook of mechanics, under "bouncing ball"). On the last leg the ball is at
+    rest. 0 < e <= 1.
     """
     e, fall, speed = restitution, np.sqrt(2 * height / gravity), np.sqrt(2 * gravity * height)
-    # For e < 1 the bounces left out last 1e-14 of the fall each and are lower than a float can
-    # tell.
+    # For e < 1 the bounces left out last less than 1e-14 of the fall each: float64 cannot resolve
+    # their height.
     count = int(until / (2 * fall)) + 2 if e == 1 else int(np.log(1e-14) / np.log(e))
     k = np.arange(1.0, count + 1)
     rest = np.inf if e == 1 else fall * (1 + e) / (1 - e)
@@ -134,8 +134,7 @@ def bouncing(height: float, gravity: float, restitution: float, until: float) ->
 def to_and_fro(
     place: float, velocity: float, length: float, restitution: float, until: float
 ) -> Legs:
-    """A point between 0 and `length` m that flies freely and is thrown back at both ends, up to
-    `until` s.
+    """A free point that bounces to and fro between walls at 0 and `length` m, up to `until` s.
 
     Leg k has speed v e^k and lasts D / (v e^k) (elementary; e = 1: the triangle wave). 0 < e <= 1,
     v != 0.
@@ -157,7 +156,7 @@ def to_and_fro(
 def pair(
     position: Array, velocity: Array, radius: Array, mass: Array, restitution: float
 ) -> tuple[Legs, Array]:
-    """Two disks that fly freely and collision once or never: their legs (s, 2, 2) and the impulses
+    """Two disks that fly freely and collide once or never: their legs (s, 2, 2) and the impulses
     (s - 1,) N s.
 
     position, velocity (2, 2) m, m/s; radius, mass (2,) m, kg. Contact at |r + u t| = R = r_1 + r_2:
@@ -185,7 +184,8 @@ def pair(
 
 
 def offset_growth(free_path: float, reach: float) -> float:
-    """How much a distance from the centre line grows per bounce between two static disks.
+    """The factor by which a distance from the centre line grows per bounce between two static
+    disks.
 
     q + sqrt(q^2 - 1), q = 1 + s / R: s m from surface to surface, R m the sum of the two radii that
     meet (the eigenvalue of the two-disk orbit; Gaspard & Rice, J. Chem. Phys. 90, 2225, 1989).

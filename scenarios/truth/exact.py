@@ -19,26 +19,28 @@ from scenarios.truth.oracle.path import Path
 from scenarios.truth.oracle.work import Clock, Work
 from scenarios.truth.record import TruthRecord, record_of
 
-FEWEST_BITS, MOST_BITS = 128, 8192  # half of them are the tie: float64 must be distinguished
+FEWEST_BITS, MOST_BITS = 128, 8192  # the tie is 2^-(bits / 2), below the eps of float64
 LEAST_GAIN = 1.05  # 1.5 times the bits must reach 1.05 times as far, else more bits do not help
-# times as many bits as the rate so far asks for, and so many to be left for the accuracy
+# a factor on the bits predicted from the loss so far, and the bits to be left for the accuracy
 SPARE, LEFT = 1.3, 64
 MOST_DISKS = 200
-# steps of the event loop for one attempt, some twenty seconds; few attempts get so far
+# steps of the event loop for one attempt, about twenty seconds; few attempts need so many
 WORK = 40_000
 HEAVY = 4096  # bits at which a step takes twice the time of one with few bits
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
-# of the time that is left for both of two precisions: the finer one takes a little longer
+# share of the remaining time for the coarser of two precisions; the finer one takes a little longer
 COARSE = 0.45
-# radii of the smallest disk, and s; two precisions that differ by more have diverged
+# radii of the smallest disk, and s; two precisions that differ by more than this have diverged
 ACCURACY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class OracleTruth:
-    """The truth of a scenario by the oracle; nothing is computed before it is called, nor what is
-    `known` already."""
+    """The truth of a scenario, computed by the oracle at the first call.
+
+    known: a record to use instead of computing one.
+    """
 
     scenario: Scenario
     known: TruthRecord | None = None
@@ -61,8 +63,8 @@ class OracleTruth:
         return record.sampled(one.scene, one.thrusts, t)
 
     def record(self, clock: Clock | None = None) -> TruthRecord:
-        """The record: from the cache, or computed and put there, unless a `clock` cut it off.
-        Raises `NoTruth`."""
+        """The record, from the cache or computed. A computed one is cached unless the time of
+        `clock` ran out. Raises `NoTruth`."""
         if self.known is not None:
             return self.known
         key = key_of(self.scenario, has_balls())
@@ -70,7 +72,7 @@ class OracleTruth:
         if found is None:
             clock = clock or Clock()
             found = vars(computed(self.scenario, None, clock))
-            if not clock.struck:
+            if not clock.expired:
                 keep(key, found)
         return TruthRecord(**found)
 
@@ -81,8 +83,7 @@ def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
 
 
 def answered_by(scenario: Scenario) -> str:
-    """The cheapest model that answers it and is no engine, which the harness takes for its truth:
-    one of the three."""
+    """What gives the truth of a scenario: `CLOSED_FORM`, `EVENT_DRIVEN` or `NOTHING`."""
     if scenario.truth is None:
         return NOTHING
     return EVENT_DRIVEN if isinstance(scenario.truth, OracleTruth) else CLOSED_FORM
@@ -96,11 +97,11 @@ def with_oracle(scenario: Scenario) -> Scenario:
 def computed(
     scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: Clock | None = None
 ) -> TruthRecord:
-    """The record of a scenario: proven by balls where they are installed and can, else the same at
-    two precisions.
+    """The record of a scenario: proven by interval arithmetic where that is installed and decides
+    every comparison, else computed at two precisions that agree.
 
-    kind: numbers to compute it in, at two precisions, whatever is installed.
-    clock: when it is over, the record is that of what was found until then.
+    kind: the numbers for two precisions; if given, no interval arithmetic.
+    clock: when its time runs out, the record ends where the computation is then.
 
     Raises:
         NoTruth: the scene has more than the oracle can do, or bodies overlap at the start.
@@ -114,9 +115,10 @@ def computed(
         raise NoTruth(fault)
     if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
         raise NoTruth(
-            "a thrust that turns with its disk makes paths whose contacts no polynomial gives"
+            "a thrust that turns with its disk has no exact answer: its contact times are not roots"
+            " of polynomials"
         )
-    # Without friction nothing asks how a disk turns.
+    # Without friction a torque does not affect the motion.
     forced = [p for p in thrusts if p.force.any() or (scene.friction and p.torque)]
     clock = clock or Clock()
     record = certified(scenario, forced, clock) if kind is None and has_balls() else None
@@ -124,26 +126,28 @@ def computed(
 
 
 def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
-    """The record by interval arithmetic, which proves every comparison; None where no precision
-    decides one.
+    """The record by interval arithmetic, which proves every comparison; None where a comparison
+    stays undecided at every precision.
 
-    How far the first bits reach shows how many are needed for all: a motion loses them at a steady
-    rate. When the `clock` is over it is that of the attempt which got farthest.
+    A motion loses bits at a steady rate: the time reached so far predicts the bits that the whole
+    duration needs. When the time of `clock` runs out, the attempt that got farthest is returned.
     """
     bits, before, until, accuracy = FEWEST_BITS, 0.0, scenario.duration, accuracy_of(scenario)
     attempts: list[tuple[Path, int]] = []
     while bits <= MOST_BITS:
         try:
-            path = trace(scenario.scene, forced, until, balls(bits), Work(steps(bits), clock))
+            path = trace(
+                scenario.scene, forced, until, balls(bits), Work(allowed_steps(bits), clock)
+            )
             error, reached = spread(path, until), until
-            if error < accuracy and not clock.struck:
+            if error < accuracy and not clock.expired:
                 return record_of(scenario, path, error, bits, "certified")
         except Undecided as doubt:
             path, reached = replace(doubt.path, end=doubt.t), doubt.t
         attempts.append((path, bits))
-        if clock.struck:
+        if clock.expired:
             return farthest(scenario, attempts, clock)
-        # Bits help against chaos, not where two things are equal.
+        # More bits help against chaos, but do not decide whether two numbers are equal.
         if reached <= before * LEAST_GAIN and before < until:
             return None
         needed = LEFT + ceil(SPARE * bits * until / max(reached, until * bits / MOST_BITS))
@@ -151,14 +155,14 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> Tru
     return None
 
 
-def steps(bits: int) -> int:
-    """How many steps of the event loop in numbers of so many bits are the work of one attempt."""
+def allowed_steps(bits: int) -> int:
+    """The steps of the event loop that one attempt may take in numbers of `bits` bits."""
     return int(WORK / (1 + bits / HEAVY))
 
 
 def farthest(scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: Clock) -> TruthRecord:
-    """The record of the attempt that got farthest, as far as it is exact; each is a path and the
-    bits it is in."""
+    """The record of the attempt that got farthest, up to where it is exact; an attempt is a path
+    and its bits."""
     found = [
         (exact_until(path, scenario.duration, accuracy_of(scenario)), path, bits)
         for path, bits in attempts
@@ -177,8 +181,8 @@ def farthest(scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: Cl
 
 
 def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float]:
-    """Up to when the spread of a path is less than `accuracy` m, to the last place of float64, and
-    the spread then."""
+    """The time, s, up to which the spread of a path is below `accuracy` m, to the last place of
+    float64, and the spread, m, at that time."""
     table, end = widths(path), min(path.end, until)
     if (most := widest(table, end)) < accuracy:
         return end, most
@@ -190,13 +194,13 @@ def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float
 
 
 def spread(path: Path, until: float) -> float:
-    """m, how far the right motion may be from the middle of the balls, at worst."""
+    """m, the largest possible distance of the exact motion from the midpoints of the balls."""
     return widest(widths(path), min(path.end, until))
 
 
 def widths(path: Path) -> Array:
-    """(l, 3) of every leg: when it begins, s, how wide its balls are then, m, and by how much they
-    widen, m/s; where there is friction its angle counts, too, 1 rad as 1 m."""
+    """(l, 3) for each leg: its start, s, the radius of its balls then, m, and the rate at which it
+    grows, m/s; with friction angles count as well, 1 rad as 1 m."""
     rows = []
     for leg in (leg for legs in path.legs for leg in legs):
         angle, spin = leg.turn[:2] if leg.turn else (leg.x, leg.vx)
@@ -214,7 +218,7 @@ def widths(path: Path) -> Array:
 
 
 def widest(table: Array, until: float) -> float:
-    """m, the widest that the legs of a table of `widths` get up to `until` s."""
+    """m, the largest radius of a ball up to `until` s, from a table of `widths`."""
     begun = table[table[:, 0] <= until]
     return float((begun[:, 1] + begun[:, 2] * (until - begun[:, 0])).max())
 
@@ -222,41 +226,41 @@ def widest(table: Array, until: float) -> float:
 def two_precisions(
     scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
 ) -> TruthRecord:
-    """The record in numbers of one kind, up to where twice as many bits say the same, or the
-    `clock` is over."""
+    """The record in numbers of one kind, up to where a computation with twice as many bits agrees,
+    or until the time of `clock` runs out."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse = trace(scene, forced, until, kind(bits), Work(steps(bits), clock, COARSE))
-        fine = trace(scene, forced, until, kind(2 * bits), Work(steps(2 * bits), clock))
+        coarse = trace(scene, forced, until, kind(bits), Work(allowed_steps(bits), clock, COARSE))
+        fine = trace(scene, forced, until, kind(2 * bits), Work(allowed_steps(2 * bits), clock))
         diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
-        if clock.struck and coarse.end < fine.end:
+        if clock.expired and coarse.end < fine.end:
             fine = replace(fine, end=end, reason=coarse.reason, disks=[], outcomes=[], named=[])
         if diverged < end:
-            reason = f"the digits of {2 * bits} bits are used up at t = {diverged:.9g} s"
+            reason = f"numbers of {2 * bits} bits have used up their digits at t = {diverged:.9g} s"
             fine = replace(fine, end=diverged, reason=reason, disks=[], outcomes=[])
         attempts.append((fine, error, 2 * bits))
-        if diverged >= end or 2 * bits >= MOST_BITS or clock.struck:
+        if diverged >= end or 2 * bits >= MOST_BITS or clock.expired:
             break
         needed = ceil(SPARE * bits * until / max(diverged, until * bits / MOST_BITS))
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
     best = (
         max(attempts, key=lambda attempt: min(attempt[0].end, until))
-        if clock.struck
+        if clock.expired
         else attempts[-1]
     )
     return record_of(scenario, *best, "two-precision")
 
 
 def _out_of_scale(scenario: Scenario) -> str:
-    """What is too small or too large for `Numbers.tie`, which takes numbers to be of the order of
-    1; or ""."""
+    """A sentence on a quantity that is too small or too large for `Numbers.tie`, which assumes
+    numbers of the order of 1; "" if there is none."""
     scene = scenario.scene
     if not (scene.radius >= 1 / LARGEST).all():
         return (
             f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a"
-            " collision from a touch"
+            " collision from a contact without approach"
         )
     sizes = {
         "radius": scene.radius,
@@ -287,8 +291,8 @@ def accuracy_of(scenario: Scenario) -> float:
 def difference(
     coarse: Path, fine: Path, until: float, k: Numbers, accuracy: float
 ) -> tuple[float, float]:
-    """When the two part, s, or inf: the first event in which they differ by `accuracy` m; the error
-    until then, m."""
+    """The time, s, at which two paths diverge, or inf: the first event at which they differ by
+    `accuracy` m; and the largest difference before it, m."""
     diverged, errors = np.inf, [(0.0, 0.0)]
     end = min(coarse.end, fine.end, until)
     with k.precise():
@@ -307,7 +311,7 @@ def difference(
 
 
 def _apart(one: Leg, other: Leg, left: float) -> float:
-    """m between two flights at their start and, at worst, `left` s later."""
+    """m, the largest distance between two flights from their start to `left` s later."""
     place = max(abs(float(one.x - other.x)), abs(float(one.y - other.y)))
     speed = max(abs(float(one.vx - other.vx)), abs(float(one.vy - other.vy)))
     if one.turn is not None and other.turn is not None:

@@ -1,25 +1,25 @@
-"""How long a float64 solver can follow an exact motion: a rounding of the start, carried along to
-first order.
+"""How long a float64 solver can follow an exact motion: the growth of a rounding error of the
+initial state, to first order.
 
-Motions from starts a rounding apart diverge exponentially; after that a distance to the exact
-answer says nothing about a solver. The horizon is when that happens. It comes from the oracle's own
-path: every number of the start may be off by 2^-52 of the largest, each on its own, and what
-becomes of it is the derivative of flight and of every collision (Dellago, Posch & Hoover, Phys.
-Rev. E 53, 1485, 1996; with falling disks and rest the same for parabolas and for motion along a
-wall). The derivative is wanted to a few per cent, so it is float64 along a path in many digits. A
-near miss by less than a rounding has no derivative and is not seen.
+Motions whose initial states differ by a rounding error diverge exponentially. Once they have
+diverged, a distance to the exact answer tells nothing about a solver: that time is the horizon. It
+is computed along the path of the oracle. Each number of the initial state has an independent error
+of 2^-52 of the largest one, and its effect is propagated by the derivative of the flights and of
+every collision (Dellago, Posch & Hoover, Phys. Rev. E 53, 1485, 1996; here also for parabolas and
+for motion along a wall). The derivative is needed to a few per cent only, so it is computed in
+float64. A near miss by less than a rounding error has no derivative and is not detected.
 
-The limit is set on the standard deviation over roundings of all numbers at once, each on its own.
-One rounded start strays by a normal number times that, less than it in two of three samples:
-falling_box ends at 0.409 s, and single samples pass the limit from 0.395 to 0.47 s, most of them at
-0.43 to 0.45 s.
+The limit applies to the standard deviation over independent errors of all numbers. The deviation of
+one rounded state is normally distributed: it is below the standard deviation in two of three
+samples. The horizon of falling_box is 0.409 s; single samples pass the limit at 0.395 to 0.47 s,
+most of them at 0.43 to 0.45 s.
 
-The rounding is that of the largest coordinate in the scene, also where that belongs to a disk that
-the others never
-meet: ten times as far, and the horizon of the rest is ln 10 growth times shorter (2.67 s become
-2.39 s for a gas of eight disks as a row at rest that none of them meets is put at 30 m instead of 3
-m). So a horizon is too short there rather than too long. Each number's own rounding would not do
-instead: an engine rounds what it takes from its partner and from its walls, too.
+The rounding error is relative to the largest coordinate in the scene, even if that belongs to a
+disk that the others never meet. At ten times the distance the horizon of the other disks is shorter
+by ln 10 growth times: for a gas of eight disks, 2.67 s become 2.39 s when a row of disks at rest,
+which none of them meets, is moved from 3 m to 30 m. There the horizon is too short rather than too
+long. An error relative to each number itself would be too small: an engine also rounds the
+coordinates of the partners and walls of a disk.
 """
 
 from __future__ import annotations
@@ -34,37 +34,35 @@ from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
 DIVERGED = 1e-9
-"""Of a disk's radius: the standard deviation of its position from which on it counts as
-diverged."""
-# of those that die out so many are looked at; what comes later lasts less than float64 can tell
+"""In radii of a disk: if the standard deviation of its position is larger, it has diverged."""
+# this many bounces of a series that dies out are computed; float64 cannot resolve later ones
 BOUNCES = 64
 
 
 def float64_horizon(scenario: Scenario, path: Path) -> float:
-    """s, until when starts a rounding apart stay together along `path`, see `DIVERGED`; inf: as far
-    as the path goes.
+    """s, the time at which the first disk diverges along `path`, see `DIVERGED`; inf: none does.
 
-    Contacts that touch are kept touching: what lies on a wall, or on another disk, has no freedom
-    across it.
+    Contacts that last stay closed: a disk that rests on a wall, or on another disk, has no
+    deviation along the normal.
     """
-    nearby = Nearby(scenario, path)
+    tangents = TangentVectors(scenario, path)
     end = min(path.end, scenario.duration)
     for event in path.events:
-        if float(event.t) >= min(end, nearby.diverged):
+        if float(event.t) >= min(end, tangents.diverged):
             break
         if float(event.impulse):  # else a contact begins
-            nearby.collide(event)
-    for i in nearby.moving:
-        nearby.carry(i, min(end, nearby.diverged))
-    return nearby.diverged
+            tangents.collide(event)
+    for i in tangents.moving:
+        tangents.carry(i, min(end, tangents.diverged))
+    return tangents.diverged
 
 
 def roundings(scene: Scene) -> tuple[Array, Array, Array]:
-    """Two (n, d, 2) and one (n, d): what 2^-52 of the largest coordinate, speed or spin in each of
-    d numbers moves.
+    """Initial deviations of position and velocity (n, d, 2) and of spin (n, d), one for each of d
+    numbers of the initial state: 2^-52 of the largest coordinate, speed or spin.
 
-    Where all centres lie on one line along an axis and nothing moves across it, nothing is rounded
-    across it either; friction may move disks across. Without it spins decide nothing.
+    Where all centres lie on a line along an axis and no disk moves off it, the other coordinate has
+    no rounding error; with friction a disk may move off. Without friction spins have no effect.
     """
     lined = (
         (scene.position == scene.position[0]).all(axis=0)
@@ -79,7 +77,7 @@ def roundings(scene: Scene) -> tuple[Array, Array, Array]:
     for k, (i, axis) in enumerate(free):
         dx[i, k, axis] = EPS * np.abs(scene.position).max()
         dv[i, len(free) + k, axis] = EPS * np.abs(scene.velocity).max()
-    # A rim moves at the spin of its disk, or at the speed that friction made it of.
+    # The speed of a rim comes from the spin of its disk, or from a speed by friction.
     rim = max(np.abs(scene.velocity).max(), np.abs(scene.radius * scene.angular_velocity).max())
     for k, i in enumerate(turns):
         dw[i, 2 * len(free) + k] = EPS * rim / scene.radius[i]
@@ -87,8 +85,8 @@ def roundings(scene: Scene) -> tuple[Array, Array, Array]:
 
 
 class Body(NamedTuple):
-    """One side of a collision: its motion along the path, what it is off by, its acceleration
-    before and after, 1/mass; and for friction the same of how it turns, its radius and 1/inertia.
+    """One side of a collision: its motion along the path, the deviations, its acceleration before
+    and after, 1/mass; and for friction its rotation likewise, its radius and 1/inertia.
 
     Shapes (2,), m, m/s, m/s2; `dx` and `dv` (d, 2); `dw` (d,).
     """
@@ -107,19 +105,18 @@ class Body(NamedTuple):
     inverse_inertia: float = 0.0
 
 
-class Nearby:
-    """All starts a rounding from that of a path, carried along it: one derivative for each number
-    of the start.
+class TangentVectors:
+    """Deviations of a motion, to first order, carried along a path: one for a rounding error of
+    each number of the initial state.
 
     Attributes:
         moving: the disks that are not static.
-        t: (n,) s, the time that each disk has been carried to; `leg`: (n,) on which of its legs
-        that is. dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, how far each disk is off then, for
-        a rounding of each of d numbers. struck, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, when
-        each disk collided last, and its velocity after that.
-        instant: s, when the latest collision was; `late`: (d,) s, by how much each rounding delays
-            it.
-        diverged: s, when the first disk is off by too much; inf: none is so far.
+        t: (n,) s, the time up to which each disk has been carried; `leg`: (n,) the index of its leg
+            then. dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, the deviations of each disk then,
+            for each of the d numbers. collided_at, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, the
+            time of the last collision of each disk, and its velocity after that.
+        instant: s, the latest collision; `late`: (d,) s, its delay for each deviation.
+        diverged: s, when the first disk diverges; inf: none has so far.
     """
 
     def __init__(self, scenario: Scenario, path: Path) -> None:
@@ -127,7 +124,7 @@ class Nearby:
         self.scene, self.path, self.moving = scene, path, np.flatnonzero(~scene.static).tolist()
         self.t, self.leg = np.zeros(scene.n), [0] * scene.n
         self.dx, self.dv, self.dw = roundings(scene)
-        self.struck, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
+        self.collided_at, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
         self.spin = np.zeros(scene.n)
         turns = ~scene.static & np.isfinite(scene.inertia)
         self.inverse_inertia = np.where(turns, 1 / scene.inertia, 0.0)
@@ -138,15 +135,15 @@ class Nearby:
         self.diverged = np.inf
 
     def carry(self, i: int, until: float) -> None:
-        """Bring disk i to `until` s over all of its legs that begin before."""
+        """Carry disk i to `until` s, over all of its legs that begin before."""
         legs = self.path.legs[i]
         while self.leg[i] + 1 < len(legs) and (t := float(legs[self.leg[i] + 1].t)) < until:
             self.fly(i, t)
-            self.turn(i, t)
+            self.change_leg(i, t)
         self.fly(i, until)
 
     def fly(self, i: int, until: float) -> None:
-        """Bring disk i to `until` s on its leg, and note when it diverges."""
+        """Carry disk i to `until` s on its leg, and note when it diverges."""
         hop = self.path.legs[i][self.leg[i]].hop
         if hop is not None:
             self.bounce(i, hop)
@@ -156,7 +153,7 @@ class Nearby:
             until - self.t[i],
             DIVERGED * self.scene.radius[i],
         )
-        # |dx + dv s|^2 = limit^2, summed over the roundings: they are independent, so that their
+        # |dx + dv s|^2 = limit^2, summed over the deviations: they are independent, so that their
         # variances add.
         room, slope, growth = limit**2 - (here**2).sum(), (here * drift).sum(), (drift**2).sum()
         if not room > 0:  # or nan, after a graze that no float64 can follow
@@ -166,12 +163,12 @@ class Nearby:
         self.dx[i], self.t[i] = here + drift * since, until
 
     def bounce(self, i: int, hop: Hop) -> None:
-        """Note when disk i diverges across a wall on which its bounces die out; what is left is
-        along the wall.
+        """Note when disk i diverges along the normal of a wall on which its bounces die out; then
+        keep only the deviation along the wall.
 
         Bounce k begins at u s_k, s_k = (2 / g) (1 - e^k) / (1 - e), with the speed u e^k
-        (`oracle_record.along`): off by dt at the first one and by du, it begins dt + du s_k late
-        and lasts 2 du e^k / g longer.
+        (`record.along`). If the first one begins dt late and at a speed larger by du, bounce k
+        begins dt + du s_k late and lasts 2 du e^k / g longer.
         """
         normal, u, g = np.array([float(hop.nx), float(hop.ny)]), float(hop.speed), float(hop.fall)
         e, k = self.scene.restitution, np.arange(BOUNCES)[:, None]
@@ -186,23 +183,23 @@ class Nearby:
         for part in (self.dx, self.dv):
             part[i] -= np.outer(part[i] @ normal, normal)
 
-    def turn(self, i: int, t: float) -> None:
-        """Put disk i onto its next leg, which begins at `t` s."""
+    def change_leg(self, i: int, t: float) -> None:
+        """Carry disk i over to its next leg, which begins at `t` s."""
         before, leg = self.path.legs[i][self.leg[i] : self.leg[i] + 2]
         self.leg[i] += 1
-        # A collision has seen to what follows it, and a thrust starts and stops when it does.
-        if t != self.struck[i] and t not in self.starts_and_stops:
-            late = self.release(i, before, t)
+        # `collide` has done this for a collision, and a thrust starts and stops at given times.
+        if t != self.collided_at[i] and t not in self.starts_and_stops:
+            late = self.release_delay(i, before, t)
             self.dv[i] += np.outer(late, acceleration(before) - acceleration(leg))
             self.dw[i] += late * (rate(before) - rate(leg))
         for contact in leg.held:
             self.hold(i, contact.j if contact.kind == "wall" and len(leg.held) == 1 else None)
 
-    def release(self, i: int, leg: Leg, t: float) -> Array:
-        """(d,) s, how much later disk i leaves what held it, the end of its wall, or a disk that is
-        struck; or how much later it slides no more."""
+    def release_delay(self, i: int, leg: Leg, t: float) -> Array:
+        """(d,) s, the delay at which disk i leaves the end of its wall, or a disk that another one
+        hits; or at which its slip ends."""
         if leg.turn is not None and leg.held and leg.held == self.path.legs[i][self.leg[i]].held:
-            return self.grips(i, leg)
+            return self.slip_end_delay(i, leg)
         spans = [
             self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0]
             for c in leg.held
@@ -213,8 +210,8 @@ class Nearby:
             return late
         return self.late if t == self.instant else np.zeros_like(self.late)
 
-    def grips(self, i: int, leg: Leg) -> Array:
-        """(d,) s, how much later disk i has lost the slip with which it slides along its wall."""
+    def slip_end_delay(self, i: int, leg: Leg) -> Array:
+        """(d,) s, the delay at which the slip of disk i along its wall ends."""
         contact, arm = leg.held[0], float(self.scene.radius[i])
         start, end = self.scene.walls[contact.j]
         way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
@@ -224,7 +221,7 @@ class Nearby:
         return late
 
     def hold(self, i: int, wall: int | None) -> None:
-        """Leave disk i the freedom along a wall, or none."""
+        """Keep only the deviation of disk i along a wall, or none."""
         way = np.zeros(2)
         if wall is not None:
             start, end = self.scene.walls[wall]
@@ -233,12 +230,11 @@ class Nearby:
             part[i] = np.outer(part[i] @ way, way)
 
     def collide(self, event: Event) -> None:
-        """Carry both sides through a collision; what touched before collides when the instant's new
-        contact does.
+        """Carry both sides through a collision; a contact that was closed before collides at the
+        same time as the new contact of that instant.
 
-        To first order: the gap closes `late` s later, where the normal is tilted and the closing
-        speed another, so that the impulse is; and what has flown on for as long has done so with
-        the old velocity.
+        To first order: the gap closes `late` s later, with a tilted normal and another closing
+        speed, hence another impulse. For these `late` s a body flies on with its old velocity.
         """
         t, e, impulse = float(event.t), self.scene.restitution, float(event.impulse)
         if t > self.instant:
@@ -248,7 +244,7 @@ class Nearby:
         way, dv, share = two.x - one.x, two.v - one.v, one.weight + two.weight
         normal = way / np.hypot(*way)
         if event.new and t > 0:
-            # normal.dv, which would have lost its digits in a graze
+            # normal.dv itself would lose its digits in a grazing collision
             closing = -impulse * share / (1 + e)
             self.late = -(two.dx - one.dx) @ normal / closing
         late = self.late[:, None]
@@ -257,53 +253,56 @@ class Nearby:
         faster = tilt @ dv + (two.dv - one.dv + (two.before - one.before) * late) @ normal
         more = -(1 + e) / share * faster
         kick, change = impulse * normal, impulse * tilt + np.outer(more, normal)
-        rub, rubs = 0.0, np.zeros_like(more)
+        friction, d_friction = 0.0, np.zeros_like(more)
         if self.scene.friction:
-            rub, rubs = self.rub(one, two, normal, tilt, impulse, more)
+            friction, d_friction = self.friction_impulse(one, two, normal, tilt, impulse, more)
             tangent, turned = perpendicular(normal), perpendicular(tilt)
-            kick, change = kick + rub * tangent, change + rub * turned + np.outer(rubs, tangent)
+            kick, change = (
+                kick + friction * tangent,
+                change + friction * turned + np.outer(d_friction, tangent),
+            )
         for disk, body, side in ((event.i, one, -one.weight), (event.j, two, two.weight)):
             if side:
                 self.dx[disk] -= side * kick * late
                 self.dv[disk] += side * change + (body.before - body.after) * late
-                self.v[disk], self.struck[disk] = body.v + side * kick, t
+                self.v[disk], self.collided_at[disk] = body.v + side * kick, t
                 arm = body.radius * body.inverse_inertia
-                self.dw[disk] += (body.rates[0] - body.rates[1]) * self.late - arm * rubs
-                self.spin[disk] = body.spin - arm * rub
+                self.dw[disk] += (body.rates[0] - body.rates[1]) * self.late - arm * d_friction
+                self.spin[disk] = body.spin - arm * friction
 
-    def rub(
+    def friction_impulse(
         self, one: Body, two: Body, normal: Array, tilt: Array, impulse: float, more: Array
     ) -> tuple[float, Array]:
-        """N s, the impulse of friction on `two` along the tangent, and (d,) how far it is off; see
-        `oracle/friction`.
+        """N s, the impulse of friction on `two` along the tangent, and its deviations (d,); see
+        `oracle/friction.py`.
 
-        tilt, more: (d, 2) and (d,) N s, how far normal and impulse are off.
+        tilt, more: (d, 2) and (d,) N s, the deviations of the normal and of the impulse.
         """
         tangent, dv, late = perpendicular(normal), two.v - one.v, self.late[:, None]
-        softness = one.weight + two.weight
+        inverse_mass = one.weight + two.weight
         slip = float(tangent @ dv)
         slips = (two.dv - one.dv + (two.before - one.before) * late) @ tangent
         slips += perpendicular(tilt) @ dv
         for body in (one, two):
-            softness += body.radius**2 * body.inverse_inertia
+            inverse_mass += body.radius**2 * body.inverse_inertia
             slip -= body.radius * body.spin
             slips -= body.radius * (body.dw + body.rates[0] * self.late)
         most = self.scene.friction * impulse
-        if abs(slip) <= most * softness:
-            return -slip / softness, -slips / softness
+        if abs(slip) <= most * inverse_mass:
+            return -slip / inverse_mass, -slips / inverse_mass
         way = -1.0 if slip > 0 else 1.0
         return way * most, way * self.scene.friction * more
 
     def body(self, i: int, t: float) -> Body:
-        """Disk i at `t` s, as the collisions of that instant have left it so far."""
+        """Disk i at `t` s, after the collisions of that instant carried out so far."""
         if not self.scene.static[i]:
             self.carry(i, t)
         legs, k = self.path.legs[i], self.leg[i]
         x, v = along(legs[k], t)
         follows = k + 1 < len(legs) and float(legs[k + 1].t) == t
         after = acceleration(legs[k + 1] if follows else legs[k])
-        struck = self.struck[i] == t
-        before, v = (after, self.v[i]) if struck else (acceleration(legs[k]), v)
+        collided = self.collided_at[i] == t
+        before, v = (after, self.v[i]) if collided else (acceleration(legs[k]), v)
         weight = 0.0 if self.scene.static[i] else 1 / float(self.scene.mass[i])
         body = Body(x, v, self.dx[i], self.dv[i], before, after, weight)
         turn = legs[k].turn
@@ -311,16 +310,16 @@ class Nearby:
             return body
         rates = rate(legs[k]), rate(legs[k + 1] if follows else legs[k])
         return body._replace(
-            spin=self.spin[i] if struck else float(turn.spin) + rates[0] * (t - float(legs[k].t)),
+            spin=self.spin[i] if collided else float(turn.spin) + rates[0] * (t - float(legs[k].t)),
             dw=self.dw[i],
-            rates=(rates[1], rates[1]) if struck else rates,
+            rates=(rates[1], rates[1]) if collided else rates,
             radius=float(self.scene.radius[i]),
             inverse_inertia=float(self.inverse_inertia[i]),
         )
 
     def other(self, event: Event, one: Body) -> tuple[Body, float]:
-        """The other side of a collision, and the radius, m, at which its normal turns: none at the
-        face of a wall."""
+        """The other side of a collision, and the distance, m, over which a shift tilts the normal:
+        inf at the face of a wall."""
         if event.j >= 0:
             two = self.body(event.j, float(event.t))
             return two, float(np.hypot(*(two.x - one.x)))
@@ -333,14 +332,14 @@ class Nearby:
 
 
 def along(leg: Leg, t: float) -> tuple[Array, Array]:
-    """Position and velocity (2,) on a leg at `t` s; of bounces only what is along the wall."""
+    """Position and velocity (2,) on a leg at `t` s; without the bounces along the normal."""
     since, x, y, vx, vy, ax, ay = t - float(leg.t), *map(float, leg[1:7])
     v, a = np.array([vx, vy]), np.array([ax, ay])
     return np.array([x, y]) + (v + a * since / 2) * since, v + a * since
 
 
 def rate(leg: Leg) -> float:
-    """rad/s2, at which a disk turns on a leg; 0 where nothing asks for it."""
+    """The angular acceleration, rad/s2, on a leg; 0 without friction."""
     return 0.0 if leg.turn is None else float(leg.turn.rate)
 
 
@@ -351,7 +350,7 @@ def perpendicular(vector: Array) -> Array:
 
 
 def acceleration(leg: Leg) -> Array:
-    """(2,) m/s2 on a leg, with the fall of what bounces on a wall."""
+    """(2,) m/s2 on a leg, with the acceleration towards the wall during bounces."""
     a = np.array([float(leg.ax), float(leg.ay)])
     return (
         a

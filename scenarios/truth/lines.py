@@ -1,4 +1,4 @@
-"""Closed forms of disks on a line: equal masses that pass their velocities on, and Galperin's
+"""Closed forms of disks on a line: equal masses, which exchange velocities, and Galperin's
 billiard."""
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from scenarios.truth.closed_forms import Collision, Motion
 
 
 def fold(place: Array, length: float) -> tuple[Array, Array]:
-    """A free point thrown back at 0 and `length` m: where it is, and the sign (1 or -1) of its
+    """A free point reflected at 0 and `length` m: its position, and the sign (1 or -1) of its
     velocity.
 
-    place: any shape, m, where it would be without walls. `length` inf: no walls.
+    place: any shape, m, its position without walls. `length` inf: no walls.
     """
     if np.isinf(length):
         return place, np.ones_like(place)
@@ -22,8 +22,8 @@ def fold(place: Array, length: float) -> tuple[Array, Array]:
 
 
 def free_points(x: Array, radius: float) -> Array:
-    """(n,) m, the equal disks of a row without their widths: z_i = x_i - r - 2 r i, i from the
-    left."""
+    """(n,) m, the positions of equal disks in a row less the widths of the disks before them:
+    z_i = x_i - r - 2 r i, i from the left."""
     return x - radius - 2 * radius * np.arange(len(x))
 
 
@@ -50,8 +50,8 @@ def row_collisions(
     """The collisions of `row` up to `until` s; wall 0 is the one at 0, wall 1 the one at `length`
     m.
 
-    Two free points meet where one meets the other or its mirror image; the meeting disks are
-    those whose ranks the two points hold.
+    Two free points meet where one meets the other or its mirror image. The disks that collide are
+    those at the ranks of the two points, counted from the left.
     """
     z, room = free_points(x, radius), length - 2 * radius * len(x)
     walled = np.isfinite(room)
@@ -77,21 +77,20 @@ def row_collisions(
 
 
 def galperin(gap: Array, speed: float, mass: Array, t: Array) -> Motion:
-    """Free room (k, 2) m in front of wall and light disk, and its rate (k, 2) m/s, at the times t
-    (k,) s.
+    """The gaps (k, 2) m of Galperin's billiard, and their rates (k, 2) m/s, at the times t (k,) s.
 
-    A light disk at rest between a wall and a heavy disk that comes in with `speed`, e = 1. gap (2,)
-    m: of the light disk to the wall, of the heavy one to the wall less the light one's width; mass
-    (2,) kg. With a = sqrt(M) X, b = sqrt(m) x the pair is one point in a wedge of the angle
-    atan(sqrt(m / M)), and unfolding the wedge makes its path a straight line (Galperin, Regul.
-    Chaotic Dyn. 8, 375, 2003).
+    A light disk is at rest between a wall and a heavy disk that approaches at `speed` m/s; e = 1.
+    gap (2,) m, at the start: from the wall to the light disk, and from the wall to the heavy disk
+    less the width of the light one. mass (2,) kg. With a = sqrt(M) X, b = sqrt(m) x the pair is one
+    point in a wedge of the angle atan(sqrt(m / M)), and unfolding the wedge makes its path a
+    straight line (Galperin, Regul. Chaotic Dyn. 8, 375, 2003).
     """
     root = np.sqrt(mass)
     wedge = np.arctan2(root[0], root[1])
     rate = complex(-root[1] * speed, 0)
     line = complex(root[1] * gap[1], root[0] * gap[0]) + rate * t
     sector = np.floor(np.angle(line) / wedge)
-    # An even sector is turned back onto the wedge, an odd one is turned back and mirrored.
+    # An even sector is rotated back onto the wedge, an odd one is rotated back and mirrored.
     turn = np.exp(-1j * wedge * (sector + sector % 2))
     mirrored = sector % 2 == 1
     folded, folded_rate = (np.where(mirrored, np.conj(z * turn), z * turn) for z in (line, rate))
@@ -102,8 +101,8 @@ def galperin(gap: Array, speed: float, mass: Array, t: Array) -> Motion:
 
 
 def galperin_collisions(gap: Array, speed: float, mass: Array) -> list[Collision]:
-    """All collisions of `galperin`, ceil(pi / wedge) - 1: of the light disk 0 with disk 1 and wall
-    0 in turn.
+    """All collisions of `galperin`, ceil(pi / wedge) - 1: of the light disk 0 alternately with
+    disk 1 and wall 0.
 
     The straight line crosses the k-th image of the wedge's sides at the angle k wedge, where it
     loses 2 sqrt(M) V sin(k wedge) of its mass-weighted velocity.
@@ -113,7 +112,7 @@ def galperin_collisions(gap: Array, speed: float, mass: Array) -> list[Collision
     k = np.arange(1, int(np.ceil(np.pi / wedge)))
     t = (gap[1] - root[0] * gap[0] / np.tan(k * wedge) / root[1]) / speed
     kick = 2 * root[1] * speed * np.sin(k * wedge)
-    # What an impulse of 1 N s changes of it: by 1 / sqrt(mu) between the disks, by 1 / sqrt(m) at
+    # 1 N s changes the mass-weighted velocity by 1 / sqrt(mu) between the disks, by 1 / sqrt(m) at
     # the wall.
     impulse = kick * np.where(k % 2 == 1, np.sqrt(1 / (1 / mass).sum()), root[0])
     return [(float(t[i]), 0, 1 if k[i] % 2 == 1 else -1, float(impulse[i])) for i in range(len(k))]

@@ -1,5 +1,5 @@
-"""The truth record: an exact motion in float64 as flights and bounces, with its collisions, its end
-and what is left open."""
+"""The truth record: an exact motion in float64 as flights and bounces, with its collisions, the
+time and reason of its end, and what still holds after it."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from scenarios.truth.horizon import DIVERGED, float64_horizon
 from scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
-# of the largest coordinate and of the longest way: a few for a leg's start, a time, a sample
+# relative to `reach`: a few roundings, of the start of a leg, of a time and of a sample
 ROUNDINGS = 4 * EPS
-# s; of the bounces that die out those that last less are not listed, as in
-# `walls.bouncing_ball_e09`
+# s; of bounces that die out, those that last less are not listed, as in `walls.bouncing_ball_e09`
 LEAST = 1e-4
-TOUCH = 1e-6  # m, what is closer to a wall at the end may be in contact with it
+TOUCH = 1e-6  # m; a disk closer to a wall than this at the end may touch it
 NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
 
 
 @dataclass(frozen=True, eq=False)
 class TruthRecord:
-    """An exact motion as its flights, and how far it can be trusted.
+    """An exact motion as a list of flights, with its error bound and its horizon.
 
     Attributes:
-        legs: (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2, and where the disk bounces on for
-            good beside that: normal nx, ny, speed m/s after the first bounce, fall m/s2; else 0.
-            Where there is friction angle rad, spin rad/s and its rate rad/s2; else 0. Disk by disk
-            in order of time.
+        legs: (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2; then, where the disk bounces on a
+            wall until it rests, the normal nx, ny, the speed m/s after the first bounce and the
+            acceleration m/s2 towards the wall, else 0; then, where there is friction, angle rad,
+            spin rad/s and its rate rad/s2, else 0. Sorted by disk, then by time.
         events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
-            |v_n| / |v|; an impulse of 0 is no collision: from there on the disk rests on the other.
-        horizon: s; nothing is said of what comes later.
+            |v_n| / |v|; an impulse of 0 is no collision: from then on the disk rests on the other.
+        horizon: s; the motion is not known after it.
         error_bound: m.
-        bits: of the numbers it was computed with.
-        method: "closed form", "two-precision" (the same with half as many bits) or "certified"
+        bits: precision of the numbers it was computed with.
+        method: "closed form", "two-precision" (half as many bits give the same) or "certified"
             (interval arithmetic).
         reason: why it ends where it does.
-        float64_horizon: s; until then a float64 engine can be held to it, see `horizon.py`.
-        outcomes: (o, 4) outcome, disk, vx, vy m/s: where the order of simultaneous collisions
-            matters, all ends it may have.
-        orders: (p, 3) outcome, disk, other: the collisions, in one order, that lead to each.
-        remains: what can still be said after the end, a sentence each.
+        float64_horizon: s; up to then float64 engines are compared with it, see `horizon.py`.
+        outcomes: (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends
+            because the order of simultaneous collisions matters.
+        orders: (p, 3) outcome, disk, other: for each outcome one order of collisions that leads to
+            it.
+        remains: sentences on what still holds after the end.
     """
 
     legs: Array = field(repr=False)
@@ -72,8 +72,8 @@ class TruthRecord:
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
             if scene.friction:
                 angle[:, i], spin[:, i] = flight(t - leg[:, 1], *leg[:, 12:15].T)
-        # What lies there from the start counts as a contact that begins with no impulse; later ones
-        # began before.
+        # A disk that rests on a wall from the start has a contact without impulse at t = 0. One
+        # that comes to rest later is not listed: its contact began with a collision.
         collisions: list[Collision] = [
             (float(at), int(i), int(j), float(kick))
             for at, i, j, kick, _ in self.events
@@ -98,8 +98,8 @@ class TruthRecord:
 
 
 def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
-    """Position and velocity (k, 2) on the legs (k, 12) at the times t (k,) s: the flight, and the
-    bounces across it.
+    """Position and velocity (k, 2) on the legs (k, 12) at the times t (k,) s: the flight, plus the
+    bounces along the normal.
 
     Bounce k begins s_k = 2 v (1 - e^k) / (g (1 - e)) after the first one at the speed v e^k; from 2
     v / (g (1 - e)) on there is none (any textbook of mechanics, under "bouncing ball").
@@ -123,7 +123,7 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
 
 
 def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: str) -> TruthRecord:
-    """The record of a path that is right to `error` m up to its end."""
+    """The record of a path whose error is at most `error` m up to its end."""
     path = within_float64(scenario, path, error)
     end = min(path.end, scenario.duration) if path.reason else np.inf
     legs = legs_of(path, end)
@@ -143,7 +143,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     return TruthRecord(
         legs=frozen(legs),
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),
-        # The instant at which the answer is lost already belongs to what is not known.
+        # The state at the end itself is not known: the horizon is the float64 before it.
         horizon=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
         error_bound=error + ROUNDINGS * reach(legs, min(end, scenario.duration)),
         bits=bits,
@@ -157,10 +157,10 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
 
 
 def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
-    """The path up to where legs and samples, which are float64, tell it as exactly as is promised.
+    """The path, cut where its legs and samples in float64 become less accurate than promised.
 
-    What is promised is `DIVERGED` radii of the smallest disk, as it is by that that engines are
-    held to an answer. Far from the origin, and after a long way, the rounding of float64 is more.
+    The promised accuracy is `DIVERGED` radii of the smallest disk, the same limit as that of the
+    horizon. The rounding of float64 exceeds it far from the origin, and after a long distance.
     """
     end = min(path.end, scenario.duration) if path.reason else scenario.duration
     legs = legs_of(path, end)
@@ -180,7 +180,7 @@ def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
 
 
 def legs_of(path: Path, end: float) -> Array:
-    """(l, 15), as of `TruthRecord.legs`, those that begin before `end` s."""
+    """The legs of a path that begin before `end` s, (l, 15) as in `TruthRecord.legs`."""
     flights = [
         (i, leg)
         for i, legs in enumerate(path.legs)
@@ -196,8 +196,8 @@ def legs_of(path: Path, end: float) -> Array:
 
 
 def reach(legs: Array, until: float) -> float:
-    """m, what is rounded up to `until` s: the largest coordinate, and how far the largest speed
-    goes in that time."""
+    """m, the length to which the rounding of float64 is relative up to `until` s: the largest
+    coordinate plus the distance at the largest speed."""
     begun = legs[:, 1] <= until
     follows = np.append(legs[1:, 0] == legs[:-1, 0], False)
     stop = np.minimum(np.where(follows, np.append(legs[1:, 1], until), until), until)
@@ -205,7 +205,7 @@ def reach(legs: Array, until: float) -> float:
         np.maximum(stop - legs[:, 1], 0.0)[:, None],
         (legs[:, 2:4], legs[:, 4:6], legs[:, 6:8]),
     )
-    # between the two an apex
+    # the last term bounds the apex between the two ends
     far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8
     speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, 10:11]
     return float(far[begun].max() + until * speed[begun].max())
@@ -217,20 +217,20 @@ def _row(event: Event) -> list[float]:
 
 
 def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
-    """The legs with bounces on them, each with the s at which it ends."""
+    """The legs with bounces, each with the time, s, at which it ends."""
     for k in np.flatnonzero(legs[:, 10] > 0):
         follows = k + 1 < len(legs) and legs[k + 1, 0] == legs[k, 0]
         yield legs[k], min(end, legs[k + 1, 1] if follows else np.inf)
 
 
 def bounces(scene: Scene, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as of `TruthRecord.events` for the bounces on a leg, up to `stop` s, as far as they last
-    `LEAST` s."""
+    """Rows as in `TruthRecord.events` for the bounces on a leg up to `stop` s that last `LEAST` s
+    or more."""
     e, v, g, disk = scene.restitution, leg[10], leg[11], int(leg[0])
     count = (
         max(0, int(np.ceil(np.log(LEAST * g / (2 * v)) / np.log(e)))) if LEAST * g < 2 * v else 0
     )
-    wall = wall_beside(scene, leg)
+    wall = wall_of_bounces(scene, leg)
     for k in range(1, count):
         t = leg[1] + 2 * v / g * (1 - e**k) / (1 - e)
         if t >= stop:
@@ -241,8 +241,8 @@ def bounces(scene: Scene, leg: Array, stop: float) -> Iterator[list[float]]:
         yield [t, disk, -1 - wall, kick, before / np.hypot(before, beside)]
 
 
-def wall_beside(scene: Scene, leg: Array) -> int:
-    """The wall on which a leg bounces: the nearest whose line lies along it."""
+def wall_of_bounces(scene: Scene, leg: Array) -> int:
+    """The wall on which the disk of a leg bounces: the nearest one parallel to the leg."""
     start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
     length = np.hypot(*span.T)
     share = np.clip(((leg[2:4] - start) * span).sum(axis=1) / length**2, 0, 1)
@@ -251,8 +251,8 @@ def wall_beside(scene: Scene, leg: Array) -> int:
 
 
 def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iterator[str]:
-    """What can be said of these disks after the end: momentum along walls, if all are parallel;
-    energy falls."""
+    """Sentences on what holds for these disks after the end: their momentum along the walls they
+    touch, if all these are parallel, is conserved, and their energy does not grow."""
     ours = [i for i in sorted(set(disks)) if i < scene.n and not scene.static[i]]
     last = [legs[(legs[:, 0] == i) & (legs[:, 1] <= end)][-1] for i in ours]
     x, v = (
@@ -269,18 +269,20 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     near = span[touched.any(axis=0)]
     names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
     momentum = (mass[:, None] * v).sum(axis=0)
-    # Round a fixed disk, or round the end of a wall, the normal turns, and friction acts along a
-    # wall: no direction keeps its momentum.
+    # Momentum is conserved in no direction where the normal turns (around a static disk or the end
+    # of a wall), or where friction acts along a wall.
     if (
         any(scene.static[i] for i in disks if i < scene.n)
         or (touched & ((share <= 0) | (share >= 1))).any()
         or (scene.friction and len(near))
     ):
         near = np.eye(2)
-    exception = " but for gravity" if scene.gravity.any() else ""
+    exception = ", apart from the effect of gravity" if scene.gravity.any() else ""
     if not len(near):
         total = f"({momentum[0]:.6g}, {momentum[1]:.6g}) N s"
-        yield f"{names}: nothing else touches them, so their momentum, {total}, stays{exception}"
+        yield (
+            f"{names}: nothing else touches them, so their momentum {total} is conserved{exception}"
+        )
     elif (
         np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max()
         <= EPS * np.abs(near).max() ** 2
@@ -288,7 +290,7 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
         way = near[0] / np.hypot(*near[0])
         yield (
             f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their"
-            f" momentum that way, {momentum @ way:.6g} N s, stays{exception}"
+            f" momentum in that direction, {momentum @ way:.6g} N s, is conserved{exception}"
         )
     energy = (mass * (v**2).sum(axis=1)).sum() / 2
     if scene.friction:

@@ -1,7 +1,7 @@
 """Closed forms with Coulomb friction: a bounce, two disks that meet, a slide that becomes a roll.
 
-Legs here end in (x, y, angle), or (way, angle) along a wall: a disk turns as evenly between events
-as it flies. k = m r^2 / I is 2 for a solid disk.
+The last axis of the legs here is (x, y, angle), or (distance, angle) along a wall: between events
+an angle is a parabola in time, as a position is. k = m r^2 / I is 2 for a solid disk.
 """
 
 from __future__ import annotations
@@ -12,24 +12,29 @@ from scenarios.model import Array, Scene
 from scenarios.truth.closed_forms import Legs, pair
 
 
-def rubbed(slip: Array, softness: Array | float, most: Array) -> Array:
-    """What friction adds against a slip (m/s): `slip / softness`, which ends it, but no more than
-    `most`.
+def friction_kick(slip: Array, inverse_mass: Array | float, most: Array) -> Array:
+    """The impulse of friction (N s, or m/s per mass) on contact points with a slip (m/s): the one
+    that ends the slip, `-slip / inverse_mass`, limited to `most` either way.
+
+    inverse_mass: 1/kg (or a number, per mass), the effective one along the tangent.
 
     Foerster, Louge, Chang & Allia, Phys. Fluids 6, 1108, 1994, with no tangential restitution.
     """
-    return -np.clip(slip / softness, -most, most)
+    return -np.clip(slip / inverse_mass, -most, most)
 
 
 def bounced(
     v: Array, spin: Array, radius: Array, k: Array, restitution: float, friction: float
 ) -> tuple[Array, Array]:
-    """Velocities (n, 2) m/s and spins (n,) rad/s after bounces on a floor; before it they fall.
+    """Velocities (n, 2) m/s and spins (n,) rad/s of disks after one bounce each on a floor.
 
-    The rim moves at v_x + r w along the floor; a kick J / m along it changes that by 1 + k times as
-    much, and the spin by k / r.
+    v, spin: before the bounce. The contact point of a disk moves at v_x + r w along the floor. An
+    impulse J along the floor changes v_x by J / m, the speed of the contact point by (1 + k) J / m,
+    and the spin by k J / (m r).
     """
-    kick = rubbed(v[:, 0] + radius * spin, 1 + k, friction * (1 + restitution) * np.abs(v[:, 1]))
+    kick = friction_kick(
+        v[:, 0] + radius * spin, 1 + k, friction * (1 + restitution) * np.abs(v[:, 1])
+    )
     after = np.stack([v[:, 0] + kick, -restitution * v[:, 1]], axis=-1)
     return after, spin + k * kick / radius
 
@@ -60,10 +65,11 @@ def bounce(
 def between_plates(
     start: Array, v: Array, radius: float, k: float, gap: float, friction: float, until: float
 ) -> Legs:
-    """A disk thrown to and fro between a floor and a ceiling `gap` m above where it touches that,
-    at e = 1: legs (s, 3). It begins on its way down, from (3,) `start` in the middle.
+    """A disk that bounces between a floor and a ceiling at e = 1, up to `until` s: legs (s, 3).
 
-    Seen from upside down the ceiling is a floor: velocities change their sign, the spin does not.
+    gap: m, the distance that its centre travels from one to the other. It starts half-way, at
+    `start` (3,), and moves down. Turned by 180 degrees the ceiling is a floor: that changes the
+    sign of velocities, but not of the spin.
     """
     turned = np.array([-1.0, -1.0, 1.0])
     t, x, side = 0.0, start, 1.0
@@ -96,8 +102,8 @@ def spinning_pair(scene: Scene, first: int) -> tuple[Legs, Array]:
     way = legs.position[1, 1] - legs.position[1, 0]
     tangent = np.array([-way[1], way[0]]) / np.hypot(*way)
     slip = (velocity[1] - velocity[0]) @ tangent - radius @ spin
-    softness = (1 / mass + radius**2 / inertia).sum()
-    kick = rubbed(slip, softness, scene.friction * impulse[0])
+    inverse_mass = (1 / mass + radius**2 / inertia).sum()
+    kick = friction_kick(slip, inverse_mass, scene.friction * impulse[0])
     flown = legs.velocity[1] + np.array([[-1.0], [1.0]]) * kick / mass[:, None] * tangent
     spun = spin - radius / inertia * kick
     return Legs(

@@ -21,8 +21,8 @@ from reports.speed.advice import (
     advise,
     attempts,
     by_engine,
-    held_by,
     ladder_of,
+    scored_scenario,
     those_that_keep,
     timed,
 )
@@ -52,7 +52,7 @@ def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
     """What was advised and what costs least when all is measured again; whether they agree."""
     workers = os.cpu_count() or 1
     advice = advise(scene, SEED, PURPOSE, BOUND, list(ENGINES), workers, progress)
-    asked = [(name, PLAIN, k) for name in ENGINES for k in ladder_of(held_by(scene, SEED))]
+    asked = [(name, PLAIN, k) for name in ENGINES for k in ladder_of(scored_scenario(scene, SEED))]
     tried = attempts(scene, SEED, PURPOSE, workers, progress, asked)
     keeping = [one for ladder in by_engine(tried) for one in those_that_keep(ladder, BOUND)]
     if not advice.keeping or not keeping:

@@ -137,7 +137,7 @@ def compile_time() -> float:
             "from tests.adapters.event_driven.gases import gas; from time import process_time;from"
             " adapters.event_driven.events import EventEngine; start = process_time();engine ="
             " EventEngine(*gas(100, 0.3)); engine.advance(1.0);"
-            " engine.look(1.0);engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0);"
+            " engine.motion_at(1.0);engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0);"
             " print(process_time() - start)",
             NUMBA_CACHE_DIR=empty,
         )

@@ -95,7 +95,7 @@ def test_all_the_collisions_of_one_long_step_come_in_their_order(gravity):
     ]
     # Every collision multiplies what rounding did before it by about a free path over a radius.
     assert reported[:, 2] == pytest.approx(events.collisions[:, 3], rel=1e-11)
-    assert np.abs(engine.read().position - events.look(0.6)[0]).max() < 1e-11
+    assert np.abs(engine.read().position - events.motion_at(0.6)[0]).max() < 1e-11
 
 
 @pytest.mark.parametrize("gravity", [0.0, -9.8])
@@ -116,7 +116,7 @@ def test_a_disk_that_passes_through_another_a_wall_or_its_end_within_a_step_has_
     assert sorted(collision[1:3] for collision in engine.collisions()) == [(0, 1), (2, -1), (3, -2)]
     # A place rounds at 10 m; over a radius of 0.1 m that turns the normal, and with it 4 m of
     # flight: 400 times it.
-    assert np.abs(engine.read().position - events.look(0.1)[0]).max() < 400 * 10 * ROUNDING
+    assert np.abs(engine.read().position - events.motion_at(0.1)[0]).max() < 400 * 10 * ROUNDING
 
 
 def test_a_centre_that_leaves_the_box_enters_it_opposite_at_that_instant():
@@ -127,7 +127,9 @@ def test_a_centre_that_leaves_the_box_enters_it_opposite_at_that_instant():
     events = EventEngine(scene)
     events.advance(2.0)
     # Rounding of 120 steps at 5 m, grown e-fold in about a second.
-    assert np.abs(played(scene, 1 / 60, 120).read().position - events.look(2.0)[0]).max() < 1e-12
+    assert (
+        np.abs(played(scene, 1 / 60, 120).read().position - events.motion_at(2.0)[0]).max() < 1e-12
+    )
 
 
 def test_the_neighbour_list_leaves_every_bit_as_it_is():

@@ -15,7 +15,7 @@ from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Thrust
 from scenarios.truth import horizon as of_horizon
 from scenarios.truth.exact import computed
-from scenarios.truth.horizon import DIVERGED, EPS, Nearby, float64_horizon, roundings
+from scenarios.truth.horizon import DIVERGED, EPS, TangentVectors, float64_horizon, roundings
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import digits
 from scenarios.truth.oracle.path import Path
@@ -50,13 +50,13 @@ def moved(scene: Scene, by: tuple[Array, Array, Array], k: int, scale: float) ->
 def carried(one: Scenario) -> Array:
     """(n, d, 2) m, what each rounding makes of each position at the end, to first order."""
     path = path_of(one)
-    nearby = Nearby(one, path)
+    tangents = TangentVectors(one, path)
     for event in path.events:
         if float(event.impulse):
-            nearby.collide(event)
-    for i in nearby.moving:
-        nearby.carry(i, one.duration)
-    return nearby.dx
+            tangents.collide(event)
+    for i in tangents.moving:
+        tangents.carry(i, one.duration)
+    return tangents.dx
 
 
 def ends(one: Scenario) -> Array:

@@ -14,9 +14,9 @@ from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.no_truth import NoTruth, truth_at
 from scenarios.truth.exact import computed, with_oracle
-from scenarios.truth.oracle import ahead as oracle_ahead
+from scenarios.truth.oracle import contact_finder
 from scenarios.truth.oracle.numbers import mpfr
-from scenarios.truth.oracle.ties import Contact, Matter, Touch
+from scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch
 from scenarios.truth.record import TruthRecord
 from tests.scenarios.test_oracle import asked, states
 
@@ -213,7 +213,7 @@ def test_taking_the_collisions_of_a_chain_as_they_come_is_caught(monkeypatch: py
     others."""
     one = asked(row([1.0, 0, 0, 0, 0], [1] * 5, 0.9, (1.0,)), 2.0)
     assert len(ends(computed(one))) == 8
-    monkeypatch.setattr(oracle_ahead.Ahead, "alone", lambda *_: True)
+    monkeypatch.setattr(contact_finder.ContactFinder, "alone", lambda *_: True)
     assert computed(one).reason == ""
 
 
@@ -253,7 +253,7 @@ def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(
             Touch(Contact("wall", 0, 0, 1), zero, -one),
             Touch(Contact("wall", 0, 1, 1), -gmpy2.sin(angle), gmpy2.cos(angle)),
         ]
-        found = Matter(k, [one], k.exact(restitution), False).outcomes(
+        found = CollisionLaw(k, [one], k.exact(restitution), False).outcomes(
             touches, {0: (k.exact(-1.0), k.exact(-0.3), k.exact(0.0))}
         )[0]
 
@@ -277,7 +277,7 @@ def test_what_can_still_be_said_is_said():
     flat, wedge = (computed(asked(scene, 4.0)) for scene in (BALL, TILTED))
 
     assert any(
-        "lie along (1, 0), so their momentum that way, 0 N s, stays" in said
+        "lie along (1, 0), so their momentum in that direction, 0 N s, is conserved" in said
         for said in flat.remains
     )
     assert any("their kinetic energy" in said and "can only fall" in said for said in flat.remains)

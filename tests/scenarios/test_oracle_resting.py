@@ -267,7 +267,7 @@ def test_a_resting_disk_slides_off_its_wall_or_on_to_the_next():
     )
     slow = asked(replace(scene, velocity=[[1.5, 0]]), 1.5)
     assert (
-        "disk 0 turns about the end of wall 1, off which it slides at t = 1.33333333 s"
+        "disk 0 slides off the end of wall 1 so slowly that it turns about it at t = 1.33333333 s"
         in computed(slow).reason
     )
 

@@ -82,7 +82,7 @@ def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callab
     clock = Clock(CUT, REASON)
     short, whole = computed(boxed(), kind, clock), computed(boxed(), kind)
 
-    assert clock.struck
+    assert clock.expired
     assert 2.0 < short.horizon < 0.9 * boxed().duration
     assert short.reason.startswith(f"{REASON} at t = ")
     assert whole.reason == ""

@@ -20,7 +20,7 @@ from reports.lessons.lesson import (
 )
 from reports.page.style import TRUTH, number
 from scenarios.model import Array, Scene
-from scenarios.truth.sliding import rubbed
+from scenarios.truth.sliding import friction_kick
 
 CONE = "friction cone"
 BOX2D, BOX2D_V3 = "box2d:shipped", "box2d_v3:shipped"
@@ -185,7 +185,7 @@ def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str,
 def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
     """When the contact sticks, who has the exact answer, and what the others do."""
     slips = slip_at(angles, settings["spin"])
-    exact = rubbed(slips, 1 / law.weight, np.asarray(law.edge))
+    exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
     return [
         Claim(
             f"The normal impulse is (1 + e) m v_n = {number(law.normal)} N s in every engine. At"

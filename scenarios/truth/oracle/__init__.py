@@ -1,1 +1,2 @@
-"""The oracle: event by event, in many digits, certified."""
+"""The oracle: an event-driven computation in many digits, certified where intervals are
+installed."""

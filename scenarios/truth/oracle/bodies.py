@@ -1,5 +1,5 @@
-"""Disks and the ends of walls in many digits: the leg each is on, what holds it, and which contacts
-touch exactly."""
+"""Disks and the ends of walls in many digits: the leg of each, the contacts it rests on, and which
+contacts touch exactly."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from scenarios.model import Array, Scene, Thrust
-from scenarios.truth.oracle.friction import Grip, limited
+from scenarios.truth.oracle.friction import Friction, limited
 from scenarios.truth.oracle.numbers import Number, Numbers
-from scenarios.truth.oracle.ties import Contact, Matter, Touch, Velocity
+from scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
 
 STATIC, FALLING = 0, 1
 """Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on;
@@ -24,8 +24,8 @@ STILL, STRAIGHT, CURVED = range(3)
 
 
 class Hop(NamedTuple):
-    """Bounces across a wall from the start of a leg on: normal (nx, ny), speed m/s, fall m/s2
-    towards the wall."""
+    """A series of bounces on a wall, from the start of a leg on: normal (nx, ny), speed m/s after
+    the first bounce, acceleration m/s2 towards the wall (`fall`)."""
 
     nx: Number
     ny: Number
@@ -34,7 +34,7 @@ class Hop(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """How a disk turns from the start of a leg on: angle rad, spin rad/s, its rate rad/s2."""
+    """The rotation of a disk from the start of a leg on: angle rad, spin rad/s, its rate rad/s2."""
 
     angle: Number
     spin: Number
@@ -42,8 +42,8 @@ class Turn(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2; with a hop, the part of it along the
-    wall; on what the disk rests meanwhile; and how it turns, where there is friction."""
+    """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2 (with a `hop`, only the motion along
+    the wall); the contacts on which the disk rests; and its rotation, where there is friction."""
 
     t: Number
     x: Number
@@ -73,23 +73,24 @@ class Bodies:
     Attributes:
         legs: (b,) the leg each body is on.
         count: (b,) events each has had.
-        table, radii: (b, 7) and (b,) the legs as float64, see `oracle_filter`, and m.
+        table, radii: (b, 7) and (b,) the legs as float64, see `filter.py`, and the radii, m.
         shape: (b,) whether each leg is a point, a straight line or a parabola.
-        asleep: (b,) whose bounces die out untouched, so that nothing need be asked of them.
-        held: (b,) the contacts each rests on: gap 0, no speed and no acceleration across it.
-        separated: pairs that touched, and did not approach, when the two had had so many events.
-        leaning: (b,) the same of walls, at the start of the leg.
-        matter: masses, restitution and friction.
-        rates: (b,) rad/s2, how torques change the spin of each; asked for only with friction.
-        gripping: (b,) the wall along which the contact point of each has no speed, exactly, since
-            the collision that began its leg.
-        sliding: (b,) the sign of that speed where a disk rests on a wall with friction.
+        asleep: (b,) whether the bounces of each die out without another contact: it is then left
+            out of all searches.
+        held: (b,) the contacts each rests on: gap 0, no speed and no acceleration along the normal.
+        separated: pair -> the event counts of both when they touched and did not approach.
+        leaning: (b,) the walls that each touched without approach at the start of its leg.
+        law: masses, restitution and friction.
+        rates: (b,) rad/s2, angular acceleration by torques; used only with friction.
+        no_slip_on: (b,) the wall on which each has exactly no slip since the collision at the start
+            of its leg.
+        sliding: (b,) the sign of the slip of a disk that rests on a wall with friction.
     """
 
     def __init__(self, scene: Scene, k: Numbers) -> None:
         self.k, self.scene, exact = k, scene, k.exact
         ends = np.unique(scene.walls.reshape(-1, 2), axis=0)
-        # The wall that is blamed for a collision on its end: the first that has it.
+        # The wall that a collision with an end point is listed under: the first with this end.
         self.owner = [int(np.argmax((scene.walls == end).all(axis=2).any(axis=1))) for end in ends]
         nought, still = exact(0.0), ~scene.static
         positions = np.concatenate([scene.position, ends])
@@ -110,7 +111,7 @@ class Bodies:
         self.kind = [FALLING if moves else STATIC for moves in still] + [STATIC] * len(ends)
         if not scene.gravity.any():
             self.kind = [STATIC] * len(self.legs)
-        # What accelerates each while nothing holds it.
+        # The kind and the acceleration of each in free flight.
         self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.kind, self.legs)]
         self.count = [0] * len(self.legs)
         self.radii = np.append(scene.radius, np.zeros(len(ends)))
@@ -120,19 +121,19 @@ class Bodies:
         self.asleep = np.zeros(len(self.legs), bool)
         mass = [exact(m) if np.isfinite(m) else None for m in scene.mass.tolist()]
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
-        self.matter = Matter(
-            k, inverse, exact(scene.restitution), scene.restitution == 0, self._grip()
+        self.law = CollisionLaw(
+            k, inverse, exact(scene.restitution), scene.restitution == 0, self._friction()
         )
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
         self.separated: dict[tuple[int, int], tuple[int, int]] = {}
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
         self.nought, self.rates = nought, [nought for _ in self.legs]
-        self.gripping: list[Contact | None] = [None for _ in self.legs]
+        self.no_slip_on: list[Contact | None] = [None for _ in self.legs]
         self.sliding = [0 for _ in self.legs]
 
-    def _grip(self) -> Grip | None:
-        """What friction needs to know; None where there is none."""
+    def _friction(self) -> Friction | None:
+        """The data for friction; None without friction."""
         scene, exact = self.scene, self.k.exact
         if not scene.friction:
             return None
@@ -140,7 +141,7 @@ class Bodies:
         inertia = zip(scene.inertia.tolist(), turns.tolist())
         inverse = [exact(1.0) / exact(each) if turn else exact(0.0) for each, turn in inertia]
         none = [exact(0.0)] * (len(self.legs) - scene.n)
-        return Grip(exact(scene.friction), self.radius, inverse + none)
+        return Friction(exact(scene.friction), self.radius, inverse + none)
 
     def partner(self, contact: Contact) -> int:
         """The other disk, or -1 - wall."""
@@ -181,7 +182,7 @@ class Bodies:
         return vx, vy, self.turn_at(i, now).spin
 
     def turn_at(self, i: int, now: Number) -> Turn:
-        """How body i is turned; nothing where there is no friction to ask for it."""
+        """The rotation of body i; zeros without friction."""
         leg = self.legs[i]
         if leg.turn is None:
             return Turn(self.nought, self.nought, self.nought)
@@ -191,21 +192,21 @@ class Bodies:
         return Turn(angle + (spin + rate * s / 2) * s, spin + rate * s, rate)
 
     def fly(self, i: int, now: Number, v: Velocity, beside: Contact | None = None) -> None:
-        """Body i goes on from here with velocity v, held by what holds it; set exactly beside a
-        wall it has struck."""
+        """Body i goes on from here with velocity v, resting on the same contacts; placed exactly on
+        the wall `beside`, if given."""
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
         self.begin(i, self.leg(i, now, x, y, v))
 
     def leg(self, i: int, now: Number, x: Number, y: Number, v: Velocity) -> Leg:
-        """A leg of body i from (x, y) m with velocity v, as it is held."""
+        """A leg of body i from (x, y) m with velocity v, on the contacts it rests on."""
         (vx, vy, spin), (ax, ay, rate) = v, self.acceleration(i)
-        turn = None if self.matter.grip is None else Turn(self.turn_at(i, now).angle, spin, rate)
+        turn = None if self.law.friction is None else Turn(self.turn_at(i, now).angle, spin, rate)
         return Leg(now, x, y, vx, vy, ax, ay, turn=turn)
 
     def across(self, edge: Contact, now: Number) -> None:
-        """Set a disk that has reached an edge of the wrap onto the opposite one."""
+        """Move a disk that has reached an edge of the wrap to the opposite edge."""
         assert self.scene.wrap is not None
         i, place = edge.i, list(self.state_at(edge.i, now))
         place[edge.j] = self.k.exact(float(self.scene.wrap[0 if edge.side > 0 else 1, edge.j]))
@@ -216,15 +217,15 @@ class Bodies:
 
     def set_thrusts(self, i: int, now: Number, thrusts: Sequence[Thrust]) -> None:
         """Body i is accelerated by all of `thrusts` from now on."""
-        exact, inverse = self.k.exact, self.matter.inverse_mass[i]
+        exact, inverse = self.k.exact, self.law.inverse_mass[i]
         a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
         for thrust in thrusts:
             a = [each + exact(float(force)) * inverse for each, force in zip(a, thrust.force)]
         kind = 2 + i if thrusts else (FALLING if self.scene.gravity.any() else STATIC)
         self.free[i] = kind, a[0], a[1]
-        if self.matter.grip is not None:
+        if self.law.friction is not None:
             torque = exact(float(sum(thrust.torque for thrust in thrusts)))
-            turns = self.matter.grip.inverse_inertia[i]
+            turns = self.law.friction.inverse_inertia[i]
             self.rates[i] = torque * turns if any(p.torque for p in thrusts) else self.nought
         held = tuple(
             c
@@ -233,26 +234,26 @@ class Bodies:
         )
         rolls = bool(self.held[i]) and not self.sliding[i]
         self.hold(i, now, held, self.velocity_at(i, now), rolls)
-        # What held it still touches.
+        # The walls on which it rested still touch it.
         self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
 
     def hold(
         self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity, rolls: bool = False
     ) -> None:
-        """Body i goes on with velocity v, resting on these contacts: the end of what it did before.
+        """Body i goes on with velocity v, resting on these contacts.
 
-        rolls: it has no slip, exactly, on the one wall it rests on with friction.
+        rolls: it has exactly no slip on the one wall on which it rests with friction.
         """
         self.asleep[i] = False
         self.held[i] = contacts
-        if contacts and self.matter.grip is not None:
+        if contacts and self.law.friction is not None:
             self.sliding[i] = 0 if rolls else self.k.sign(self.slip(contacts[0], v))
         x, y, _, _ = self.state_at(i, now)
         self.begin(i, self.leg(i, now, x, y, v))
 
     def slip(self, contact: Contact, v: Velocity) -> Number:
-        """m/s along the wall of a contact, from its start to its end, of the point that touches
-        it."""
+        """m/s, the velocity of the contact point along the wall, positive from its start to its
+        end."""
         _, _, tx, ty, _ = self.walls[contact.j]
         return tx * v[0] + ty * v[1] + contact.side * self.radius[contact.i] * v[2]
 
@@ -263,10 +264,10 @@ class Bodies:
         self.table[i], self.shape[i] = row, shape_of(row)
         self.count[i] += 1
         self.leaning[i] = set()
-        self.gripping[i] = None
+        self.no_slip_on[i] = None
 
     def acceleration(self, i: int) -> tuple[Number, Number, Number]:
-        """ax, ay m/s2 and rad/s2 of body i as it is held; sets what kind it is, too."""
+        """ax, ay m/s2 and rad/s2 of body i on the contacts it rests on; also sets its kind."""
         kind, ax, ay = self.free[i]
         rate = self.rates[i]
         walls = [c for c in self.held[i] if c.kind == "wall"]
@@ -278,46 +279,48 @@ class Bodies:
             if kind == FALLING:
                 level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
                 kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
-            if self.matter.grip is not None and not (kind == STATIC and self.lies(i)):
+            if self.law.friction is not None and not (kind == STATIC and self.lies(i)):
                 kind = 2 + i
-                along, rate = self.rubbed(walls[0], along, load, self.matter.grip)
+                along, rate = self.rubbed(walls[0], along, load, self.law.friction)
             ax, ay = along * tx, along * ty
         self.kind[i] = kind
         return ax, ay, rate
 
     def lies(self, i: int) -> bool:
-        """Whether nothing asks for friction on a body that rests on a level wall: no slip and no
+        """Whether friction does not act on a body that rests on a level wall: no slip and no
         torque."""
         return not self.sliding[i] and self.rates[i] is self.nought
 
     def rubbed(
-        self, contact: Contact, along: Number, load: Number, grip: Grip
+        self, contact: Contact, along: Number, load: Number, friction: Friction
     ) -> tuple[Number, Number]:
-        """m/s2 along a wall and rad/s2 of a disk that rests on it, with friction; notes if it
-        begins to slide.
+        """m/s2 along a wall and rad/s2 of a disk that rests on it, with friction; sets `sliding`.
 
-        along, load: m/s2, its acceleration along the wall without friction, and into it.
+        along, load: m/s2, its acceleration along the wall without friction, and into the wall.
         """
-        i, k, w = contact.i, self.k, self.matter.inverse_mass[contact.i]
-        # All per mass: of the friction 1 m/s2 along the wall is so much more of the slip.
-        softness, most = 1 + grip.softness(i) / w, grip.friction * load
+        i, k, w = contact.i, self.k, self.law.inverse_mass[contact.i]
+        # All per mass: 1 m/s2 of friction changes the slip by `inverse_effective_mass` m/s2.
+        inverse_effective_mass, most = (
+            1 + friction.rim_inverse_mass(i) / w,
+            friction.coefficient * load,
+        )
         driven = along + contact.side * self.radius[i] * self.rates[i]
         if self.sliding[i]:
             force = -self.sliding[i] * most
         else:
-            force, rolls = limited(k, -driven / softness, most)
+            force, rolls = limited(k, -driven / inverse_effective_mass, most)
             self.sliding[i] = 0 if rolls else k.sign(driven)
-        turning = contact.side * self.radius[i] * grip.inverse_inertia[i] * force / w
+        turning = contact.side * self.radius[i] * friction.inverse_inertia[i] * force / w
         return along + force, self.rates[i] + turning
 
-    def remember(self, touches: Sequence[Touch], collision: set[int]) -> None:
-        """After the collisions of one instant: these contacts touch, exactly, and do not
+    def remember(self, touches: Sequence[Touch], collided: set[int]) -> None:
+        """Note, after the collisions of one instant, that these contacts touch exactly and do not
         approach."""
         for contact, _, _ in touches:
             if contact.kind == "body":
                 i, j = sorted((contact.i, contact.j))
                 self.separated[i, j] = self.count[i], self.count[j]
-            elif contact.i in collision or not collision:
+            elif contact.i in collided or not collided:
                 self.leaning[contact.i].add(contact)
 
     def height(self, contact: Contact, x: Number, y: Number) -> Number:
@@ -342,15 +345,15 @@ class Bodies:
         return part * tx, part * ty
 
     def beside(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
-        """The place next to (x, y) at which disk contact.i touches the wall exactly."""
+        """The position nearest to (x, y) at which disk contact.i touches the wall exactly."""
         px, py, tx, ty, _ = self.walls[contact.j]
         foot, away = self.foot(contact.j, x, y), contact.side * self.radius[contact.i]
         return px + foot * tx - away * ty, py + foot * ty + away * tx
 
-    def upright(self, one: Contact, other: Contact) -> bool:
-        """Whether a collision on one of two walls leaves the speed across the other: they stand at
-        right angles, exactly, and there is no friction."""
-        if one.kind != "wall" or other.kind != "wall" or self.matter.grip is not None:
+    def stays_still(self, one: Contact, other: Contact) -> bool:
+        """Whether a collision on one wall leaves the speed along the normal of the other unchanged:
+        they are exactly perpendicular, and there is no friction."""
+        if one.kind != "wall" or other.kind != "wall" or self.law.friction is not None:
             return False
         direction = self.scene.walls[other.j, 1], self.scene.walls[other.j, 0]
         return square_to(self.scene.walls[one.j], *direction)
@@ -364,12 +367,12 @@ def shape_of(row: Sequence[float]) -> int:
 
 
 def rational(vector: Array) -> tuple[Fraction, Fraction]:
-    """The float64 numbers of a vector (2,) as the fractions they are."""
+    """The float64 numbers of a vector (2,) as exact fractions."""
     return Fraction(float(vector[0])), Fraction(float(vector[1]))
 
 
 def square_to(wall: Array, tip: Array, foot: Array | None = None) -> bool:
-    """Whether a wall stands at right angles to the vector from `foot` (default 0, 0) to `tip`, in
+    """Whether a wall is perpendicular to the vector from `foot` (default 0, 0) to `tip`, in
     rationals."""
     (px, py), (qx, qy) = rational(wall[0]), rational(wall[1])
     (x, y), (ox, oy) = rational(tip), rational(np.zeros(2) if foot is None else foot)

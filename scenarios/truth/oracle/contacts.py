@@ -1,21 +1,20 @@
-"""When two bodies touch next: roots of polynomials in t, in any numbers, without subtracting what
-is nearly equal."""
+"""When two bodies touch next: roots of polynomials in t, in any numbers, without cancellation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
 
-from scenarios.truth.oracle.filter import fall
+from scenarios.truth.oracle.filter import first_fall
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
 EPS = 2.0**-52
-# of a bracket, before Newton is tried: enough to leave the neighbours of a simple root
+# halvings of a bracket before Newton's method: enough to separate a simple root from others
 HALVINGS = 12
 
 
 class Pressed(ArithmeticError):
-    """Two bodies touch, do not approach, and are pressed together: a contact that lasts, no
+    """Two bodies touch without approach and accelerate towards each other: a lasting contact, not a
     collision."""
 
 
@@ -33,14 +32,14 @@ def meeting(k: Numbers, c: Number, b: Number, a2: Number) -> Number | None:
     under = b * b - a2 * c
     if under <= 0:
         return None
-    k.sign(under)  # a ball must prove here that the two do not just miss
+    k.sign(under)  # raises `Undecided` for a ball that does not prove that the two meet
     return c / (k.sqrt(under) - b)
 
 
 def crossing(k: Numbers, s: Number, v: Number, a: Number) -> Number | None:
     """s until s + v t + a t^2 / 2 (m, m/s, m/s2) next falls through 0, or None.
 
-    s < 0 is a point already behind the line: it must come out again before it can cross. Raises
+    For s < 0 the point is behind the line, and must come back before it can cross it. Raises
     `Pressed`.
     """
     side, going, curving = k.sign(s), k.sign(v), k.sign(a)
@@ -66,22 +65,22 @@ def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number |
     """s until the gap c0 + c1 t + ... + c4 t^4 (m2) of two bodies that accelerate differently
     closes, or None.
 
-    Only up to `limit` s. float64 finds between which times, by margins far above its rounding; many
-    digits find the time. Raises `Pressed`, and `Undecided` for balls where float64 cannot decide:
-    the two graze.
+    Only up to `limit` s. A bracket is found in float64, with margins far above its rounding, and
+    the time in many digits. Raises `Pressed`, and `Undecided` for balls where float64 finds no
+    bracket (a grazing contact).
     """
     touching = k.sign(gap[0]) <= 0
     approach = k.sign(gap[1] / 2) if touching else 0
     if touching and approach < 0:
         return k.exact(0.0)
     if touching:
-        # The root at 0 is the contact they leave; what is left of the polynomial begins positive.
+        # The root at 0 is the present contact: divide it out. The rest must begin positive.
         gap = gap[1:] if approach else gap[2:]
         if k.sign(gap[0]) < 0:
             raise Pressed
     rough = [float(x) for x in gap] + [0.0] * (5 - len(gap))
-    low, high = fall((rough[0], rough[1], rough[2], rough[3], rough[4]), limit, 0.0)
-    # Coefficients known less well than that would not be covered by the margins.
+    low, high = first_fall((rough[0], rough[1], rough[2], rough[3], rough[4]), limit, 0.0)
+    # The margins do not cover coefficients with a larger error than this.
     vague = any(k.spread(x) * max(1.0, limit) ** 4 > EPS * rough[0] for x in gap)
     if low == inf and not vague:
         return None
@@ -94,7 +93,7 @@ def falling_meeting(k: Numbers, gap: Sequence[Number], limit: float) -> Number |
 
 
 def sharpened(k: Numbers, p: Sequence[Number], low: float, high: float) -> Number:
-    """The one root of sum p[i] t^i between two times where it falls, by Newton's method.
+    """The one root of sum p[i] t^i between two times, where the sum decreases, by Newton's method.
 
     For balls the interval Newton method (Moore, Kearfott & Cloud, Introduction to Interval
     Analysis, 2009, 8.1): the root lies in m - p(m) / p'(T) if it lies in T and m is T's middle.
@@ -105,9 +104,13 @@ def sharpened(k: Numbers, p: Sequence[Number], low: float, high: float) -> Numbe
         if k.proves and not steep < 0:
             raise Undecided
         middle = t.mid() if k.proves else t
-        ahead = middle - _value(p, middle) / steep
-        done = not k.spread(ahead) < k.spread(t) / 2 if k.proves else abs(ahead - t) * 1024 < k.tie
-        t = ahead
+        improved = middle - _value(p, middle) / steep
+        done = (
+            not k.spread(improved) < k.spread(t) / 2
+            if k.proves
+            else abs(improved - t) * 1024 < k.tie
+        )
+        t = improved
         # Newton doubles the right digits: after a step of less than half of them all are right.
         if done:
             break
@@ -115,10 +118,10 @@ def sharpened(k: Numbers, p: Sequence[Number], low: float, high: float) -> Numbe
 
 
 def first_changes(k: Numbers, p: Sequence[Number], low: Number, high: Number) -> list[Number]:
-    """The roots of sum p[i] t^i between `low` and `high` at which it changes sign, increasing.
+    """The roots of sum p[i] t^i between `low` and `high` at which it changes sign, in order.
 
     Between two roots of its derivative a polynomial is monotone: one root at most in each piece,
-    found by halving and Newton's steps kept inside the bracket.
+    found by bisection and Newton steps that stay inside the bracket.
     """
     if len(p) < 2:
         return []
@@ -139,12 +142,12 @@ def _root(k: Numbers, p: Sequence[Number], low: Number, high: Number, rises: boo
             return t
         low, high = (t, high) if (value < 0) == rises else (low, t)
         steep = _value(slope, t)
-        ahead = t - value / steep if steep and step >= HALVINGS else low
-        ahead = ahead if low < ahead < high else (low + high) / 2
+        improved = t - value / steep if steep and step >= HALVINGS else low
+        improved = improved if low < improved < high else (low + high) / 2
         # Newton doubles the right digits: after a step of less than half of them all are right.
-        if abs(ahead - t) * 1024 < k.tie:
-            return ahead
-        t = ahead
+        if abs(improved - t) * 1024 < k.tie:
+            return improved
+        t = improved
     return t
 
 

@@ -1,8 +1,8 @@
-"""The event loop: exact flights between collisions, in any numbers, from one next event per disk.
+"""The event loop: exact flights between collisions, in any numbers, with one next event per disk.
 
-Each body keeps its motion since its own last event; each moving disk keeps a record of what it
-touches first. A record is stale when a partner has had an event since; it is then made anew when
-its turn comes. Every pair is covered by whichever of the two was predicted last (Lubachevsky, J.
+Each body keeps its motion since its own last event; each moving disk keeps a record of its next
+contact. A record is stale if the partner has had an event since; it is predicted again when its
+time comes. Of every pair, the disk that was predicted last has the valid record (Lubachevsky, J.
 Comput. Phys. 94, 255, 1991).
 """
 
@@ -13,33 +13,33 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenarios.model import Scene, Thrust
-from scenarios.truth.oracle.ahead import Ahead, key
 from scenarios.truth.oracle.bodies import Bodies
+from scenarios.truth.oracle.contact_finder import ContactFinder, key
 from scenarios.truth.oracle.contacts import Pressed
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
-from scenarios.truth.oracle.path import Ends, Event, Path, Recent, Record, ambiguous
+from scenarios.truth.oracle.path import Event, MotionEnds, Path, RecentCollisions, Record, ambiguous
 from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
-from scenarios.truth.oracle.ties import Blow, Contact, Outcome, Touch, Velocities
+from scenarios.truth.oracle.ties import Collision, Contact, Outcome, Touch, Velocities
 from scenarios.truth.oracle.work import Work
 
-MOST_IDLE = 100  # contacts on end without a collision: their signs contradict each other
+MOST_IDLE = 100  # contacts in a row without a collision: the digits no longer decide
 
 
 class Motion:
-    """A scene on its way to `until` s, in the numbers `k`, for so much `work`; arithmetic only
-    within `k.precise()`."""
+    """The motion of a scene up to `until` s, in the numbers `k`, within the limits of `work`; used
+    only within `k.precise()`."""
 
     def __init__(
         self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work
     ) -> None:
         self.k, self.until, self.scene, self.work = k, until, scene, work
         self.bodies = Bodies(scene, k)
-        self.ahead = Ahead(self.bodies)
+        self.finder = ContactFinder(self.bodies)
         self.records: list[Record | None] = [None] * scene.n
         self.due = np.full(scene.n, np.inf)
         self.now = k.exact(0.0)
         self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
-        self.recent = Recent(scene.n)
+        self.recent = RecentCollisions(scene.n)
         # From the last to the first, so that the next one can be popped.
         self.starts_and_stops = sorted(
             ((t, p.disk) for p in thrusts for t in (p.start, p.stop) if t < until), reverse=True
@@ -50,35 +50,36 @@ class Motion:
             "edge": self.wrap,
             "end": self.leave,
             "rest": self.stop,
-            "grip": self.roll,
+            "slip end": self.roll,
         }
 
     def run(self) -> Path:
-        """Everything up to `until`, or up to where the motion has no answer."""
+        """The motion up to `until`, or up to where it has no exact answer."""
         try:
             self.begin()
             while self.advance():
                 self.work.step(float(self.now), self.k.bits)
-        except Ends as end:
+        except MotionEnds as end:
             self.path.end, self.path.reason = end.t, str(end)
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
             self.path.named = [
-                [self.bodies.pair(blow.contact) for blow in one.blows] for one in end.outcomes
+                [self.bodies.pair(collision.contact) for collision in one.collisions]
+                for one in end.outcomes
             ]
         except Undecided:
             raise Undecided(float(self.now), self.path) from None
         return self.path
 
     def begin(self) -> None:
-        """Set the thrusts on from the start, rest what lies still, predict all."""
+        """Begin the thrusts of t = 0, find the disks that rest, and predict all."""
         while self.starts_and_stops and self.starts_and_stops[-1][0] == 0:
             self.set_thrusts(self.starts_and_stops.pop()[1])
-        for contact in lie_down(self.ahead):
+        for contact in lie_down(self.finder):
             self.rest(contact)
         self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
 
     def advance(self) -> bool:
-        """Do what comes next; False if nothing does before `until`."""
+        """Carry out the next event; False if there is none before `until`."""
         soonest = self.due.min()
         if self.starts_and_stops and self.starts_and_stops[-1][0] <= soonest:
             t, disk = self.starts_and_stops.pop()
@@ -98,10 +99,10 @@ class Motion:
         return True
 
     def next_contacts(self, soonest: float) -> tuple[int, list[Contact]]:
-        """The first disk and the contacts of its event; none if its record is stale and must be
-        made anew.
+        """The disk with the earliest event, and the contacts of that; none if its record is stale
+        and must be predicted again.
 
-        float64 clocks only tell which records are worth comparing.
+        The times in float64 only select the records that are compared in many digits.
         """
         near = [int(i) for i in np.flatnonzero(self.due <= soonest + 1e-9 * max(1.0, soonest))]
         first = near[0]
@@ -132,8 +133,8 @@ class Motion:
         return record
 
     def order(self, one: Record, other: Record) -> int:
-        """-1, 0 or 1 as `one` comes before, with or after `other`; balls that overlap are the same
-        time if the same."""
+        """-1, 0 or 1 if `one` is before, simultaneous with or after `other`. Balls that overlap are
+        simultaneous if they belong to the same disks, or to none in common."""
         try:
             return self.k.sign(one.t - other.t)
         except Undecided:
@@ -153,17 +154,17 @@ class Motion:
         )
 
     def predict(self, i: int) -> None:
-        """Find what disk i touches first from now on."""
+        """Find the next contact of disk i."""
         k = self.k
         now = float(self.now)
         left = self.until - now
         best: list[tuple[Number, Contact]] = []
         try:
-            for bound, contact in self.ahead.candidates(i, now, left):
+            for bound, contact in self.finder.candidates(i, now, left):
                 limit = float(best[0][0]) if best else left
                 if bound > limit * (1 + 1e-9) + 1e-12:
                     break
-                if (after := self.ahead.time_to(contact, self.now, limit)) is None:
+                if (after := self.finder.time_to(contact, self.now, limit)) is None:
                     continue
                 place = k.sign(after - best[0][0]) if best else -1
                 best = (
@@ -183,7 +184,7 @@ class Motion:
             self.expect(i, self.now if at_once else self.now + after, contacts)
 
     def expect(self, i: int, t: Number, contacts: tuple[Contact, ...]) -> None:
-        """Put down what disk i does next."""
+        """Set the record of disk i."""
         counts = self.bodies.count
         self.records[i] = Record(
             t, contacts, tuple(counts[c.j] if c.kind == "body" else 0 for c in contacts)
@@ -191,92 +192,98 @@ class Motion:
         self.due[i] = float(t) if float(t) <= self.until else np.inf
 
     def press(self, contact: Contact) -> None:
-        """A contact that lasts begins; on a wall the disk rests from now on."""
-        if not press(self.ahead, contact, self.now):
+        """Begin a lasting contact: from now on the disk rests on the wall."""
+        if not press(self.finder, contact, self.now):
             on = [self.bodies.name(held) for held in self.bodies.held[contact.i]]
             where = f" while it rests on {on[0]}" if on else ""
             others = [contact.j] if contact.kind == "body" and contact.j < self.scene.n else []
             reason = f"disk {contact.i} is pressed onto {self.bodies.name(contact)}{where}"
-            raise Ends(float(self.now), reason, [contact.i, *others])
+            raise MotionEnds(float(self.now), reason, [contact.i, *others])
         self.rest(contact)
         self.follow_up({contact.i})
 
     def collide(self, contacts: list[Contact]) -> None:
-        """Resolve the contacts of one instant; where their order matters there is no answer."""
+        """Resolve the contacts of one instant; if their order matters there is no exact answer."""
         self.refuse_corners(contacts)
-        alone = len(contacts) == 1 and self.ahead.alone(contacts[0], float(self.now))
+        alone = len(contacts) == 1 and self.finder.alone(contacts[0], float(self.now))
         if alone:
-            touches = [self.ahead.touch(contacts[0], self.now)]
+            touches = [self.finder.touch(contacts[0], self.now)]
         else:
-            touches = self.ahead.cluster(contacts, self.now)
+            touches = self.finder.cluster(contacts, self.now)
         disks = sorted({i for touch in touches for i in touch.contact.disks})
         v = {i: self.bodies.velocity_at(i, self.now) for i in disks}
         outcome = self.after_one(touches[0], v) if alone else self.after_all(touches, v)
-        self.log_all(outcome.blows, contacts)
-        touched = {i for blow in outcome.blows for i in blow.contact.disks} or set(disks)
+        self.log_all(outcome.collisions, contacts)
+        touched = {i for collision in outcome.collisions for i in collision.contact.disks} or set(
+            disks
+        )
         self.go_on(outcome, touches, touched)
 
     def refuse_corners(self, contacts: Sequence[Contact]) -> None:
-        """No answer where a disk that touches another comes to an edge of the wrap, or to the end
-        of its wall, or stops to slide."""
+        """Raise `MotionEnds` if a disk reaches an edge of the wrap or the end of its wall, or stops
+        sliding, at the instant at which it touches another."""
         comes = {
-            "edge": "comes to the edge of the wrap",
-            "end": "comes to the end of wall {}",
-            "grip": "slides no more along wall {}",
+            "edge": "reaches the edge of the wrap",
+            "end": "reaches the end of wall {}",
+            "slip end": "stops sliding along wall {}",
         }
         for contact in contacts:
             if contact.kind in comes:
                 what = comes[contact.kind].format(contact.j)
                 reason = f"disk {contact.i} {what} while it touches another"
-                raise Ends(float(self.now), reason, [contact.i])
+                raise MotionEnds(float(self.now), reason, [contact.i])
 
     def after_one(self, touch: Touch, v: Velocities) -> Outcome:
-        """The outcome of a contact that no other touches."""
-        matter = self.bodies.matter
-        after, blow = matter.collision(touch, v)
-        return Outcome(after, [blow], frozenset([touch.contact] if matter.sticks else ()))
+        """The outcome of a single contact."""
+        law = self.bodies.law
+        after, collision = law.collide(touch, v)
+        return Outcome(after, [collision], frozenset([touch.contact] if law.sticks else ()))
 
     def after_all(self, touches: Sequence[Touch], v: Velocities) -> Outcome:
-        """The one outcome of contacts at one instant, in whatever order they are resolved."""
+        """The outcome of contacts at one instant, if it is the same in every order."""
         bodies = self.bodies
         resting = frozenset(contact for held in bodies.held for contact in held)
-        ends, tried = bodies.matter.outcomes(touches, v, resting, bodies.upright)
+        ends, tried = bodies.law.outcomes(touches, v, resting, bodies.stays_still)
         self.work.left -= tried
         if len(ends) == 1 and ends[0].velocities:
             return ends[0]
         names = ", ".join(str(i) for i in v if i < self.scene.n)
         known = [end for end in ends if end.velocities]
-        raise Ends(float(self.now), ambiguous(names, ends), list(v), known)
+        raise MotionEnds(float(self.now), ambiguous(names, ends), list(v), known)
 
-    def log_all(self, blows: Sequence[Blow], contacts: Sequence[Contact]) -> None:
-        """Write the collisions of one instant down; those of `contacts` that come first are new."""
+    def log_all(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
+        """Log the collisions of one instant; the first one of each of `contacts` is new."""
         arriving = {key(contact) for contact in contacts}
-        for blow in blows:
-            self.log(blow, key(blow.contact) in arriving)
-            arriving.discard(key(blow.contact))
-        self.idle = 0 if blows else self.idle + 1
+        for collision in collisions:
+            self.log(collision, key(collision.contact) in arriving)
+            arriving.discard(key(collision.contact))
+        self.idle = 0 if collisions else self.idle + 1
         if self.idle > MOST_IDLE:
-            reason = f"the digits of {self.k.bits} bits are used up"
-            raise Ends(float(self.now), reason)
+            reason = f"numbers of {self.k.bits} bits have used up their digits"
+            raise MotionEnds(float(self.now), reason)
 
     def go_on(self, outcome: Outcome, touches: Sequence[Touch], touched: set[int]) -> None:
-        """New legs after the collisions of one instant; a bounce off a wall may be the first of the
-        last ones."""
+        """Begin new legs after the collisions of one instant; after a bounce off a wall, check
+        whether the bounces die out without another contact."""
         bodies = self.bodies
-        walls = [blow.contact for blow in outcome.blows if blow.contact.kind == "wall"]
-        bounce = walls[0] if len(outcome.blows) == 1 and walls else None
+        walls = [
+            collision.contact
+            for collision in outcome.collisions
+            if collision.contact.kind == "wall"
+        ]
+        bounce = walls[0] if len(outcome.collisions) == 1 and walls else None
         for i in sorted(touched):
             bodies.held[i] = tuple(c for c in bodies.held[i] if c in outcome.still)
             vx, vy, spin = outcome.velocities[i]
             for still in (c for c in outcome.still if c.kind == "wall" and c.i == i):
                 vx, vy = bodies.slide(still, vx, vy)
-            if bodies.matter.grip is not None:
-                bodies.held[i] = ()  # whether it slides is asked when it is pressed onto that again
+            if bodies.law.friction is not None:
+                bodies.held[i] = ()  # `press` decides whether it slides
             bodies.fly(i, self.now, (vx, vy, spin), bounce)
         bodies.remember(touches, touched)
-        if bounce is not None and outcome.blows[0].grips:
-            bodies.gripping[bounce.i] = bounce
-        # What was carried by a disk that is struck is carried no longer.
+        if bounce is not None and outcome.collisions[0].slip_ended:
+            bodies.no_slip_on[bounce.i] = bounce
+        # A disk no longer rests on a disk that has collided.
         dropped = {
             i
             for i, held in enumerate(bodies.held)
@@ -286,29 +293,29 @@ class Motion:
             bodies.hold(i, self.now, (), bodies.velocity_at(i, self.now))
         stop = None
         if bounce is not None and 0 < self.scene.restitution < 1:
-            stop = settle(self.ahead, bounce, self.now, self.thrusts)
+            stop = settle(self.finder, bounce, self.now, self.thrusts)
         self.follow_up(touched | dropped)
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 
-    def log(self, blow: Blow, new: bool) -> None:
-        """Write a collision down; refuse where those of a disk pile up."""
-        contact, j = blow.contact, self.bodies.partner(blow.contact)
+    def log(self, collision: Collision, new: bool) -> None:
+        """Log a collision; raises `MotionEnds` where those of a disk accumulate."""
+        contact, j = collision.contact, self.bodies.partner(collision.contact)
         self.path.events.append(
-            Event(self.now, contact.i, j, blow.impulse, float(blow.cosine), new)
+            Event(self.now, contact.i, j, collision.impulse, float(collision.cosine), new)
         )
         self.recent.add(contact.i, float(self.now), self.bodies.name(contact))
         if j >= 0:
             self.recent.add(j, float(self.now), f"disk {contact.i}")
 
     def rest(self, contact: Contact) -> None:
-        """Write down that a disk comes to rest: a contact begins, with no impulse."""
+        """Log that a disk comes to rest: a contact that begins without an impulse."""
         self.path.events.append(
             Event(self.now, contact.i, self.bodies.partner(contact), self.k.exact(0.0), 0.0)
         )
 
     def stop(self, contact: Contact) -> None:
-        """The bounces of a disk on a wall have died out: it rests."""
+        """Let a disk rest on a wall on which its bounces have died out."""
         bodies, i = self.bodies, contact.i
         wall = contact._replace(kind="wall")
         bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now), True)
@@ -316,32 +323,32 @@ class Motion:
         self.follow_up({i})
 
     def roll(self, contact: Contact) -> None:
-        """A disk that slides along a wall with friction has lost its slip: it rolls, if friction is
-        enough for that."""
+        """End the slip of a disk on a wall with friction: it rolls, if friction is large enough."""
         bodies, i, side = self.bodies, contact.i, contact.side
         vx, vy, spin = bodies.velocity_at(i, self.now)
-        # The spin at which there is no slip, to all digits.
+        # The spin without slip, to all digits.
         spin = spin - side * bodies.slip(contact, (vx, vy, spin)) / bodies.radius[i]
         bodies.hold(i, self.now, bodies.held[i], (vx, vy, spin), True)
         self.follow_up({i})
 
     def leave(self, contact: Contact) -> None:
-        """A disk slides off the end of the wall it rests on: on to the next in line, or into the
-        air."""
+        """Move a disk off the end of the wall it rests on: onto the next wall in line, or into free
+        flight."""
         bodies, i, k = self.bodies, contact.i, self.k
         held = [c for c in bodies.held[i] if c.j == contact.j]
         v, end = (
             bodies.velocity_at(i, self.now),
             self.scene.walls[contact.j, 1 if contact.side > 0 else 0],
         )
-        following = next_in_line(self.ahead, held[0], contact.side)
+        following = next_in_line(self.finder, held[0], contact.side)
         if following is None:
             _, ax, ay = bodies.free[i]
             slow = v[0] * v[0] + v[1] * v[1] + bodies.radius[i] * bodies.outward(held[0], ax, ay)
             if k.sign(slow) <= 0 or len(bodies.held[i]) > 1:
-                raise Ends(
+                raise MotionEnds(
                     float(self.now),
-                    f"disk {i} turns about the end of wall {contact.j}, off which it slides",
+                    f"disk {i} slides off the end of wall {contact.j} so slowly that it turns about"
+                    " it",
                     [i],
                 )
             bodies.hold(i, self.now, (), v)
@@ -350,22 +357,22 @@ class Motion:
                 for j in range(self.scene.n, len(bodies.legs))
                 if (bodies.table[j, :2] == end).all()
             )
-            bodies.remember([self.ahead.touch(Contact("body", i, corner), self.now)], set())
+            bodies.remember([self.finder.touch(Contact("body", i, corner), self.now)], set())
         else:
             bodies.hold(i, self.now, (following,), v, not bodies.sliding[i])
         self.follow_up({i})
 
     def wrap(self, contact: Contact) -> None:
-        """Set a disk onto the opposite edge; where another stands there, the exercise gives no
-        answer."""
+        """Move a disk to the opposite edge of the wrap; if it overlaps another one there, there is
+        no exact answer."""
         i = contact.i
         self.bodies.across(contact, self.now)
-        for other, gap in self.ahead.near(i, self.now):
+        for other, gap in self.finder.near(i, self.now):
             if gap < 0:
                 reason = (
                     f"disk {i} re-enters over the edge of the wrap onto {self.bodies.name(other)}"
                 )
-                raise Ends(float(self.now), reason, sorted(other.disks))
+                raise MotionEnds(float(self.now), reason, sorted(other.disks))
         self.follow_up({i})
 
     def set_thrusts(self, disk: int) -> None:
@@ -374,7 +381,7 @@ class Motion:
         self.bodies.set_thrusts(disk, self.now, on)
 
     def follow_up(self, disks: set[int]) -> None:
-        """Write down the new legs and predict the disks anew."""
+        """Add the new legs of these disks to the path, and predict the disks again."""
         moving = sorted(i for i in disks if i < self.scene.n and not self.scene.static[i])
         for i in moving:
             self.path.legs[i].append(self.bodies.legs[i])
@@ -386,7 +393,7 @@ class Motion:
 def trace(
     scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work | None = None
 ) -> Path:
-    """The motion of `scene` under `thrusts` up to `until` s, as far as `work` goes. Raises what
-    `Bodies` raises."""
+    """The motion of `scene` under `thrusts` up to `until` s, within the limits of `work`. Raises as
+    `Bodies`."""
     with k.precise():
         return Motion(scene, thrusts, until, k, work or Work()).run()

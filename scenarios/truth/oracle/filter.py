@@ -1,9 +1,9 @@
-"""What a disk may touch next, and not before when: float64 bounds, so that few contacts need many
-digits.
+"""Lower bounds in float64 on the times of the next contacts of a disk, so that only few contacts
+are computed in many digits.
 
-Every bound is lowered by far more than float64 rounds, so nothing is left out; what it lets through
-is only slower. A row of a table (b, 7) is a leg: x, y, vx, vy, ax, ay, t. Bodies that are asleep
-cannot be touched.
+Every bound is lowered by far more than the rounding of float64, so no contact is missed; a bound
+that is too low costs only time. A row of a table (b, 7) is a leg: x, y, vx, vy, ax, ay, t. Bodies
+that are asleep are left out.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from scenarios.model import Array
 
 Codes = NDArray[np.int64]
 
-SLACK = 1e-9  # of a distance or a time
-BLUR = 1e-12  # of what is added up: float64 rounds by 1e-16 of it, some ten times
+SLACK = 1e-9  # relative, of a distance or a time
+BLUR = 1e-12  # relative, of the terms of a sum: float64 rounds about ten times by 1e-16 of them
 HALVINGS = 60
 kernel = njit(cache=True, error_model="numpy")  # plain Python with NUMBA_DISABLE_JIT=1
 X, Y, VX, VY, AX, AY, T = range(7)
@@ -30,7 +30,7 @@ Quartic = tuple[float, float, float, float, float]
 
 @kernel
 def moved(row: Array, now: float) -> Row:
-    """x, y, vx, vy, ax, ay at `now` s of one leg."""
+    """x, y, vx, vy, ax, ay of a leg at `now` s."""
     s = now - row[T]
     x = row[X] + (row[VX] + row[AX] * s / 2) * s
     y = row[Y] + (row[VY] + row[AY] * s / 2) * s
@@ -49,10 +49,11 @@ def soonest(
     bounds: Array,
     codes: Codes,
 ) -> int:
-    """How many contacts disk i may have within `left` s of `now`, written into `bounds` (s) and
-    `codes`, soonest first.
+    """Write the possible contacts of disk i within `left` s of `now` into `bounds` (s, lower
+    bounds) and `codes`, soonest first; returns their number.
 
-    A code is a body, or from len(table) on twice the wall, plus 1 for its right side (side -1).
+    The code of a body is its index; that of a wall is len(table) + twice its index, plus 1 for its
+    right side (side -1).
     """
     one, count = moved(table[i], now), 0
     for j in range(len(table)):
@@ -74,7 +75,8 @@ def soonest(
 
 @kernel
 def insert(bound: float, code: int, left: float, bounds: Array, codes: Codes, count: int) -> int:
-    """Sort `code` in among the first `count`, unless it comes too late."""
+    """Insert `code` into the first `count` in order of time, unless its time is beyond `left`;
+    returns the new count."""
     if not bound <= left * (1 + SLACK) + BLUR:
         return count
     k = count
@@ -87,8 +89,8 @@ def insert(bound: float, code: int, left: float, bounds: Array, codes: Codes, co
 
 @kernel
 def pair_bound(one: Row, other: Row, reach: float, left: float) -> float:
-    """s before which two bodies cannot touch, at centres `reach` m apart; inf: not within `left`
-    s."""
+    """A lower bound, s, on the time until the centres of two bodies are `reach` m apart; inf: not
+    within `left` s."""
     dx, dy, du, dv = other[X] - one[X], other[Y] - one[Y], other[VX] - one[VX], other[VY] - one[VY]
     ax, ay = other[AX] - one[AX], other[AY] - one[AY]
     far = max(max(abs(one[X]), abs(one[Y])), max(abs(other[X]), abs(other[Y])))
@@ -103,8 +105,9 @@ def pair_bound(one: Row, other: Row, reach: float, left: float) -> float:
             du * ax + dv * ay,
             (ax * ax + ay * ay) / 4,
         )
-        return fall(f, left * (1 + 1e-6), BLUR * far * (distance + reach))[0]
-    # c / (-b + sqrt(b^2 - a2 c)), each part blurred so that the time comes out too early.
+        return first_fall(f, left * (1 + 1e-6), BLUR * far * (distance + reach))[0]
+    # c / (-b + sqrt(b^2 - a2 c)), each term changed by its rounding error so that the time is too
+    # early.
     closing -= blur * speed
     under = closing * closing - speed2 * max(gap, 0.0)
     if closing >= 0.0 or under < -8 * blur * (distance + reach) * speed2:
@@ -116,13 +119,13 @@ def pair_bound(one: Row, other: Row, reach: float, left: float) -> float:
 
 
 @kernel
-def fall(f: Quartic, end: float, blur: float) -> tuple[float, float]:
-    """Between which two times f[0] + ... + f[4] t^4 first falls through 0, up to `end`; (inf, inf):
-    never.
+def first_fall(f: Quartic, end: float, blur: float) -> tuple[float, float]:
+    """A bracket of the first time up to `end` at which f[0] + ... + f[4] t^4 falls through 0; (inf,
+    inf): it does not.
 
-    (t, 0): float64 cannot tell what happens from t on. blur: how far f[0] may be off. Piece by
-    piece, the Taylor series bounds f from below, or its slope from above; all by margins far above
-    the rounding.
+    (t, 0): float64 cannot decide what happens after t. blur: the error of f[0]. On each interval
+    the Taylor series bounds f from below, or its slope from above, with margins far above the
+    rounding.
     """
     a, h = 0.0, end
     for _ in range(20 * HALVINGS):
@@ -158,7 +161,7 @@ def taylor(f: Quartic, t: float) -> Quartic:
 
 @kernel
 def narrowed(f: Quartic, low: float, high: float, margin: float) -> tuple[float, float]:
-    """The bracket of a root, closed in by halving while both its ends are sure."""
+    """The bracket of a root, halved while the signs at both its ends are certain."""
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         value = taylor(f, middle)[0]
@@ -173,7 +176,8 @@ def narrowed(f: Quartic, low: float, high: float, margin: float) -> tuple[float,
 
 @kernel
 def wall_bound(one: Row, wall: Array, radius: float, side: float) -> float:
-    """s before which a disk cannot touch one side of the line of a wall; inf: never."""
+    """A lower bound, s, on the time until a disk touches one side of the line of a wall; inf:
+    never."""
     px, py, tx, ty = wall[0, 0], wall[0, 1], wall[1, 0] - wall[0, 0], wall[1, 1] - wall[0, 1]
     length = sqrt(tx * tx + ty * ty)
     nx, ny = -side * ty / length, side * tx / length
@@ -183,7 +187,7 @@ def wall_bound(one: Row, wall: Array, radius: float, side: float) -> float:
     speed = nx * one[VX] + ny * one[VY] - BLUR * (abs(one[VX]) + abs(one[VY]))
     acceleration = nx * one[AX] + ny * one[AY] - BLUR * (abs(one[AX]) + abs(one[AY]))
     if gap < -blur:
-        # Behind the line it must come out before it can cross again.
+        # A disk behind the line must come back before it can cross it.
         falls_back = acceleration < 0 and speed + 2 * BLUR * (abs(one[VX]) + abs(one[VY])) > 0
         return 0.0 if falls_back else inf
     gap = max(gap - blur, 0.0)
@@ -199,8 +203,8 @@ def wall_bound(one: Row, wall: Array, radius: float, side: float) -> float:
 def touching(
     table: Array, radius: Array, asleep: Array, walls: Array, i: int, now: float, codes: Codes
 ) -> int:
-    """How many contacts of disk i may have no gap at `now` s, written into `codes`; see
-    `soonest`."""
+    """Write the contacts of disk i that may have no gap at `now` s into `codes`, see `soonest`;
+    returns their number."""
     one, count = moved(table[i], now), 0
     far = max(abs(one[X]), abs(one[Y])) + radius[i]
     for j in range(len(table)):

@@ -1,10 +1,10 @@
-"""Numbers of as many digits as asked for, under one set of verbs: gmpy2's mpfr, the library's
-decimal, arb's balls.
+"""Numbers with any number of digits behind one interface: mpfr of gmpy2, decimal of the standard
+library, and balls (intervals) of arb.
 
-A kind makes numbers out of float64 (exactly), takes roots and determines signs. What lies below its
-`tie` counts as
-zero: no precision can tell an exact equality from a small difference, and half the digits are far
-more than chance needs. Balls never guess: where zero lies inside one, they raise `Undecided`.
+`Numbers` converts float64 exactly, takes square roots and determines signs. A number below `tie`
+counts as zero: no precision can distinguish an exact equality from a small difference, and two
+numbers that agree in half of their digits do not do so by chance. Balls need no `tie`: where zero
+lies inside one, its sign raises `Undecided`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ from math import ceil, log10
 from typing import Any
 
 Number = Any
-"""What a kind makes: mpfr, Decimal, arb. They share the operators of arithmetic and nothing
-else."""
+"""An mpfr, Decimal or arb. They share only the operators of arithmetic."""
 
 
 class Undecided(ArithmeticError):
-    """A ball holds zero, so its sign is not proven; at `t` s of a motion, of which `path` is what
-    was found."""
+    """A ball contains zero, so its sign is not proven; at `t` s of a motion, computed so far as
+    `path`."""
 
     def __init__(self, t: float = 0.0, path: Any = None) -> None:
         super().__init__(t)
@@ -41,10 +40,10 @@ class Numbers:
         exact: float64 -> the same number, unrounded.
         sqrt: number -> its root.
         sign: number -> -1, 0 or 1; 0 where it is below `tie`.
-        precise: makes the context within which all arithmetic is done.
-        between: two float64 -> a number between them; a ball, that holds both.
-        spread: number -> how far the right one may be from it; 0 where that is not known.
-        tie: number; what is smaller counts as zero. s, m, m/s: scenes are of the order of 1.
+        precise: makes the context in which all arithmetic is done.
+        between: two float64 -> a number between them; for balls, one that contains both.
+        spread: number -> the radius of a ball; 0 for other numbers.
+        tie: smaller numbers count as zero; in s, m and m/s, as scenes are of the order of 1.
         proves: whether these are balls.
     """
 
@@ -117,7 +116,7 @@ def decimals(bits: int) -> Numbers:
 
 
 def balls(bits: int) -> Numbers:
-    """Arb's real balls, which hold the right number for certain. Raises ImportError where
+    """Arb's real balls, which are proven to contain the exact number. Raises ImportError where
     python-flint is missing."""
     import flint
 

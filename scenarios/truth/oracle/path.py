@@ -1,5 +1,4 @@
-"""What the event loop finds: legs, collisions, and the reason where the motion has no answer any
-more."""
+"""The motion that the event loop computes: legs, collisions, and why and when it ends."""
 
 from __future__ import annotations
 
@@ -14,14 +13,16 @@ from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact, Outcome
 
-CROWDED = 64  # collisions of one disk ...
-INSTANT = 1e-9  # ... within so many s: they pile up towards a point in time
-PILE = 1e-5  # s before it; whom it strikes in between takes part
+ACCUMULATED = 64  # collisions of one disk ...
+INSTANT = 1e-9  # ... within this many s accumulate
+NAMED = 1e-5  # s before that; the bodies it collides with in this time are named in the reason
 
 
-class Ends(Exception):
-    """The motion has no answer from `t` s on; str() says why. `open` holds what it may become, if
-    that is known."""
+class MotionEnds(Exception):
+    """The motion has no exact answer from `t` s on; str() says why.
+
+    disks: those it concerns. outcomes: the possible outcomes, if they are known.
+    """
 
     def __init__(
         self, t: float, reason: str, disks: Sequence[int] = (), outcomes: Sequence[Outcome] = ()
@@ -32,7 +33,7 @@ class Ends(Exception):
 
 class Event(NamedTuple):
     """A collision: t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle;
-    new: they come together now, and did not touch before."""
+    new: whether the two did not touch before."""
 
     t: Number
     i: int
@@ -43,8 +44,8 @@ class Event(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a disk touches first (several contacts if at once), when, and how often each partner had
-    been struck then."""
+    """The next contact of a disk (several if simultaneous), its time t s, and the event count of
+    each partner when it was computed."""
 
     t: Number
     contacts: tuple[Contact, ...]
@@ -53,8 +54,16 @@ class Record(NamedTuple):
 
 @dataclass
 class Path:
-    """What was found: the legs of each disk, the collisions; until when (s), why no further, whom
-    it concerns, how it may go on, and by which collisions (disk, other disk or -1 - wall)."""
+    """A computed motion.
+
+    Attributes:
+        legs: of each disk, in order of time.
+        events: the collisions.
+        end, reason: s, up to when there is an exact answer, and why it ends there.
+        disks: those that the reason concerns.
+        outcomes: the possible outcomes at the end, if they are known.
+        named: the collisions of each outcome: disk, other disk or -1 - wall.
+    """
 
     legs: list[list[Leg]]
     events: list[Event] = field(default_factory=list)
@@ -65,32 +74,32 @@ class Path:
     named: list[list[tuple[int, int]]] = field(default_factory=list)
 
 
-class Recent:
+class RecentCollisions:
     """The latest collisions of each of n disks."""
 
     def __init__(self, n: int) -> None:
         self.collisions: list[deque[tuple[float, str]]] = [
-            deque(maxlen=4 * CROWDED) for _ in range(n)
+            deque(maxlen=4 * ACCUMULATED) for _ in range(n)
         ]
 
     def add(self, i: int, t: float, other: str) -> None:
-        """Disk i collisions `other` at t s. Raises `Ends` where its collisions pile up towards an
-        instant."""
+        """Disk i collides with `other` at t s. Raises `MotionEnds` where its collisions
+        accumulate."""
         collisions = self.collisions[i]
         collisions.append((t, other))
-        if len(collisions) < CROWDED or t - collisions[-CROWDED][0] > INSTANT:
+        if len(collisions) < ACCUMULATED or t - collisions[-ACCUMULATED][0] > INSTANT:
             return
-        others = sorted({name for at, name in collisions if at > t - PILE})
+        others = sorted({name for at, name in collisions if at > t - NAMED})
         disks = [i, *(int(name[5:]) for name in others if name.startswith("disk"))]
-        raise Ends(
-            collisions[-CROWDED][0],
+        raise MotionEnds(
+            collisions[-ACCUMULATED][0],
             f"the collisions of disk {i} on {' and '.join(others)} accumulate",
             disks,
         )
 
 
 def ambiguous(disks: str, ends: Sequence[Outcome]) -> str:
-    """Why a simultaneous contact has no answer."""
+    """The reason why simultaneous contacts have no exact answer."""
     if not ends[-1].velocities:
         return f"disks {disks} touch at once and their collisions do not end"
     return (

@@ -1,9 +1,9 @@
-"""What comes to rest: bounces that die out in finite time (rule Z1), what lies still from the
-start, what slides.
+"""Rest: bounces that die out in finite time (rule Z1), disks that rest from the start, disks that
+slide.
 
-A disk that leaves a line at the speed v and is accelerated back at g bounces infinitely often
+A disk that leaves a wall at the speed v and is accelerated back at g bounces infinitely often
 within 2 v / (g (1 - e)), and rests from then on (any textbook of mechanics, under "bouncing ball").
-If nothing can touch it before, that is exact.
+This is exact if nothing can touch the disk before.
 """
 
 from __future__ import annotations
@@ -16,29 +16,31 @@ import numpy as np
 
 from scenarios.model import Array, Thrust
 from scenarios.no_truth import NoTruth
-from scenarios.truth.oracle.ahead import Ahead, collinear, key
 from scenarios.truth.oracle.bodies import FALLING, STATIC, Bodies, Hop, Leg, rational, square_to
+from scenarios.truth.oracle.contact_finder import ContactFinder, collinear, key
 from scenarios.truth.oracle.filter import moved, touching
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact
 
-SAFE = 1 + 1e-6  # times every length by which float64 judges that two cannot meet
-FAR = 1e-12  # of the largest coordinate, the same
+SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disks cannot meet
+FAR = 1e-12  # relative to the largest coordinate, added to those lengths
 
 
-def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust]) -> Number | None:
-    """Let a disk that has just struck a wall bounce on for good, if nothing can touch it; when it
-    rests (s), or None.
+def settle(
+    finder: ContactFinder, contact: Contact, now: Number, thrusts: Sequence[Thrust]
+) -> Number | None:
+    """Replace all further bounces of a disk on a wall by one leg, if nothing can touch the disk
+    before it rests; the time, s, at which it rests, or None.
 
-    It must be on its leg after the collision, e < 1.
+    The disk must be on its leg after a collision with the wall; e < 1.
     """
-    bodies, k, i = ahead.bodies, ahead.k, contact.i
+    bodies, k, i = finder.bodies, finder.k, contact.i
     leg, wall = bodies.legs[i], bodies.walls[contact.j]
     fall = -bodies.outward(contact, leg.ax, leg.ay)
-    if k.sign(fall) <= 0 or not slip_stays(ahead, contact, thrusts):
+    if k.sign(fall) <= 0 or not slip_stays(finder, contact, thrusts):
         return None
     speed = bodies.outward(contact, leg.vx, leg.vy)
-    stop = now + 2 * speed / (fall * (1 - bodies.matter.restitution))
+    stop = now + 2 * speed / (fall * (1 - bodies.law.restitution))
     vx, vy = along(bodies, contact, leg.vx, leg.vy)
     ax, ay = along(bodies, contact, leg.ax, leg.ay)
     hop = Hop(-contact.side * wall.ty, contact.side * wall.tx, speed, fall)
@@ -46,43 +48,43 @@ def settle(ahead: Ahead, contact: Contact, now: Number, thrusts: Sequence[Thrust
     edges = [edge for thrust in thrusts if thrust.disk == i for edge in (thrust.start, thrust.stop)]
     if any(float(now) < edge <= float(stop) * SAFE for edge in edges):
         return None
-    if not untouched(ahead, contact, bounces, float(stop), thrusts):
+    if not untouched(finder, contact, bounces, float(stop), thrusts):
         return None
     bodies.begin(i, bounces)
     bodies.asleep[i] = True
     return stop
 
 
-def slip_stays(ahead: Ahead, contact: Contact, thrusts: Sequence[Thrust]) -> bool:
-    """Whether friction does nothing in the bounces of a disk: there is none, or the disk bounces
-    without slip on a level wall, and nothing turns it."""
-    bodies, i = ahead.bodies, contact.i
-    if bodies.matter.grip is None:
+def slip_stays(finder: ContactFinder, contact: Contact, thrusts: Sequence[Thrust]) -> bool:
+    """Whether friction does not act in the bounces of a disk: there is none, or the disk bounces
+    without slip on a level wall, under no torque."""
+    bodies, i = finder.bodies, contact.i
+    if bodies.law.friction is None:
         return True
     falls = bodies.free[i][0] == FALLING and square_to(
-        ahead.scene.walls[contact.j], ahead.scene.gravity
+        finder.scene.walls[contact.j], finder.scene.gravity
     )
-    return falls and bodies.gripping[i] == contact and not any(p.torque for p in thrusts)
+    return falls and bodies.no_slip_on[i] == contact and not any(p.torque for p in thrusts)
 
 
 def along(bodies: Bodies, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
-    """The part of a vector (x, y) along the wall of a contact; none where the disk rests on another
-    wall, too."""
+    """The part of a vector (x, y) along the wall of a contact; 0 if the disk also rests on another
+    wall."""
     if bodies.held[contact.i]:
         return bodies.k.exact(0.0), bodies.k.exact(0.0)
     return bodies.slide(contact, x, y)
 
 
 def untouched(
-    ahead: Ahead, contact: Contact, leg: Leg, stop: float, thrusts: Sequence[Thrust]
+    finder: ContactFinder, contact: Contact, leg: Leg, stop: float, thrusts: Sequence[Thrust]
 ) -> bool:
-    """Rule Z1: whether the disk on `leg` meets nothing but its wall until `stop` s, whatever the
-    others do.
+    """Rule Z1: whether the disk on `leg` can touch nothing but its wall until `stop` s, however the
+    others move.
 
-    None can be faster than all energy there is, with what gravity and thrusts may add, makes it:
-    d sqrt(K) / dt <= a sqrt(M / 2), K <= sum m v^2 / 2, |v_j| <= sqrt(2 K / m_j).
+    No speed can exceed that of all the kinetic energy in one disk, with what gravity and thrusts
+    can add: d sqrt(K) / dt <= a sqrt(M / 2), K <= sum m v^2 / 2, |v_j| <= sqrt(2 K / m_j).
     """
-    bodies, scene, i, w = ahead.bodies, ahead.scene, contact.i, contact.j
+    bodies, scene, i, w = finder.bodies, finder.scene, contact.i, contact.j
     left, table = stop - float(leg.t), bodies.table
     x, y, vx, vy, ax, ay = (float(value) for value in leg[1:7])
     assert leg.hop is not None
@@ -96,12 +98,12 @@ def untouched(
     slack = FAR * (np.abs(states[:, :2]).max() + 1)
     needed = (own + others) * SAFE
     clear = distance - heights > needed + slack
-    clear[[i, *ahead.in_line[w]]] = True
+    clear[[i, *finder.in_line[w]]] = True
     if (~clear & (bodies.asleep | (distance < needed - slack))).any():
         return False
-    for j in np.flatnonzero(~clear).tolist():  # too close for float64
+    for j in np.flatnonzero(~clear).tolist():  # float64 does not decide these
         clear[j] = apart(bodies, i, j, leg.t) > needed[j]
-    room, in_line = stretch(ahead, contact, float(bodies.foot(w, leg.x, leg.y)))
+    room, in_line = stretch(finder, contact, float(bodies.foot(w, leg.x, leg.y)))
     if not clear.all() or not own * SAFE + slack < room:
         return False
     if scene.wrap is not None and (
@@ -118,18 +120,18 @@ def untouched(
     return bool((away > own * SAFE + slack).all())
 
 
-def stretch(ahead: Ahead, contact: Contact, foot: float) -> tuple[float, set[int]]:
-    """How far a disk may slide either way, m, from `foot` m along its wall; and that wall with all
-    in line with it."""
+def stretch(finder: ContactFinder, contact: Contact, foot: float) -> tuple[float, set[int]]:
+    """How far a disk can slide in both directions, m, from `foot` m along its wall; and the walls
+    in line, with its own."""
     rooms, walls = [], {contact.j}
     for side in (1, -1):
         here: Contact | None = contact
-        room = foot if side < 0 else float(ahead.bodies.walls[contact.j].length) - foot
+        room = foot if side < 0 else float(finder.bodies.walls[contact.j].length) - foot
         heading = side
-        while here is not None and (following := next_in_line(ahead, here, heading)) is not None:
+        while here is not None and (following := next_in_line(finder, here, heading)) is not None:
             if following.j in walls:
                 break
-            room += float(ahead.bodies.walls[following.j].length)
+            room += float(finder.bodies.walls[following.j].length)
             heading = heading if following.side == here.side else -heading
             walls.add(following.j)
             here = following
@@ -138,7 +140,7 @@ def stretch(ahead: Ahead, contact: Contact, foot: float) -> tuple[float, set[int
 
 
 def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
-    """m between two bodies, to all digits of a float64 however small it is."""
+    """The gap, m, between two bodies, to all digits of float64 even where it is tiny."""
     (x, y, _, _), (px, py, _, _) = bodies.state_at(i, now), bodies.state_at(j, now)
     dx, dy, reach = px - x, py - y, bodies.radius[i] + bodies.radius[j]
     gap = dx * dx + dy * dy - reach * reach
@@ -150,8 +152,8 @@ def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
 def travel(
     bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust], spins: float
 ) -> Array:
-    """(b,) m, how far each body gets within `left` s at most, from states (b, 6) as of `moved`; see
-    `untouched`. spins: J, that friction may make flight of."""
+    """(b,) m, the largest distance that each body can move within `left` s, from states (b, 6) as
+    of `moved`; see `untouched`. spins: J, rotational energy that friction may turn into motion."""
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
     accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
@@ -165,7 +167,7 @@ def travel(
 
 
 def spin_energy(bodies: Bodies, now: Number) -> float:
-    """J, of all that turns, where there is friction; 0 where there is none."""
+    """J, the rotational energy of all disks, where there is friction; else 0."""
     scene = bodies.scene
     turns = np.isfinite(scene.inertia) & ~scene.static
     spins = np.array([float(bodies.turn_at(i, now).spin) for i in range(scene.n)])
@@ -177,41 +179,41 @@ def hop_height(leg: Leg) -> float:
     return 0.0 if leg.hop is None else float(leg.hop.speed) ** 2 / 2 / float(leg.hop.fall)
 
 
-def press(ahead: Ahead, contact: Contact, now: Number) -> bool:
-    """Let a disk that is accelerated onto a wall it touches, with no speed across it, rest on it;
+def press(finder: ContactFinder, contact: Contact, now: Number) -> bool:
+    """Let a disk rest on a wall that it touches without normal speed and is accelerated towards;
     False if it cannot.
 
-    On a second wall it rests if that stands at right angles to the first, or if it lies still
-    between the two.
+    It can rest on a second wall that is perpendicular to the first one, or if it is at rest between
+    the two.
     """
-    bodies, i = ahead.bodies, contact.i
+    bodies, i = finder.bodies, contact.i
     if contact.kind != "wall":
         return False
     held, v = bodies.held[i], bodies.velocity_at(i, now)
     if held:
         still = not bodies.table[i, 2:4].any()
         _, ax, ay = bodies.free[i]
-        if len(held) > 1 or held[0].kind != "wall" or bodies.matter.grip is not None:
+        if len(held) > 1 or held[0].kind != "wall" or bodies.law.friction is not None:
             return False
         wedged = (
             still and bodies.k.sign(bodies.outward(held[0], *bodies.slide(contact, ax, ay))) < 0
         )
-        if not wedged and not bodies.upright(held[0], contact):
+        if not wedged and not bodies.stays_still(held[0], contact):
             return False
-    rolls = bodies.gripping[i] == contact and bodies.legs[i].t is now
+    rolls = bodies.no_slip_on[i] == contact and bodies.legs[i].t is now
     bodies.hold(i, now, (*held, contact), (*along(bodies, contact, *v[:2]), v[2]), rolls)
     return True
 
 
-def lie_down(ahead: Ahead) -> list[Contact]:
-    """Rest what lies still at the start: disks on walls, and disks straight above each other on
-    those. The contacts."""
-    bodies, now = ahead.bodies, ahead.bodies.k.exact(0.0)
-    found = start(ahead)
+def lie_down(finder: ContactFinder) -> list[Contact]:
+    """Let disks that touch a wall rest on it from the start, and disks at rest straight above such
+    a disk on that; the contacts."""
+    bodies, now = finder.bodies, finder.bodies.k.exact(0.0)
+    found = start(finder)
     lying = [
         c for c, approach in found if c.kind == "wall" and approach == 0 and _pressed(bodies, c)
     ]
-    rested = [c for c in lying if press(ahead, c, now)]
+    rested = [c for c in lying if press(finder, c, now)]
     pairs = [
         Contact("body", *ends)
         for c, _ in found
@@ -219,8 +221,8 @@ def lie_down(ahead: Ahead) -> list[Contact]:
         for ends in ((c.i, c.j), (c.j, c.i))
     ]
     still = [not row.any() for row in bodies.table[:, 2:4]]
-    if bodies.matter.grip is not None:
-        pairs = []  # with friction more than one contact that lasts is refused
+    if bodies.law.friction is not None:
+        pairs = []  # with friction only one lasting contact per disk is supported
     while upper := next(
         (c for c in pairs if still[c.i] and not bodies.held[c.i] and _carries(bodies, c)), None
     ):
@@ -229,10 +231,10 @@ def lie_down(ahead: Ahead) -> list[Contact]:
     return rested
 
 
-def next_in_line(ahead: Ahead, contact: Contact, side: int) -> Contact | None:
-    """The wall that goes on where this one ends (side 1) or starts (-1), in line with it, as a
-    contact; or None."""
-    walls, w = ahead.scene.walls, contact.j
+def next_in_line(finder: ContactFinder, contact: Contact, side: int) -> Contact | None:
+    """The contact with the wall that continues this one in line at its end (side 1) or start (-1);
+    None if there is none."""
+    walls, w = finder.scene.walls, contact.j
     tip, heading = walls[w, 1 if side > 0 else 0], side * (walls[w, 1] - walls[w, 0])
     for other, wall in enumerate(walls):
         ahead_of = wall.sum(axis=0) - 2 * tip
@@ -244,15 +246,14 @@ def next_in_line(ahead: Ahead, contact: Contact, side: int) -> Contact | None:
 
 
 def _pressed(bodies: Bodies, contact: Contact) -> bool:
-    """Whether its acceleration presses the disk of a contact onto the wall, when nothing holds
-    it."""
+    """Whether the acceleration of free flight presses the disk of a contact onto the wall."""
     _, ax, ay = bodies.free[contact.i]
     return bodies.k.sign(bodies.outward(contact, ax, ay)) < 0
 
 
 def _carries(bodies: Bodies, contact: Contact) -> bool:
-    """Whether contact.j lies still and exactly below contact.i, so that gravity alone keeps the two
-    together."""
+    """Whether contact.j is at rest exactly below contact.i, so that gravity alone keeps them in
+    contact."""
     scene, i, j = bodies.scene, contact.i, contact.j
     if bodies.free[i][0] != FALLING or scene.static[i]:
         return False
@@ -264,20 +265,20 @@ def _carries(bodies: Bodies, contact: Contact) -> bool:
     return (px - x) * gy == (py - y) * gx and (px - x) * gx + (py - y) * gy > 0
 
 
-def start(ahead: Ahead) -> list[tuple[Contact, Fraction]]:
-    """The contacts that touch at the start, exactly, and dr.dv of each (up to a positive factor);
-    facts are noted.
+def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
+    """The contacts that touch exactly at the start, and dr.dv of each (up to a positive factor);
+    those without approach are noted in `bodies`.
 
     Raises:
         NoTruth: bodies overlap.
     """
-    bodies, scene = ahead.bodies, ahead.scene
+    bodies, scene = finder.bodies, finder.scene
     faults, found = [], dict[tuple[Any, ...], tuple[Contact, Fraction]]()
     for i in np.flatnonzero(~scene.static).tolist():
         count = touching(
-            bodies.table, bodies.radii, bodies.asleep, scene.walls, i, 0.0, ahead.codes
+            bodies.table, bodies.radii, bodies.asleep, scene.walls, i, 0.0, finder.codes
         )
-        for contact in [ahead.contact(i, code) for code in ahead.codes[:count].tolist()]:
+        for contact in [finder.contact(i, code) for code in finder.codes[:count].tolist()]:
             gap, approach, overlap = at_start(bodies, contact)
             if gap < 0 and key(contact) not in found:
                 name = bodies.name(contact)
@@ -291,13 +292,13 @@ def start(ahead: Ahead) -> list[tuple[Contact, Fraction]]:
         raise NoTruth(faults[0] + (f" ({len(faults) - 1} more)" if len(faults) > 1 else ""))
     for contact, approach in found.values():
         if approach >= 0:
-            bodies.remember([ahead.touch(contact, bodies.legs[contact.i].t)], set())
+            bodies.remember([finder.touch(contact, bodies.legs[contact.i].t)], set())
     return list(found.values())
 
 
 def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, float]:
-    """The gap (up to a positive factor), dr.dv (the same) and the overlap, m, of a contact; all but
-    the last exact."""
+    """The gap and dr.dv of a contact, both exact up to a positive factor, and its overlap, m, in
+    float64."""
     rows, scene, i = bodies.table, bodies.scene, contact.i
     (x, y), (u, v), r = (
         rational(rows[i, :2]),

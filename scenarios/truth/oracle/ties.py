@@ -1,5 +1,5 @@
-"""Collisions: one contact at a time, and contacts that touch at the same instant, resolved in every
-order there is."""
+"""Collisions: of one contact, and of several contacts at one instant, resolved in every possible
+order."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from scenarios.truth.oracle.friction import Grip, limited
+from scenarios.truth.oracle.friction import Friction, limited
 from scenarios.truth.oracle.numbers import Number, Numbers
 
 MOST_ORDERS = 3000  # collisions tried in all orders together
-LONGEST = 200  # collisions of one order at one instant; more do not end
+LONGEST = 200  # collisions of one order at one instant; more count as endless
 
 
 class Contact(NamedTuple):
-    """What disk `i` comes to: kind "body", a disk j or an end point (j from n on); "wall", a side
-    of wall j; "edge" of the wrap across axis j; "end" of the wall j it rests on; "rest", where its
-    bounces on a side of wall j die out; "grip", where it slides along that no more.
+    """What disk `i` meets next.
+
+    kind: "body", disk j or an end point (j from n on); "wall", a side of wall j; "edge", of the
+    wrap across axis j; "end", of wall j on which it rests; "rest", its bounces on a side of wall j
+    have died out; "slip end", its slip on wall j ends.
     """
 
     kind: str
@@ -28,27 +30,27 @@ class Contact(NamedTuple):
 
     @property
     def disks(self) -> set[int]:
-        """The bodies whose motion it changes; an end point among them does no harm."""
+        """The bodies whose motion it changes; an end point may be among them."""
         return {self.i, self.j} if self.kind == "body" else {self.i}
 
 
 class Touch(NamedTuple):
-    """A contact at its instant: the direction (dx, dy) from the centre of i to the other, any
-    length but 0."""
+    """A contact at its instant, with the direction (dx, dy) from the centre of i to the other side,
+    of any length but 0."""
 
     contact: Contact
     dx: Number
     dy: Number
 
 
-class Blow(NamedTuple):
-    """A collision that was carried out: its impulse N s along the normal, and the cosine of the
-    impact angle, |v_n| / |v|; whether friction has ended the slip of the contact points."""
+class Collision(NamedTuple):
+    """A collision that was carried out: its impulse along the normal, N s; the cosine of the impact
+    angle, |v_n| / |v|; and whether friction ended the slip of the contact points (`slip_ended`)."""
 
     contact: Contact
     impulse: Number
     cosine: Number
-    grips: bool = False
+    slip_ended: bool = False
 
 
 Velocity = tuple[Number, Number, Number]
@@ -57,28 +59,28 @@ Velocities = dict[int, Velocity]
 
 
 class Outcome(NamedTuple):
-    """How a simultaneous contact may end: velocities, the collisions in one order, contacts with no
-    speed across, exactly."""
+    """A possible outcome of simultaneous contacts: velocities, the collisions in one order, and the
+    contacts with exactly no speed along their normal (`still`)."""
 
     velocities: Velocities
-    blows: list[Blow]
+    collisions: list[Collision]
     still: frozenset[Contact]
 
 
 @dataclass(frozen=True)
-class Matter:
-    """What a collision needs to know of the bodies: 1 / mass (b,) 1/kg and the restitution, in
-    numbers; whether that is 0; and what friction needs, if there is any."""
+class CollisionLaw:
+    """The law of collisions for a set of bodies: 1 / mass (b,) 1/kg; the restitution; whether that
+    is 0 (`sticks`); and the data for friction, if there is any (`friction`)."""
 
     numbers: Numbers
     inverse_mass: Sequence[Number]
     restitution: Number
     sticks: bool
-    grip: Grip | None = None
+    friction: Friction | None = None
 
     @cached_property
-    def faint(self) -> Number:
-        """m2/s, what is slower is on its way to the tie."""
+    def least_approach(self) -> Number:
+        """m2/s; a slower approach is about to decay below `tie`."""
         return self.numbers.sqrt(self.numbers.tie)
 
     def approach(self, touch: Touch, v: Mapping[int, Velocity]) -> Number:
@@ -92,11 +94,11 @@ class Matter:
         contact = touch.contact
         return v[contact.i], v[contact.j] if contact.kind == "body" else (nought,) * 3
 
-    def collision(self, touch: Touch, v: Velocities) -> tuple[Velocities, Blow]:
+    def collide(self, touch: Touch, v: Velocities) -> tuple[Velocities, Collision]:
         """The velocities after the collision, and the collision.
 
-        q = -(1 + e) b / (dr.dr (w_i + w_j)) times dr: no root, which in float64 would make energy
-        drift.
+        q = -(1 + e) b / (dr.dr (w_i + w_j)) times dr: no square root, which in float64 would make
+        the energy drift.
         """
         contact, dx, dy = touch
         (ux, uy, spin), (px, py, turn) = self._pair(touch, v)
@@ -108,35 +110,48 @@ class Matter:
         if contact.kind == "body":
             after[contact.j] = (px + q * other * dx, py + q * other * dy, turn)
         speed2 = (px - ux) * (px - ux) + (py - uy) * (py - uy)
-        blow = Blow(contact, q * root(square), -b / root(square * speed2))
-        return (after, blow) if self.grip is None else self.rubbed(touch, v, after, blow, self.grip)
+        collision = Collision(contact, q * root(square), -b / root(square * speed2))
+        return (
+            (after, collision)
+            if self.friction is None
+            else self.rubbed(touch, v, after, collision, self.friction)
+        )
 
     def rubbed(
-        self, touch: Touch, v: Velocities, after: Velocities, blow: Blow, grip: Grip
-    ) -> tuple[Velocities, Blow]:
-        """`after` and `blow` of a collision from velocities v, with what friction adds; see
-        `friction`."""
+        self,
+        touch: Touch,
+        v: Velocities,
+        after: Velocities,
+        collision: Collision,
+        friction: Friction,
+    ) -> tuple[Velocities, Collision]:
+        """`after` and `collision` of a collision from velocities v, with friction added; see
+        `friction.py`."""
         contact, i, body = touch.contact, touch.contact.i, touch.contact.kind == "body"
         (ux, uy, spin), (px, py, turn) = self._pair(touch, v)
         distance = self.numbers.sqrt(touch.dx * touch.dx + touch.dy * touch.dy)
         tx, ty = -touch.dy / distance, touch.dx / distance
-        slip = tx * (px - ux) + ty * (py - uy) - grip.radius[i] * spin
-        softness = self.inverse_mass[i] + grip.softness(i)
+        slip = tx * (px - ux) + ty * (py - uy) - friction.radius[i] * spin
+        inverse_effective_mass = self.inverse_mass[i] + friction.rim_inverse_mass(i)
         if body:
-            slip -= grip.radius[contact.j] * turn
-            softness += self.inverse_mass[contact.j] + grip.softness(contact.j)
-        kick, grips = limited(self.numbers, -slip / softness, grip.friction * blow.impulse)
+            slip -= friction.radius[contact.j] * turn
+            inverse_effective_mass += self.inverse_mass[contact.j] + friction.rim_inverse_mass(
+                contact.j
+            )
+        kick, slip_ended = limited(
+            self.numbers, -slip / inverse_effective_mass, friction.coefficient * collision.impulse
+        )
         after = {**after, i: self._kicked(after[i], i, -kick * tx, -kick * ty, kick)}
         if body:
             j = contact.j
             after[j] = self._kicked(after[j], j, kick * tx, kick * ty, kick)
-        return after, blow._replace(grips=grips)
+        return after, collision._replace(slip_ended=slip_ended)
 
     def _kicked(self, v: Velocity, i: int, jx: Number, jy: Number, kick: Number) -> Velocity:
-        """A velocity after the impulse (jx, jy) N s on the rim of body i, which turns it by r
-        `kick`, clockwise."""
-        assert self.grip is not None
-        w, turns = self.inverse_mass[i], self.grip.radius[i] * self.grip.inverse_inertia[i]
+        """A velocity after the impulse (jx, jy) N s on the rim of body i, whose angular impulse is
+        r `kick`, clockwise."""
+        assert self.friction is not None
+        w, turns = self.inverse_mass[i], self.friction.radius[i] * self.friction.inverse_inertia[i]
         return v[0] + w * jx, v[1] + w * jy, v[2] - turns * kick
 
     def outcomes(
@@ -144,48 +159,47 @@ class Matter:
         touches: Sequence[Touch],
         v: Velocities,
         still: frozenset[Contact] = frozenset(),
-        upright: Callable[[Contact, Contact], bool] = lambda _one, _other: False,
+        stays_still: Callable[[Contact, Contact], bool] = lambda _one, _other: False,
     ) -> tuple[list[Outcome], int]:
-        """Every different end that resolving the approaching contacts in some order can have, with
-        one such order.
+        """Every distinct outcome of resolving the approaching contacts, over all orders, each with
+        one of its orders; and the number of collisions that were tried.
 
-        And how many collisions were tried for that.
-
-        still: contacts with no speed across, exactly. upright: whether a collision on one contact
-        leaves the other so. The last element has no velocities where some order does not end.
+        still: contacts with exactly no speed along their normal. stays_still: whether a collision
+        on one contact keeps another one `still`. If some order does not end, the last outcome has
+        no velocities.
         """
         sign, ends = self.numbers.sign, list[Outcome]()
         waiting = [Outcome(v, [], still)]
         for tried in range(MOST_ORDERS):
             if not waiting:
                 return ends, tried
-            now, blows, still = waiting.pop()
-            if len(blows) > LONGEST:
+            now, collisions, still = waiting.pop()
+            if len(collisions) > LONGEST:
                 break
             closing = [
                 touch
                 for touch in touches
                 if touch.contact not in still and sign(self.approach(touch, now)) < 0
             ]
-            # Collisions that die out towards the tie do not end: with more digits there would be
-            # more of them.
+            # Collisions whose speed decays to the tie have no end: more digits would give more of
+            # them.
             if (
-                blows
+                collisions
                 and not self.numbers.proves
-                and any(abs(self.approach(t, now)) < self.faint for t in closing)
+                and any(abs(self.approach(t, now)) < self.least_approach for t in closing)
             ):
                 break
             for touch in closing:
-                after, blow = self.collision(touch, now)
+                after, collision = self.collide(touch, now)
                 kept = {
                     c
                     for c in still
-                    if not c.disks & touch.contact.disks or upright(c, touch.contact)
+                    if not c.disks & touch.contact.disks or stays_still(c, touch.contact)
                 }
                 kept |= {touch.contact} if self.sticks else set()
-                waiting.append(Outcome(after, [*blows, blow], frozenset(kept)))
+                waiting.append(Outcome(after, [*collisions, collision], frozenset(kept)))
             if not closing and not any(self._same(now, end.velocities) for end in ends):
-                ends.append(Outcome(now, blows, still))
+                ends.append(Outcome(now, collisions, still))
         return [*ends, Outcome({}, [], frozenset())], MOST_ORDERS
 
     def _same(self, one: Mapping[int, Velocity], other: Mapping[int, Velocity]) -> bool:

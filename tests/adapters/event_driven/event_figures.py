@@ -36,7 +36,7 @@ def measured(
     at = 200 / rate
     engine.advance(at)
     engine.kept.clear()
-    _, start = engine.look(at)
+    _, start = engine.motion_at(at)
     kinetic, span = (start**2).sum() / 2 / (disks - 1), collisions / (rate * disks / 2) / blocks
     impulses, counts = np.zeros(blocks), np.zeros(blocks)
     for block in range(blocks):
@@ -44,7 +44,7 @@ def measured(
         engine.advance(at)
         impulses[block], counts[block] = engine.collisions[:, 3].sum(), len(engine.collisions)
         engine.kept.clear()
-    _, end = engine.look(at)
+    _, end = engine.motion_at(at)
     found, rates = 1 + impulses / (2 * disks * kinetic * span), 2 * counts / disks / span
     v2 = (end**2).sum(axis=1)
     return {

@@ -101,8 +101,8 @@ class EventTruth:
                 engine.advance(at)
                 if at in edges:
                     self.set_accelerations(engine, scene, at)
-                seen += [engine.look(at)] * int((t == at).sum())
-                turned += [engine.look_turned(at)] * int((t == at).sum())
+                seen += [engine.motion_at(at)] * int((t == at).sum())
+                turned += [engine.rotation_at(at)] * int((t == at).sum())
         except NoTruth as refusal:
             end, reason = refusal.at, str(refusal)
         shape = (len(seen), scene.n, 2)

@@ -140,7 +140,7 @@ def compare(seed):
     np.testing.assert_allclose(
         np.array(found).reshape(-1, 3), np.array(collisions).reshape(-1, 3), rtol=0, atol=1e-7
     )
-    apart = engine.look(now)[0] - x
+    apart = engine.motion_at(now)[0] - x
     apart -= side * np.round(apart / side) if side else 0
     assert np.abs(apart).max() < 1e-7
 
@@ -188,7 +188,7 @@ def plain_kernels(right="", wrong=""):
     folder = Path(events.__file__).parent
     source = "\n".join((folder / f"{name}.py").read_text() for name in FILES)
     ours = r"from adapters\.event_driven\.\w+ import (\([^)]*\)|.*)"
-    source = re.sub(rf"from __future__.*|@kernel|@inlined|@pasted|{ours}", "", source)
+    source = re.sub(rf"from __future__.*|@kernel|@inlined_early|@inlined|{ours}", "", source)
     assert right in source
     names: dict = {"__name__": "plain"}
     exec(source.replace(right, wrong) if right else source, names)

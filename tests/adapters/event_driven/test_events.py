@@ -111,7 +111,7 @@ def two(gap=0.5, closing=1.0, **fields):
             r"disks 0 and 1 overlap by 0\.25 m at the start: move one 0\.25 m away",
         ),
         (two(gap=-(2.0**-52)), None, "disks 0 and 1 overlap by 2.22e-16 m"),
-        (two(gap=0.0), None, "disks 0 and 1 touch and close in at 1 m/s at the start: leave a gap"),
+        (two(gap=0.0), None, "disks 0 and 1 touch and approach at 1 m/s at the start: leave a gap"),
         (
             two(walls=[[[0, -0.25], [9, -0.25]]]),
             None,
@@ -120,7 +120,7 @@ def two(gap=0.5, closing=1.0, **fields):
         (
             two(walls=[[[-0.5, -9], [-0.5, 9]]], closing=-1.0),
             None,
-            "disk 0 touches wall 0 and closes in at the start",
+            "disk 0 touches wall 0 and moves into it at the start",
         ),
         (
             two(wrap=[[0, -0.4], [9, 0.4]]),
@@ -208,7 +208,7 @@ def test_the_log_and_the_epochs_change_nothing():
     for at in np.linspace(0, 5, 777):
         often.advance(at)
     assert (often.collisions == at_once.collisions).all()
-    assert (often.look(5.0)[0] == x).all()
+    assert (often.motion_at(5.0)[0] == x).all()
     long, _, end = state_after(scene, 20000.0, torus)
     assert len(long.collisions) > 2 * events.LOG_ROWS
     assert (np.diff(long.collisions[:, 0]) >= 0).all()

@@ -89,7 +89,7 @@ def test_no_two_disks_ever_overlap(packing):
     i, j = np.triu_indices(60, 1)
     for at in np.linspace(0, 300, 1001)[1:]:
         engine.advance(at)
-        x, _ = engine.look(at)
+        x, _ = engine.motion_at(at)
         apart = x[i] - x[j]
         apart -= side * np.round(apart / side)
         # A position is rounded at 20 m, and a time at 300 s moves it by 5e-14 m/s s: 1e-13.

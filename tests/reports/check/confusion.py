@@ -34,9 +34,9 @@ def judged(paths: Sequence[Path]) -> dict[Path, FileCheck]:
 
 
 def first(one: FileCheck) -> CheckRow | None:
-    """What is said first: a fault, or where there is none that a guard is missing."""
+    """What is said first: a fault, or where there is none that a case is not handled."""
     return next(iter(one.faults), None) or next(
-        (row for row in one.choices if "no guard" in row.cause), None
+        (row for row in one.choices if "does not handle" in row.cause), None
     )
 
 

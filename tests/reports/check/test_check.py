@@ -100,7 +100,7 @@ def test_two_mistakes_are_both_reported(tmp_path: Path):
     sentences = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py")).sentences
 
     assert "the force is not divided by the mass" in sentences[0]
-    assert "B gets the sign of A" in sentences[1]
+    assert "the impulse on B has the sign of that on A" in sentences[1]
 
 
 def test_another_restitution_is_a_free_choice_and_is_judged_by_itself():
@@ -132,11 +132,14 @@ def test_a_free_choice_is_no_fault_and_does_not_read_as_one():
         "anything",
     ]
     touch, split, separating, same_centre = (row.cause for row in choices)
-    assert touch == "the comparison is the one with <="
-    assert "only A is moved. The task asks to displace the two until they meet" in split
-    assert "does not say by how much each" in split
+    assert touch == "the comparison is <="
+    assert (
+        "only A is moved, by the whole overlap. The task asks to displace the two until they meet"
+        in split
+    )
+    assert "does not say how far each one moves" in split
     assert "as the formula is printed" in separating
-    assert "there is no guard for this case" in same_centre
+    assert "the file does not handle this case" in same_centre
 
 
 def test_an_unknown_mistake_is_said_to_be_unknown(tmp_path: Path):

@@ -14,7 +14,7 @@ from reports.check.marks import Marked
 from tests.reports.check.test_marks import HOSTILE, marked, row, students
 from tests.reports.page.browsing import opened, overhang
 
-SIGN = row("2d", "velocity of B", "fault", "B gets the sign of A")
+SIGN = row("2d", "velocity of B", "fault", "the impulse on B has the sign of that on A")
 
 
 def test_each_cause_counts_a_student_once_and_each_student_has_one_bar():
@@ -22,7 +22,7 @@ def test_each_cause_counts_a_student_once_and_each_student_has_one_bar():
     twice = marked(SIGN, replace(SIGN, name="momentum"))
 
     assert causes([twice, marked(SIGN), marked()]) == {
-        "Task 2d velocities: B gets the sign of A.": 2
+        "Task 2d velocities: the impulse on B has the sign of that on A.": 2
     }
     assert sum(distribution(students()).values()) == len(students())
     assert distribution([marked()])["18 to 20"] == 1
@@ -52,7 +52,7 @@ def test_a_class_is_sorted_filtered_and_opens_offline(browser: Browser, tmp_path
     everybody = ids.count()
     page.get_by_role("button", name="total").click()
     totals = [float(x) for x in page.locator(".students tbody td:nth-child(2)").all_inner_texts()]
-    page.locator("#filter").fill("sign of a")
+    page.locator("#filter").fill("sign of that on a")
     filtered = ids.all_inner_texts()
     page.locator(".students details:visible summary").click()
     opened_text = page.locator(".students details[open]").inner_text()

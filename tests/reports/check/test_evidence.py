@@ -286,7 +286,9 @@ def test_what_depends_on_who_is_a_is_a_fault_of_the_part_that_makes_it_so(
 
     assert found["mass_of_a_twice.js"] == [("2c", "the mass of A is used for both")]
     assert consequences["mass_of_a_twice.js"].tasks["2d"] == "right"
-    assert found["two_masses_and_b_mass.py"] == [("2d", "B is divided by the mass of A")]
+    assert found["two_masses_and_b_mass.py"] == [
+        ("2d", "the impulse on B is divided by the mass of A")
+    ]
 
 
 def test_what_follows_from_a_fault_in_another_task_is_no_fault_of_its_own(

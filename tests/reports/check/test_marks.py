@@ -204,7 +204,7 @@ def students() -> list[Marked]:
         row("2c", "impulse", "fault", "the factor (1 + e) is missing"),
         row("2d", "velocity of B", "not asked", "it fails"),
         row("scenes", "crowd", "follows", "it follows from the faults above"),
-        row("2a", "just touching", "free choice", "the comparison is the one with <"),
+        row("2a", "just touching", "free choice", "the comparison is <"),
     ]
     hostile = marked(
         row("1", "velocity", "fault", HOSTILE),

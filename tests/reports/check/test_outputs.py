@@ -90,7 +90,7 @@ def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_lin
     assert said.count("it divides by (mA + mB)") == 1, "a fault is named once"
     assert "seen in What impulse does A get from B, for masses of 1.3 and 5.1 kg? Got:" in said
     assert "These follow from the faults above: whole scenes (head_on" in said
-    assert "  free choice  2a  just touching: the comparison is the one with <" in right
+    assert "  free choice  2a  just touching: the comparison is <" in right
     assert "expected" not in right
     assert max(map(len, wrong.splitlines())) <= 80
 

@@ -18,7 +18,7 @@ import pytest
 
 from reports.run.answers import Answer, put_answer, read_answer, record_of
 from scenarios.catalogue import scenario
-from scenarios.truth.cache import is_said
+from scenarios.truth.cache import has_valid_types
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
@@ -176,9 +176,9 @@ def test_numbers_of_a_record_are_numbers_and_its_texts_texts():
         {"reason": None},
     ]
 
-    assert is_said(good)
-    assert not any(is_said(good | one) for one in bad)
-    assert not is_said([good])
+    assert has_valid_types(good)
+    assert not any(has_valid_types(good | one) for one in bad)
+    assert not has_valid_types([good])
 
 
 @pytest.mark.slow

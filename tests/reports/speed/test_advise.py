@@ -76,7 +76,7 @@ def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
 def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type):
     """Negative controls in a scene of flight and bounces; the engine that they are made from is
     right."""
-    scenario, truth = ladder.held("box_billiard", 0)
+    scenario, truth = ladder.scored("box_billiard", 0)
     dt = scenario.dt(scenario.substeps[-1])
 
     def error(engine) -> float:

@@ -9,7 +9,7 @@ import pytest
 from reports.speed import budget, explained
 from reports.speed.budget import RESIDUAL, TOTAL, budget_of
 from reports.speed.explained import COLUMNS, Cut, extent, sentence, share
-from reports.speed.ladder import held
+from reports.speed.ladder import scored
 
 
 def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:
@@ -70,7 +70,7 @@ def test_the_budget_itself_tells_how_far_it_goes():
     gas, fall = table.loc["gas_of_100"], table.loc["free_fall"]
 
     assert 0 < gas.until_s < gas.horizon_s < gas.duration_s
-    assert gas.horizon_s == held("gas_of_100", 0).scenario.duration
+    assert gas.horizon_s == scored("gas_of_100", 0).scenario.duration
     assert fall.until_s == fall.horizon_s == fall.duration_s
     assert [cut.scenario for cut in extent(table.reset_index()).cuts] == ["gas_of_100"]
 

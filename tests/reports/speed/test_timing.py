@@ -42,14 +42,14 @@ def table(samples: list[Sample]) -> pd.DataFrame:
 def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
     """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
     in it."""
-    held = ladder.held("near_miss", 0).scenario
-    steps = held.intervals
+    scored = ladder.scored("near_miss", 0).scenario
+    steps = scored.intervals
     samples = ladder.times_of(
         "near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0
     )
     best = summed_up(table(samples), ["key"]).best.iloc[0]
 
-    assert steps * EACH / held.duration <= best <= (1 + SLACK) * steps * EACH / held.duration
+    assert steps * EACH / scored.duration <= best <= (1 + SLACK) * steps * EACH / scored.duration
 
 
 def test_what_wrapping_in_python_took_is_given_separately():
@@ -124,13 +124,13 @@ def test_the_summary_leaves_the_warm_up_out_and_has_quartiles_and_the_fastest():
 
 
 def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_take_too_long():
-    """Cost n^1.5: the exponent is 1.5 with an interval of no width; foreseen costs follow the same
-    law."""
+    """Cost n^1.5: the exponent is 1.5 with an interval of no width; extrapolated_cost costs follow
+    the same law."""
     n = np.array([10.0, 100.0, 1000.0, 10_000.0])
     course = [(int(k), float(k**1.5)) for k in n]
 
     assert sizes.exponent(n, n**1.5) == pytest.approx((1.5, 1.5, 1.5))
-    assert sizes.foreseen(course, 100_000) == pytest.approx(1e5**1.5)
+    assert sizes.extrapolated_cost(course, 100_000) == pytest.approx(1e5**1.5)
     assert np.isnan(sizes.exponent(n[:3], n[:3])).all()
 
 
@@ -150,7 +150,7 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
     sizes.costs({"quick:own": partial(Ageing, 0.0)}, (10,), 12, 1.0, patience=1.0, seed=0)
 
     assert len(ages) > 12
-    assert max(ages) <= sizes.FRESH + sizes.WARM_STEPS
+    assert max(ages) <= sizes.RESTART_AFTER + sizes.WARM_STEPS
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():

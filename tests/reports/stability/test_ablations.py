@@ -136,7 +136,7 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablatio
         == "the reference with end-of-step detection and the engine's flight and position"
         " correction has this limit"
     )
-    assert other.reason == "friction takes speed along the contact"
+    assert other.reason == "friction reduces the speed along the contact"
     assert other.source == "the engine's default"
     assert untested.why.startswith("likely: overlaps are corrected")
 

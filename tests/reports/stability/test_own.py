@@ -14,15 +14,15 @@ import pytest
 from adapters.engines import FETCHED
 from reports.cli import VARIED
 from reports.stability.cases import CASES
-from reports.stability.explain import explained, tried_out
+from reports.stability.explain import explained, with_replays
 from reports.stability.interventions import (
     INTERVENTIONS,
     faster,
     intervention_of,
     larger,
+    reason_by_intervention,
     slower,
     smaller,
-    why_played,
 )
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
@@ -84,7 +84,7 @@ def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_cal
     the limit. Or nothing helps."""
     path = str(SCENES / "two.toml")
     search = Search(case_of_file(path, "dt"), "pymunk:matched", QUICK)
-    [limit] = explained([tried_out(search, replace(search.limit(), case=f"{path}:dt"))])
+    [limit] = explained([with_replays(search, replace(search.limit(), case=f"{path}:dt"))])
     assert limit.why == "a collision takes effect at the end of the step in which it is found"
     assert (
         limit.tested == "the reference with end-of-step detection and nothing else has this limit"
@@ -95,7 +95,7 @@ def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_cal
     nothing = replace(
         limit, case="x.toml:speed", mechanisms="", trials=(replace(failing, broken="collisions"),)
     )
-    reason, _, tested = why_played(nothing, "speed")
+    reason, _, tested = reason_by_intervention(nothing, "speed")
     assert reason.startswith(NOT_KNOWN)
     assert "in steps of an eighth" in reason
     assert tested == ""

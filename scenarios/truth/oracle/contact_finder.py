@@ -1,5 +1,5 @@
-"""What a body touches next and what it touches now, in many digits where float64 bounds leave a
-doubt."""
+"""The next contact of a body and its present contacts: first by float64 bounds, then in many digits
+where these do not decide."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from scenarios.truth.oracle.filter import soonest, touching
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact, Touch
 
-LATE = 1e-6  # of a limit: what meets at the limit itself must be seen as simultaneous
+LATE = 1e-6  # relative; a search goes so far beyond its limit, to find contacts at the limit itself
 
 
-class Ahead:
-    """Contacts of `bodies`, each asked for where it may come next."""
+class ContactFinder:
+    """Finds the next and the present contacts of `bodies`."""
 
     def __init__(self, bodies: Bodies) -> None:
         self.bodies, self.k, self.scene = bodies, bodies.k, bodies.scene
         most = len(bodies.legs) + 2 * len(bodies.walls)
         self.bounds, self.codes = np.empty(most), np.empty(most, np.int64)
-        # Ends of walls that lie on the line of each wall: what rests on it slides over them, or off
-        # them.
+        # For each wall the ends of walls on its line: a disk that rests on the wall slides over
+        # them, or off them.
         ends = range(self.scene.n, len(bodies.legs))
         self.in_line = [
             {j for j in ends if collinear(wall, bodies.table[j, :2])} for wall in self.scene.walls
         ]
 
     def contact(self, i: int, code: int) -> Contact:
-        """The contact of disk i of that code, see `soonest`."""
+        """The contact of disk i with a code of `soonest`."""
         wall, right = divmod(code - len(self.bodies.legs), 2)
         return Contact("wall", i, wall, 1 - 2 * right) if wall >= 0 else Contact("body", i, code)
 
     def candidates(self, i: int, now: float, left: float) -> Iterator[tuple[float, Contact]]:
-        """What disk i may touch within `left` s, with the s from now before which it cannot,
-        soonest first."""
+        """The possible contacts of disk i within `left` s, each with a lower bound on the time to
+        it, s, soonest first."""
         bodies = self.bodies
         if self.scene.wrap is not None:
             yield from ((0.0, edge) for edge in self._edges(i))
@@ -50,7 +50,7 @@ class Ahead:
             for side in (1, -1)
         )
         if bodies.sliding[i]:
-            yield from ((0.0, c._replace(kind="grip")) for c in held)
+            yield from ((0.0, c._replace(kind="slip end")) for c in held)
         count = soonest(
             bodies.table,
             bodies.radii,
@@ -68,7 +68,7 @@ class Ahead:
                 yield bound, contact
 
     def _edges(self, i: int) -> Iterator[Contact]:
-        """The edges of the wrap that disk i may be on its way to."""
+        """The edges of the wrap that disk i may reach."""
         velocity, acceleration = self.bodies.table[i, 2:4], self.bodies.table[i, 4:6]
         for axis in (0, 1):
             for side in (1, -1):
@@ -76,7 +76,7 @@ class Ahead:
                     yield Contact("edge", i, axis, side)
 
     def _holds(self, contact: Contact) -> bool:
-        """Whether this contact is what disk i rests on, or an end in its line."""
+        """Whether disk i rests on this contact, or on a wall with this end on its line."""
         held = self.bodies.held[contact.i]
         if contact.kind == "body":
             return contact in held or any(
@@ -91,7 +91,7 @@ class Ahead:
             return self._time_to_edge(contact, now)
         if contact.kind == "end":
             return self._time_to_end(contact, now)
-        if contact.kind == "grip":
+        if contact.kind == "slip end":
             return self._time_to_grip(contact, now)
         if contact.kind == "wall":
             return self._time_to_wall(contact, now)
@@ -136,12 +136,12 @@ class Ahead:
             return None
         x, y = x + (u + leg.ax * after / 2) * after, y + (v + leg.ay * after / 2) * after
         foot = bodies.foot(contact.j, x, y)
-        beside = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
-        return None if beside else after
+        past_end = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
+        return None if past_end else after
 
     def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
-        """Whether a point (x, y) with velocity (u, v) is beside the wall and not about to leave
-        over its ends."""
+        """Whether the foot of a point (x, y) lies on the wall, and its velocity (u, v) does not
+        move it off an end."""
         frame, foot = self.bodies.walls[wall], self.bodies.foot(wall, x, y)
         heading = frame.tx * u + frame.ty * v
         for left, leaving in ((foot, -heading), (frame.length - foot, heading)):
@@ -150,8 +150,8 @@ class Ahead:
         return True
 
     def _time_to_end(self, contact: Contact, now: Number) -> Number | None:
-        """s until the point at which a disk rests on a wall comes to the wall's end (side 1) or
-        start."""
+        """s until the contact point of a disk that rests on a wall reaches the wall's end (side 1)
+        or start (side -1)."""
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
@@ -164,7 +164,7 @@ class Ahead:
         return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
 
     def _time_to_grip(self, contact: Contact, now: Number) -> Number | None:
-        """s until a disk that slides along a wall with friction has no slip any more."""
+        """s until the slip of a disk on a wall with friction ends; None if it does not."""
         bodies, i = self.bodies, contact.i
         leg, way = bodies.legs[i], bodies.sliding[i]
         assert leg.turn is not None
@@ -182,7 +182,7 @@ class Ahead:
             self.k.exact(0.0) if self.bodies.kind[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
         )
         gap, speed = side * (edge - state[axis]), -side * state[2 + axis]
-        # A centre that stands on an edge is not beyond it.
+        # A centre at rest on an edge is not beyond it.
         if self.k.sign(gap) == 0 and self.k.sign(speed) == 0:
             return None
         return crossing(self.k, gap, speed, acceleration)
@@ -198,7 +198,7 @@ class Ahead:
         return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
 
     def alone(self, contact: Contact, now: float) -> bool:
-        """Whether the disks of a contact surely touch nothing else."""
+        """Whether the disks of a contact certainly touch nothing else."""
         bodies, walls = self.bodies, self.scene.walls
         for i in contact.disks:
             count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, self.codes)
@@ -210,8 +210,8 @@ class Ahead:
         return True
 
     def near(self, i: int, now: Number, sure: Sequence[Contact] = ()) -> list[tuple[Contact, int]]:
-        """What disk i touches (0) or overlaps (-1) now; contacts that surely touch are not asked
-        about."""
+        """The contacts of disk i that touch (0) or overlap (-1) now, except those in `sure`, which
+        are known to touch."""
         bodies, found = self.bodies, list[tuple[Contact, int]]()
         x, y, _, _ = bodies.state_at(i, now)
         walls, known = self.scene.walls, {key(contact) for contact in sure}
@@ -224,20 +224,21 @@ class Ahead:
             if contact.kind == "body":
                 touch, reach = self.touch(contact, now), bodies.radius[i] + bodies.radius[contact.j]
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
-                beside = False
+                past_end = False
             else:
                 gap, foot = (
                     self.k.sign(bodies.height(contact, x, y) - bodies.radius[i]),
                     bodies.foot(contact.j, x, y),
                 )
-                beside = (
+                past_end = (
                     self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
                 )
-            found += [(contact, gap)] if gap <= 0 and not beside else []
+            found += [(contact, gap)] if gap <= 0 and not past_end else []
         return found
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:
-        """All contacts that touch now, of these disks and of all that touch those."""
+        """All contacts that touch now, of the disks in `contacts` and of all disks connected to
+        them by contacts."""
         done: set[int] = set()
         waiting = {contact.i for contact in contacts} | {c.j for c in contacts if c.kind == "body"}
         found = {key(contact): contact for contact in contacts}
@@ -253,7 +254,8 @@ class Ahead:
 
 
 def key(contact: Contact) -> tuple[Any, ...]:
-    """The same for both members of a pair, and for each side of a wall apart."""
+    """A key for a contact: the same from both disks of a pair, different for the two sides of a
+    wall."""
     return ("body", *sorted((contact.i, contact.j))) if contact.kind == "body" else tuple(contact)
 
 
