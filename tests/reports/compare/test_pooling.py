@@ -108,7 +108,7 @@ def test_the_scenes_and_the_median_of_before_fail_both():
     free_fall's own closed form, a g dt t / 2 over the radius, at every step.
     """
     errors = errors_of(BEFORE, STEPPING)
-    fall = ladder.held("free_fall", 0).scenario
+    fall = ladder.scored("free_fall", 0).scenario
     g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
     for step_size in range(STEP_SIZES):
         medians = np.percentile(errors["reference:exercise", step_size], 50, method="nearest")

@@ -58,7 +58,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
             scene_rows(SCENE, "slow_collision", 0, in_turns([engine]), often),
         )
         kept.add(("time", "truth", "slow_collision"), models.closed_form("slow_collision", 0))
-    assert ladder.held("slow_collision", 0).scenario.name == "slow_collision"
+    assert ladder.scored("slow_collision", 0).scenario.name == "slow_collision"
     return place
 
 
