@@ -220,6 +220,16 @@ ELASTIC: dict[str, Impulse] = {
 MISTAKES = IMPULSES | scalar_products() | ELASTIC
 
 
+AS_IF_EQUAL = "J and the new velocities use no mass, or one mass for both"
+# Formulas for the change of A's velocity, m/s, which is that of B, too, with the other sign
+MASSLESS: dict[str, Impulse] = {
+    f"{AS_IF_EQUAL}: the spheres collide as if their masses were equal": scaled(
+        lambda h, e: 1 / (2 * h.mu)
+    ),
+    f"{AS_IF_EQUAL}: each gets a change of (1 + e) vn": scaled(lambda h, e: 1 / h.mu),
+}
+
+
 @dataclass(frozen=True)
 class Finding:
     """The explanation of a file's collisions.
@@ -261,6 +271,7 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
             slips := components(seen, IMPULSES[""], e)
         ) is not None:
             found = Finding("", slips[0], "2d", e, IMPULSES[""], slips[1])
+        found = found or without_masses(seen, e)
         if found := found or fitting(product(impulses, UPDATES), seen, e):
             wrong_way = found.impulse == NEVER and impulse_if_separating(answers, e)
             return replace(found, impulse=APPROACH) if wrong_way else found
@@ -280,6 +291,16 @@ def fitting(
             ended = [impulse != "" and near(came, 0.0) for _, came in seen]
             if any(right) and all(np.logical_or(right, ended)):
                 return Finding(impulse, update, row.task, e, law, row.change)
+    return None
+
+
+def without_masses(seen: Sequence[tuple[PairCollision, Array]], e: float) -> Finding | None:
+    """The mistake of `MASSLESS` that reproduces every collision: one, though J and the update are
+    both wrong."""
+    change = UPDATES["the impulse is not divided by the masses"].change
+    for mistake, law in MASSLESS.items():
+        if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
+            return Finding(mistake, "", "2d", e, law, change)
     return None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from adapters.own_solver.restitution import EXERCISE
 from reports.check.collisions import PairCollision, changes, collision_of
-from reports.check.impacts import IMPULSES, SEPARATING, UPDATES, Finding, tangent
+from reports.check.impacts import IMPULSES, MASSLESS, SEPARATING, UPDATES, Finding, tangent
 from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
@@ -69,7 +69,8 @@ class CollisionCase:
     @property
     def shown_impulse(self) -> Array:
         """J n as far as it is known, N s: a mistake in (d) changes the impulse on A."""
-        return self.computed_impulse if self.found else self.received
+        known = self.found is not None and self.found.impulse not in MASSLESS
+        return self.computed_impulse if known else self.received
 
     @property
     def right_c(self) -> bool:
@@ -79,7 +80,9 @@ class CollisionCase:
     @property
     def right_d(self) -> bool:
         """Whether the update is known to be right."""
-        return self.found is not None and (not self.found.update or self.found.task != "2d")
+        if self.found is None or self.found.impulse in MASSLESS:
+            return False
+        return not self.found.update or self.found.task != "2d"
 
 
 def impulse_rows(

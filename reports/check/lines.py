@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of
+from reports.check.impacts import AS_IF_EQUAL
 from reports.check.questions import QUESTIONS, Question, fresh_world
 from reports.check.rows import SAME_AGAIN, CheckRow
 
@@ -151,6 +152,7 @@ CALLED = {
 # causes on the lines that compute the normal of a pair, and those that name it but are elsewhere
 ABOUT_NORMAL = re.compile(r"\bnormal\b|\bd[xy] is")
 SIGN_OF_J = "sign of the normal or of J"
+NO_MASSES = "the masses are missing"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
 GUARD = re.compile(r"==\s*0\b")  # two at the same place
 ASSIGNS = re.compile(r"([\w.,\s\[\]]+?)\s*[-+*/]?=(?![=>])")
@@ -265,9 +267,23 @@ class Source:
                 *impulse_lines(seen, "mass"),
                 *(a.line for a in seen if is_write(a, "velocity")),
             ]
+        if row.task == "2c" and row.cause.startswith(AS_IF_EQUAL):
+            return [*self.lines_of_j(seen), *(a.line for a in seen if is_write(a, "velocity"))]
+        if row.task == "2c" and NO_MASSES in row.cause:
+            return self.lines_of_j(seen) or impulse_lines(seen, row.cause)
         if row.task == "2c":
             return made or impulse_lines(seen, row.cause)
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
+
+    def lines_of_j(self, seen: Sequence[Access]) -> list[int]:
+        """The lines that set a variable after the last that reads a velocity, up to the first that
+        writes one: those of J, if it reads no number of a sphere."""
+        writes = [a.line for a in seen if is_write(a, "velocity")]
+        reads = [a.line for a in seen if a.field == "velocity" and a.line not in writes]
+        if not (reads and writes):
+            return []
+        code = code_of(self.text).splitlines()
+        return [k for k in range(max(reads) + 1, min(writes)) if assigned(code[k - 1])]
 
     def normal_lines(self, seen: Sequence[Access], cause: str) -> list[int]:
         """The lines that compute the normal or the distance, if the cause is about these.
