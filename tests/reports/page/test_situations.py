@@ -101,6 +101,8 @@ def test_the_terminal_names_who_models_no_friction_below_the_numbers_with_units(
     assert headings[1] == "Position\nradii"
     assert all("\n" in heading for heading in headings[1:])
     assert medians(smooth, set())[2] == []
+    refused = [replace(each, runs=[x for x in each.runs if x.name in without]) for each in rough]
+    assert medians(refused, set())[1:] == ([], without)  # where no other engine was played
     assert "reference:exercise" in [row[0] for row in medians(smooth, set())[1]]
 
 
