@@ -342,10 +342,13 @@ def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name
 @fetched
 @pytest.mark.slow
 def test_what_brakes_matter_in_flight_is_its_air_and_its_order_of_updates():
-    """Of a free fall nothing is left over; of a pair some percent are not known."""
+    """Of a free fall nothing is left over; of a pair some percent are not known, of an oblique
+    collision up to a half, of friction nearly all, as adapters/README.md says."""
     for profile in ("shipped", "matched"):
         assert left_over("free_fall", f"matter:{profile}") < 1e-9
-        assert 0.01 < left_over("head_on_equal_e09", f"matter:{profile}") < 0.2
+        assert 0.05 < left_over("head_on_equal_e09", f"matter:{profile}") < 0.1
+        assert 0.02 < left_over("oblique_e09", f"matter:{profile}") < 0.5
+    assert left_over("slip_to_roll", "matter:matched") > 0.9
 
 
 @fetched
