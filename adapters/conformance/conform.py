@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from adapters.conformance.contract import CONTRACT
 from adapters.conformance.physics import PHYSICS
 from adapters.conformance.probe import Probe, ProbeReading
-from adapters.engine import Unsupported
+from adapters.engine import NotLoaded, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.own_solver.process import processes_reused
 
@@ -44,7 +44,7 @@ class Finding:
 
 def conform(name: str, row: EngineRow) -> list[Finding]:
     """One finding for each probe, in the order of `PROBES`; only the finding "make" if the engine
-    cannot be made.
+    cannot be made, or its file not loaded: no probe would say more.
 
     Every exception becomes a finding: a refusal (`Unsupported`) counts as not asked, any other
     exception as a failed probe.
@@ -55,7 +55,10 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
             row.make().close()
         except Exception as error:  # a missing library, or one that fails to start
             return [no_answer(name, type(error).__name__, str(error))]
-        return [ask(engine, profile, probe, row) for probe in PROBES]
+        try:
+            return [ask(engine, profile, probe, row) for probe in PROBES]
+        except NotLoaded as fault:
+            return [no_answer(name, "not loaded", str(fault))]
 
 
 def no_answer(name: str, what: str, why: str) -> Finding:
@@ -75,11 +78,13 @@ def no_answer(name: str, what: str, why: str) -> Finding:
 
 
 def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
-    """The finding of one probe."""
+    """The finding of one probe; raises `NotLoaded`."""
     probe = PROBES[name]
     try:
         reading = probe.read(row)
         verdict = "keeps" if reading.kept else missed(name, row)
+    except NotLoaded:
+        raise
     except Unsupported as refusal:
         reading, verdict = ProbeReading("refused", "an answer", note=str(refusal)), "not asked"
     except Exception as error:  # an engine may raise anything; the finding records it

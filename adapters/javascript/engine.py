@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from adapters.advance import Foreseen
-from adapters.engine import ContactImpulse, Unsupported
+from adapters.engine import ContactImpulse, NotLoaded, Unsupported
 from adapters.float32 import must_fit, rounding
 from adapters.javascript.v8 import Packaged
 from adapters.own_solver.file import SolverFailed
@@ -49,7 +49,7 @@ class JavaScriptEngine:
 
     @property
     def process(self) -> SolverProcess:
-        """The process, an idle one or a new one, when it is first needed; raises `Unsupported` if
+        """The process, an idle one or a new one, when it is first needed; raises `NotLoaded` if
         the engine cannot be loaded."""
         if self.started is None:
             self.started = IDLE.pop((os.getpid(), self.packaged), None)
@@ -57,7 +57,7 @@ class JavaScriptEngine:
             try:
                 self.started = SolverProcess(self.packaged)
             except SolverFailed as failure:
-                raise Unsupported(f"{self.packaged.package}: {failure}") from None
+                raise NotLoaded(f"{self.packaged.package}: {failure}") from None
         return self.started
 
     def do(self, command: str, argument: Any = None) -> Any:

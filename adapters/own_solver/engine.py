@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import ContactImpulse, Unsupported
+from adapters.engine import ContactImpulse, NotLoaded, Unsupported
 from adapters.engine_row import FLOAT64, EngineRow
 from adapters.friction import must_be_frictionless
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
@@ -54,13 +54,13 @@ class Student:
 
     @property
     def process(self) -> SolverProcess:
-        """The process, started when first needed; raises `Unsupported` if the file cannot be
+        """The process, started when first needed; raises `NotLoaded` if the file cannot be
         loaded."""
         if self.started is None:
             try:
                 self.started = SolverProcess(self.solver, compiled=True)
             except SolverFailed as failure:
-                raise Unsupported(f"{self.path.name} {failure}") from None
+                raise NotLoaded(f"{self.path.name} {failure}") from None
             self.whole = self.started.surface != "exercise"
             if not self.whole:
                 make_globals(self.started)

@@ -142,10 +142,10 @@ def read_library(path: Path, text: str) -> dict[str, str]:
     """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
     `NotASolver`."""
     # it imports numpy, which --help does not need
-    from adapters.own_solver.gl_matrix import WHERE_TO, gl_matrix_of
+    from adapters.own_solver.gl_matrix import gl_matrix_of, where_to
 
     found = gl_matrix_of(path, text)
-    return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], WHERE_TO))}
+    return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], where_to()))}
 
 
 def read_module(path: Path) -> str:

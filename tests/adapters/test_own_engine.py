@@ -459,3 +459,15 @@ def test_new_engine_writes_what_works_and_overwrites_nothing(tmp_path: Path):
     assert checked.returncode == 2
     assert "is an engine (create, step, read), and check is for solvers" in checked.stderr
     assert "crosscheck run bouncing_ball_e09 --engine ball.py" in checked.stderr
+
+
+@pytest.mark.parametrize("kind", ENDS)
+def test_a_file_that_cannot_be_loaded_has_one_finding_that_says_why(tmp_path, kind):
+    """Probes would each start a process in vain, a minute in all, and say nothing more."""
+    path = tmp_path / ENDS[kind]
+    path.write_text(TEMPLATES[kind].read_text().replace("read(", "look("))
+    [one] = conform("x:own", row_of_file(path))
+    assert (one.probe, one.verdict) == ("make", "breaks")
+    assert f"{path.name} has no function read" in one.note
+    run = played(path)
+    assert (run.status, "has no function read" in run.reason) == ("unsupported", True)

@@ -57,6 +57,14 @@ def test_what_keeps_to_a_line_is_drawn_over_time(name: str, axes: str, title: st
     assert drawn.titles[0] == ("x (m)" if axes == "path" else "time (s)")
 
 
+def test_a_scene_that_every_engine_refuses_has_no_panels():
+    """There is nothing to set beside its exact answer."""
+    one = simply("friction_bounce_e1_mu05", "reference:exercise", "reference:lesson")
+    assert one.truth is not None
+    assert {run.status for run in one.runs} == {"unsupported"}
+    assert panels.panels([one], ["reference:exercise", "reference:lesson"], {}, NO_CLOCK) is None
+
+
 def test_of_many_disks_the_one_is_drawn_that_is_farthest_from_its_place():
     """In most engines; of a few all are drawn, but none that cannot move."""
     many = simply("asteroids", "reference:exercise", "pymunk:matched")

@@ -101,6 +101,8 @@ def test_the_terminal_names_who_models_no_friction_below_the_numbers_with_units(
     assert headings[1] == "Position\nradii"
     assert all("\n" in heading for heading in headings[1:])
     assert medians(smooth, set())[2] == []
+    refused = [replace(each, runs=[x for x in each.runs if x.name in without]) for each in rough]
+    assert medians(refused, set())[1:] == ([], without)  # where no other engine was played
     assert "reference:exercise" in [row[0] for row in medians(smooth, set())[1]]
 
 
@@ -621,3 +623,12 @@ def test_a_scene_that_a_file_refuses_is_not_counted_as_not_played(comparisons: l
     assert not overview.refused_by_file("pymunk:matched", {"pymunk:matched": ("refused", "")})
     assert name not in set(scores(refusals("unsupported")).name)
     assert set(scores(refusals("crashed")).error[lambda e: np.isinf(e)]) == {np.inf}
+
+
+def test_where_everything_is_refused_nothing_was_played_to_its_end():
+    """An own engine's refusals are no failures, so none of its cells is counted."""
+    assert findings.played_to_the_end([]) == "every cell was refused."
+    assert findings.played_to_the_end(["ok"]) == "every cell was played to its end."
+    assert (
+        findings.played_to_the_end(["ok", "timeout"]) == "1 of 2 cells was not played to the end."
+    )
