@@ -75,14 +75,14 @@ ADDED: dict[str, list[Added]] = {
         Added(
             "adapters/engines.py",
             "def _toy():\n    from adapters.toy import Toy\n\n    return Toy()\n\n\n",
-            "# What all profiles of an engine",
+            "# The fields that all profiles of an engine share",
         ),
         Added(
             "adapters/engines.py",
             '    "toy:plain": EngineRow(_toy, "flies through everything", 0.5, FLOAT64,'
             ' distributions=("typer",),\n                     options={"as it is": {}},'
             ' variants={"as_it_is": Variant({}, "nothing")}),\n',
-            "}\n\n# whose numbers",
+            "}\n\n# engines whose numbers",
         ),
     ],
     "a scenario": [
