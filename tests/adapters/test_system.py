@@ -16,7 +16,7 @@ import pytest
 from adapters import system
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
-from tests.reports.terminal.command_line import CROSSCHECK
+from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
 PORTABLE = os.environ | {"CROSSCHECK_SYSTEM": "portable"}
 ROOT = Path(__file__).parents[2]
@@ -67,16 +67,17 @@ def test_the_portable_branch_gives_the_same_bits(tmp_path: Path):
     """Workers that connect, watchers in place of the kernel's limits: the same numbers, and the run
     says which kind of limit held."""
     words = ["run", "head_on_equal_e09", "--timings", "0", "--engine", "reference:exercise"]
-    for name, environment in (("kernel", os.environ), ("portable", PORTABLE)):
-        done = subprocess.run(
-            [CROSSCHECK, *words, "--out", name],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=200,
-        )
-        assert done.returncode == 0, done.stderr
+    here = crosscheck(*words, "--out", "kernel", cwd=tmp_path)
+    elsewhere = subprocess.run(
+        [CROSSCHECK, *words, "--out", "portable"],
+        cwd=tmp_path,
+        env=PORTABLE,
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    assert here.returncode == 0, here.stderr
+    assert elsewhere.returncode == 0, elsewhere.stderr
 
     tables = {name: (tmp_path / name / "deviations.csv").read_text() for name in LIMITS}
     assert tables["kernel"] == tables["portable"]
