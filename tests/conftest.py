@@ -6,16 +6,15 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Generator, Iterator
-from typing import Any
 
 import pytest
-from filelock import FileLock
 from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES
 from reports.run import timing_pass, worker
+from tests.compiling import LOCKS, compiling_alone
 from tests.forks import FRESH, Forked
 from tests.reports.page.browsing import chromium
 
@@ -55,18 +54,11 @@ def collected(pytestconfig: pytest.Config) -> list[pytest.Item]:
 
 @pytest.fixture(autouse=True, scope="session")
 def compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """What one process of the tests compiles, the others wait for and load: without it they
-    compile the same kernels side by side, a sixth of the work of the fast suite."""
-    locks = tmp_path_factory.getbasetemp().parent  # common to all processes
-    compile_here = Dispatcher.compile
-
-    def compile_alone(self: Dispatcher, signature: Any) -> Any:
-        name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
-        with FileLock(locks / f"{name}.lock", is_singleton=True):
-            return compile_here(self, signature)
-
+    """Here and in what is forked, see `compiling`."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Dispatcher, "compile", compile_alone)
+        locks = tmp_path_factory.getbasetemp().parent  # common to all processes
+        patch.setenv(LOCKS, str(locks))
+        patch.setattr(Dispatcher, "compile", compiling_alone(locks))
         yield
 
 

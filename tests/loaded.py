@@ -3,6 +3,11 @@ loaded."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
+from numba.core.dispatcher import Dispatcher
+
 import reports.commands.run
 import reports.run.known_answers
 import reports.run.playing
@@ -11,6 +16,10 @@ from adapters.engines import ENGINES
 from adapters.play import play
 from reports.compare.comparison import compare
 from scenarios.catalogue import scenario
+from tests.compiling import LOCKS, compiling_alone
+
+if LOCKS in os.environ:
+    Dispatcher.compile = compiling_alone(Path(os.environ[LOCKS]))
 
 scene = scenario("slow_collision")
 compare(

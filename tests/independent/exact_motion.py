@@ -69,6 +69,15 @@ class Found(NamedTuple):
     wrapped: Vector | None = None
 
 
+class Wall(NamedTuple):
+    """A segment, m; `length` m along it, and the directions in which its two faces look."""
+
+    start: Vector
+    end: Vector
+    length: Number
+    faces: tuple[Vector, Vector]
+
+
 def dot(p: Vector, q: Vector) -> Number:
     """The scalar product."""
     return p.real * q.real + p.imag * q.imag
@@ -116,10 +125,13 @@ def root(p: Polynomial, low: Number, high: Number) -> Number:
         here, steepness = value(p, t), value(slope, t)
         low, high = (low, t) if (here > 0) == rising else (t, high)
         better = t - here / steepness if steepness else low
+        # first: a last step of a rounding may leave the interval, whose middle is far from the root
+        if steepness and abs(better - t) < TINY:
+            return better
         if not low < better < high:
             better = (low + high) / 2
-        if abs(better - t) < TINY:
-            return better
+            if abs(better - t) < TINY:
+                return better
         t = better
 
 
@@ -158,7 +170,18 @@ def flown(p: Disk, t: Number) -> Disk:
     return p._replace(x=p.x + p.v * t + p.a * (t * t / 2), v=p.v + p.a * t)
 
 
-def first(disks: Sequence[Disk], scene: Scene, until: Number) -> Found:
+def walls_of(scene: Scene) -> list[Wall]:
+    """Its walls as what they are, without rounding."""
+    walls = []
+    for start, end in ((exact(start), exact(end)) for start, end in scene.walls):
+        along = end - start
+        length = gmpy2.sqrt(dot(along, along))
+        faces = mpc(0, 1) * along / length, mpc(0, -1) * along / length
+        walls.append(Wall(start, end, length, faces))
+    return walls
+
+
+def first(disks: Sequence[Disk], scene: Scene, walls: Sequence[Wall], until: Number) -> Found:
     """What happens first within `until` s, if anything does."""
     best = Found(until)
     for i, p in enumerate(disks):
@@ -170,8 +193,8 @@ def first(disks: Sequence[Disk], scene: Scene, until: Number) -> Found:
                 if (t := first_fall(gap, best.after)) is not None:
                     best = Found(t, i, j, q)
         if p.weight:
-            for w, (start, end) in enumerate(scene.walls):
-                for t, point in wall_contacts(p, exact(start), exact(end), best.after):
+            for w, wall in enumerate(walls):
+                for t, point in wall_contacts(p, wall, best.after):
                     if t < best.after:
                         best = Found(t, i, -1 - w, Disk(point, mpc(0), mpc(0)))
             if scene.wrap is not None:
@@ -181,19 +204,16 @@ def first(disks: Sequence[Disk], scene: Scene, until: Number) -> Found:
     return best
 
 
-def wall_contacts(
-    p: Disk, start: Vector, end: Vector, until: Number
-) -> Iterator[tuple[Number, Vector]]:
+def wall_contacts(p: Disk, wall: Wall, until: Number) -> Iterator[tuple[Number, Vector]]:
     """When a disk first touches each face and each end of a wall, and the point of the wall that it
     touches."""
-    along = end - start
-    length = gmpy2.sqrt(dot(along, along))
-    for normal in (mpc(0, 1) * along / length, mpc(0, -1) * along / length):
-        if (t := first_fall(height(p, start, normal, p.radius), until)) is not None:
-            share = dot(flown(p, t).x - start, along) / (length * length)
+    along = wall.end - wall.start
+    for normal in wall.faces:
+        if (t := first_fall(height(p, wall.start, normal, p.radius), until)) is not None:
+            share = dot(flown(p, t).x - wall.start, along) / (wall.length * wall.length)
             if 0 <= share <= 1:
-                yield t, start + along * share
-    for point in (start, end):
+                yield t, wall.start + along * share
+    for point in (wall.start, wall.end):
         if (t := first_fall(distance_squared(p, Disk(point, mpc(0), mpc(0))), until)) is not None:
             yield t, point
 
@@ -235,6 +255,7 @@ class Motion:
     def follow(self, scenario: Scenario, most: int, nudge: Sequence[tuple[Vector, Vector]]) -> None:
         """From thrust to thrust, and between them from event to event."""
         scene, stop = scenario.scene, mpfr(scenario.duration)
+        walls = walls_of(scene)
         sizes = [(mpfr(float(r)), 1 / mpfr(float(m))) for r, m in zip(scene.radius, scene.mass)]
         starts = zip(scene.position, scene.velocity, nudge, sizes)
         disks = [
@@ -254,7 +275,7 @@ class Motion:
             while self.now < until:
                 self.times.append(self.now)
                 self.states.append(disks)
-                found = first(disks, scene, until - self.now)
+                found = first(disks, scene, walls, until - self.now)
                 disks = [flown(disk, found.after) for disk in disks]
                 self.now = self.now + found.after if found.i >= 0 else until
                 if found.wrapped is not None:

@@ -25,18 +25,19 @@ FILES_OF_NOBODY = (".DS_Store", "Thumbs.db", "~$notes.docx", "._Exercise.js")
 COPIES, MISSING = 10, 25
 
 
-def write_class(folder: Path, students: int) -> None:
-    """Write a folder for each of so many students, the same ones each time."""
+def write_class(folder: Path, students: int, missing: int = MISSING) -> None:
+    """Write a folder for each of so many students, the same ones each time; every `missing`-th
+    hands in no file that can be checked."""
     rng = random.Random(21)
     texts = solvers(rng)
-    missing = absent()
+    nothing = absent()
     suffix, text = next(texts)
     for k in range(1, students + 1):
         home = folder / f"{NAMES[k % len(NAMES)]}_{k:04}_file"
         home.mkdir(parents=True)
         (home / rng.choice(FILES_OF_NOBODY)).write_bytes(b"\x00junk")
-        if k % MISSING == 0:
-            next(missing)(home)
+        if k % missing == 0:
+            next(nothing)(home)
             continue
         if k % COPIES:
             suffix, text = next(texts)

@@ -2,18 +2,17 @@
 wherever it is called.
 
 A test cannot reach into the workers of a command otherwise. The function blocks as compiled code
-does that runs for
-ever: in C, holding Python's lock, so that no handler of a signal runs; `STALL=MODULE:NAME:waits`
-lets go of the lock. Python imports this file by its name.
+does that runs for ever: in C, holding Python's lock, so that no handler of a signal runs, though
+without work for the processor; `STALL=MODULE:NAME:waits` lets go of the lock. Python imports this
+file by its name.
 """
 
+import ctypes
 import os
 import sys
 import time
-from collections import deque
 from importlib.abc import MetaPathFinder
 from importlib.machinery import PathFinder
-from itertools import repeat
 from pathlib import Path
 
 MODULE, NAME, WAITS, *_ = [*os.environ.get("STALL", "").split(":"), "", ""]
@@ -24,7 +23,10 @@ def stall(*_, **__):
     Path(os.environ["STALL_MARK"]).touch()
     while WAITS:
         time.sleep(1000)
-    deque(repeat(None), maxlen=0)
+    taken = ctypes.create_string_buffer(64)  # noughts: a lock of the C library that nobody has
+    take = ctypes.PyDLL(None).pthread_mutex_lock  # which no signal interrupts
+    while True:
+        take(taken)
 
 
 class Finder(MetaPathFinder):

@@ -22,6 +22,8 @@ PLAYED = (
     "head_on_equal_e09",
     "--engine",
     "reference:exercise",
+    "--timings",
+    "0",
     "--out",
     "out",
 )

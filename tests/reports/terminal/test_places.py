@@ -91,7 +91,8 @@ def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Pat
     """The run is whole in its place; a closed number of a stream is not taken by the journal and
     printed into."""
     done = shell(
-        f"$C run slow_collision --engine pymunk:matched --out out --workers 1 {stream}", tmp_path
+        f"$C run slow_collision --engine pymunk:matched --out out --workers 1 --timings 0 {stream}",
+        tmp_path,
     )
 
     assert done.returncode == (0 if stream == "2>/dev/full" else 1)
@@ -143,7 +144,7 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     shutil.copy(SOLVER, here / os.fsdecode(b"own\xe9.py"))
     played = shell(
         "$C run two$'\\xe9'.toml --engine pymunk:matched --engine own$'\\xe9'.py --dt 0.01 --out"
-        " o$'\\xff' --workers 1",
+        " o$'\\xff' --workers 1 --timings 0",
         here,
         **variables,
     )
