@@ -192,7 +192,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "pymunk:shipped": _Pymunk(
         partial(_pymunk, "shipped"),
-        "pymunk 7.3 as it comes: elasticity e on every shape",
+        "pymunk 7.3 (float64) as it comes: elasticity e on every shape",
         0.0,
         FLOAT64,
     ),
@@ -217,7 +217,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d:shipped": _Box2D(
         partial(_box2d, "shipped"),
-        "box2d-py 2.3.8 as it comes: friction, sleep, threshold 1 m/s",
+        "box2d-py 2.3.8 (float32) as it comes: friction, sleep, threshold 1 m/s",
         1.0,
         FLOAT32,
     ),
@@ -244,7 +244,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d_v3:shipped": _Box2DV3(
         partial(_box2d_v3, "shipped"),
-        "Box2D 3.1 (pyb2d3) as it comes: friction, sleep, threshold 1 m/s",
+        "Box2D 3.1 (pyb2d3, float32) as it comes: friction, sleep, threshold 1 m/s",
         0.625,
         FLOAT32,
     ),
@@ -300,7 +300,7 @@ FETCHED: dict[str, EngineRow] = {
     ),
     "matter:shipped": _Matter(
         partial(_javascript, "matter", "shipped"),
-        "matter-js 0.20 as it comes, 100 pixels a metre: circles are polygons, air brakes",
+        "matter-js 0.20 (float64) as it comes: 100 pixels a metre, disks are polygons, air brakes",
         1.0,
         VERLET,
         departs=dict.fromkeys(
@@ -316,7 +316,7 @@ FETCHED: dict[str, EngineRow] = {
     ),
     "rapier2d:shipped": _Rapier(
         partial(_javascript, "rapier2d", "shipped", float32=True),
-        "Rapier 0.21 (WebAssembly) as it comes: friction, sleep, length unit 1 m",
+        "Rapier 0.21 (WebAssembly, float32) as it comes: friction, sleep, length unit 1 m",
         0.625,
         FLOAT32,
     ),

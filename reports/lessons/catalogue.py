@@ -15,6 +15,7 @@ from reports.lessons.mechanisms.correction import CORRECTION
 from reports.lessons.mechanisms.digits import DIGITS
 from reports.lessons.mechanisms.float32 import SINGLE
 from reports.lessons.mechanisms.gravity import GRAVITY
+from reports.lessons.mechanisms.javascript import JAVASCRIPT
 from reports.lessons.mechanisms.mixing import MIXING_RULE
 from reports.lessons.mechanisms.order import ORDER
 from reports.lessons.mechanisms.row import ROW
@@ -40,6 +41,7 @@ ALL = (
     CAP,
     ROW,
     SINGLE,
+    JAVASCRIPT,
     HORIZON,
     LIMITS,
     BOUNCE,

@@ -8,9 +8,7 @@ which the lesson shows: planck is an npm package that need not be installed.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import date
 from functools import cache
-from io import StringIO
 from pathlib import Path
 
 import pandas as pd
@@ -20,7 +18,7 @@ from adapters.engines import ENGINES, FETCHED
 from adapters.play import play_once
 from adapters.run import Run
 from reports.compare.laws import deviation
-from reports.terminal.foreign_text import put_text
+from reports.lessons.mechanisms.recorded import keep, made_with, table_in
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -92,29 +90,17 @@ def table() -> pd.DataFrame:
 @cache
 def kept() -> pd.DataFrame:
     """The table as it was last written."""
-    return pd.read_csv(StringIO("\n".join(read()[1])))
+    return table_in(KEPT)
 
 
 def recorded() -> str:
     """When and with which versions it was written."""
-    return read()[0].removeprefix("# ")
-
-
-@cache
-def read() -> tuple[str, list[str]]:
-    """The first line of planck.csv, and the others."""
-    first, *lines = KEPT.read_text(encoding="utf-8").splitlines()
-    return first, lines
+    return made_with(KEPT)
 
 
 def main() -> None:
     """Play both engines in all scenes, and write planck.csv; it takes half a minute."""
-    found = table()
-    runs = [run_of(engine, PROFILES[0], SCENES[0], 1) for engine in (PLANCK, BOX2D)]
-    versions = {library: version for run in runs for library, version in run.versions.items()}
-    made = ", ".join(f"{library} {version}" for library, version in versions.items())
-    text = found.to_csv(index=False, float_format="%.6g")
-    put_text(KEPT, f"# {date.today().isoformat()} with {made}\n{text}")
+    keep(KEPT, table(), [run_of(engine, PROFILES[0], SCENES[0], 1) for engine in (PLANCK, BOX2D)])
 
 
 if __name__ == "__main__":

@@ -218,6 +218,12 @@ NO_CLAIM = {
         "A smaller step makes": "says why; the claim on half the step has it",
         "It also makes more steps": "counts steps; the claim on their number has what comes of it",
     },
+    "javascript": {
+        "Planck is Box2D 2.3": "says what planck is; its threshold is a claim",
+        "Matter-js differs": "test_javascript_bounces.py switches each off",
+        "The matched profiles": "the claims say that they give e",
+        "Matter's disks then": "test_javascript_bounces.py holds it",
+    },
     "rolling": {
         "From then on": "defines to roll; the second claim says when",
         "A disk with back spin": "the second claim says whether it does",

@@ -1,0 +1,120 @@
+"""Lesson 6.11: the restitution of the JavaScript engines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Slider,
+    run_of,
+)
+from reports.lessons.mechanisms.ablation import PLAIN, filmed
+from reports.lessons.mechanisms.javascript_bounces import (
+    CLOSING,
+    COMMAND,
+    ENGINES,
+    RESTITUTIONS,
+    SECONDS,
+    VERSIONS,
+    name_in,
+    ratios,
+    recorded,
+    scene_of,
+)
+from reports.page.style import TRUTH, number
+
+KEPT_E = 1e-3  # by how much e may be off for a sentence to say that it is kept
+STUCK = 0.25  # of e: a collision that gives less is called cut, one that gives more is not
+
+
+def show_javascript(settings: Settings) -> Shown:
+    """e of a collision against its closing speed."""
+    e, version = settings["e"], settings["off"]
+    curves = [
+        Curve(name_in(engine, version), CLOSING, ratios(engine, version, e), dots=True)
+        for engine in ENGINES
+    ]
+    claims = [claim_of(e, curve) for curve in curves]
+    curves.append(Curve(TRUTH, CLOSING, np.full(len(CLOSING), e)))
+    scenario = scene_of(e)
+    chart = LessonChart(
+        "Separation over approach speed",
+        "closing speed in m/s",
+        f"ratio {SECONDS:g} s after the start",
+        curves,
+        "x",
+    )
+    return Shown([chart], filmed(scenario, [run_of(PLAIN, scenario, 1)]), [], claims)
+
+
+def claim_of(e: float, curve: Curve) -> Claim:
+    """Up to which speed an engine cuts the bounce, and what it gives above."""
+    name = curve.name
+    speed, ratio = np.asarray(curve.x, float), np.asarray(curve.y, float)
+    stuck = ratio < STUCK * e
+    low, high = float(ratio[~stuck].min()), float(ratio[~stuck].max())
+    kept = max(abs(low - e), abs(high - e)) <= KEPT_E
+    gives = (
+        f"gives e within {number(KEPT_E)}"
+        if kept
+        else f"leaves {number(low, 2)} of the closing speed, not {number(e)}"
+    )
+    text = (
+        f"Up to {number(float(speed[stuck][-1]))} m/s {name} gives less than a quarter of e; from"
+        f" {number(float(speed[~stuck][0]))} m/s on it {gives}."
+        if stuck.any()
+        else f"{name} has no threshold down to {number(float(speed[0]))} m/s, and {gives}."
+    )
+
+    def holds(shown: Shown) -> bool:
+        y = shown.y(name)
+        above = y[~stuck]
+        return bool(
+            (y[stuck] < STUCK * e).all()
+            and np.ptp(above) <= 2 * KEPT_E
+            and (np.abs(above - e).max() <= KEPT_E) == kept
+            and abs(above.min() - low) <= KEPT_E
+        )
+
+    return Claim(text, holds)
+
+
+JAVASCRIPT = Lesson(
+    name="javascript",
+    number="6.11",
+    title="The same bounce in planck, matter and Rapier",
+    asks="What do the JavaScript engines make of e?",
+    text=(
+        (
+            "<code>planck</code> is Box2D 2.3, with its restitution threshold (see [threshold])."
+            " <code>Rapier</code> has no threshold. <code>matter-js</code> differs in three ways,"
+            " and each can be switched off. Air slows its disks in flight. Its disks are polygons,"
+            " which touch at a corner, so that a part of the impulse turns them. It solves a"
+            " collision in several iterations, and those after the first stop a slow pair."
+        ),
+        (
+            "Switch them off one after the other. The matched profiles lift all of it by settings"
+            " that the engines document; matter's disks then have 200 sides."
+        ),
+    ),
+    sliders=(
+        Slider("e", "Restitution e", RESTITUTIONS, 1),
+        Slider("off", "Switched off", tuple(VERSIONS), 0),
+    ),
+    names=(
+        *dict.fromkeys(name_in(engine, version) for version in VERSIONS for engine in ENGINES),
+        PLAIN,
+        TRUTH,
+    ),
+    show=show_javascript,
+    recorded=(
+        "The ratios of planck, matter and Rapier were recorded on"
+        f" {recorded()}, by {COMMAND}. The replay shows reference:exercise."
+    ),
+)
