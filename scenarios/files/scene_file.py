@@ -278,9 +278,11 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
                 TOUCHING
                 * np.abs([*position[near][k], *offset[k], thick[row] + radius[near][k]]).max()
             )
-            normal = (
-                away[k] / distance[k] if distance[k] > rounding else np.array([-unit[1], unit[0]])
-            )
+            # Beside a wall this is its own normal: away / distance is inexact near its line.
+            normal = np.array([-unit[1], unit[0]])
+            if distance[k] > rounding:
+                beside = 0.0 < offset[k] @ unit < length
+                normal = normal * np.sign(away[k] @ normal) if beside else away[k] / distance[k]
             one, two = number[row], number[w + first[row] + k]
             if overlap[k] > rounding:
                 # If the side is not known, the shift may lead across the middle: then it is longer
