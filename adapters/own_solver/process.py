@@ -194,9 +194,10 @@ class SolverProcess:
     ) -> list[Any | SolverFailed]:
         """The answer to each request, or its failure, within `total` s; raises `SolverFailed` if
         the process is lost."""
-        # After a call that does not return the worker makes no other like it, so a few limits
-        # are enough.
-        most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
+        # After a call that does not return the worker makes no other like it.
+        stopped_once = max(1, len({call for each in requests for call in calls_of(each)}))
+        longest = max((limit for _, _, limit in requests), default=0.0)
+        most = stopped_once * PATIENCE * longest
         answers = self.exchange(requests, min(most + GRACE, total))
         if not isinstance(answers, list) or len(answers) != len(requests):
             self.end()
@@ -214,7 +215,8 @@ class SolverProcess:
 
     def exchange(self, what: Any, limit: float) -> Any:
         """Send one line, and return the line that answers it."""
-        assert self.process is not None
+        if self.process is None:
+            raise SolverFailed("crashed", "its process has been stopped before")
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(json.dumps(what).encode() + b"\n")
@@ -278,6 +280,12 @@ class SolverProcess:
         if self.process is not None:
             end(self.process)
             self.process = None
+
+
+def calls_of(request: Request) -> list[str]:
+    """The names of the functions that a request calls."""
+    command, argument, _ = request
+    return [call[0] for call in argument["calls"]] if command == "ask" else [command]
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:
