@@ -97,11 +97,18 @@ def own_group() -> dict[str, Any]:
 
 
 def end_all(pid: int) -> None:
-    """End a process and all its children; does nothing if it has ended."""
-    if KERNEL:
-        with suppress(ProcessLookupError):
-            os.killpg(pid, signal.SIGKILL)
-        return
+    """End a process and all its children, on Linux also those of its group whose parent has ended;
+    does nothing if the process has ended."""
+    try:
+        end_tree(pid)  # also children that have left the group
+    finally:  # even without memory for psutil
+        if KERNEL:
+            with suppress(ProcessLookupError):
+                os.killpg(pid, signal.SIGKILL)
+
+
+def end_tree(pid: int) -> None:
+    """End the children of a process, and theirs, then the process; does nothing if it has ended."""
     import psutil
 
     with suppress(psutil.NoSuchProcess):

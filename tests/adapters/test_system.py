@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import psutil
 import pytest
 
 from adapters import system
@@ -104,6 +105,32 @@ def test_a_bad_engine_ends_the_same_on_the_portable_branch():
     )
 
     assert done.returncode == 0, done.stdout[-3000:]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("environment", [os.environ, PORTABLE], ids=["kernel", "portable"])
+def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
+    tmp_path: Path, environment: dict[str, str]
+):
+    """setsid leaves the group that the kernel ends at once."""
+    (tmp_path / "solver.py").write_text(
+        "import os, pathlib, time\nif os.fork() == 0:\n    os.setsid()\n"
+        f"    pathlib.Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))\n"
+        "    time.sleep(300)\n    os._exit(0)\n"
+    )
+    subprocess.run(
+        [CROSSCHECK, "check", "solver.py"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        timeout=200,
+    )
+    child = int((tmp_path / "pid").read_text())
+    end = time.monotonic() + 10.0
+    while psutil.pid_exists(child) and time.monotonic() < end:
+        time.sleep(0.05)  # until init has read its status
+
+    assert not psutil.pid_exists(child)
 
 
 def test_a_second_process_is_refused_the_lock(tmp_path: Path):
