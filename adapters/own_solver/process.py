@@ -73,7 +73,7 @@ def processes_reused() -> Iterator[None]:
 
 def end(process: subprocess.Popen[bytes]) -> None:
     """End a process and all it has started."""
-    if process.poll() is None:
+    if process.returncode is None:  # nobody else has its number before its status is read
         system.end_all(process.pid)
     process.wait()
     for stream in (process.stdin, process.stdout):

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -113,24 +113,38 @@ def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
     tmp_path: Path, environment: dict[str, str]
 ):
     """setsid leaves the group that the kernel ends at once."""
-    (tmp_path / "solver.py").write_text(
-        "import os, pathlib, time\nif os.fork() == 0:\n    os.setsid()\n"
-        f"    pathlib.Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))\n"
+    assert not lives_on(tmp_path, environment, "os.setsid()", "pass")
+
+
+@pytest.mark.slow
+def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path):
+    """The child keeps the pipe open, so that its parent's end is not seen by it."""
+    assert not lives_on(tmp_path, os.environ, "pass", "os._exit(0)")
+
+
+def lives_on(
+    folder: Path, environment: Mapping[str, str], child_does: str, parent_does: str
+) -> bool:
+    """Whether a child that a solver starts lives on after the check."""
+    file = folder / "pid"
+    (folder / "solver.py").write_text(
+        "import os, pathlib, time\n"
+        f"if os.fork() == 0:\n    {child_does}\n"
+        f"    pathlib.Path({str(file)!r}).write_text(str(os.getpid()))\n"
         "    time.sleep(300)\n    os._exit(0)\n"
+        f"time.sleep(0.3)\n{parent_does}\n"
     )
     subprocess.run(
         [CROSSCHECK, "check", "solver.py"],
-        cwd=tmp_path,
+        cwd=folder,
         env=environment,
         capture_output=True,
         timeout=200,
     )
-    child = int((tmp_path / "pid").read_text())
-    end = time.monotonic() + 10.0
-    while psutil.pid_exists(child) and time.monotonic() < end:
+    child, end = int(file.read_text()), time.monotonic() + 10.0
+    while (alive := psutil.pid_exists(child)) and time.monotonic() < end:
         time.sleep(0.05)  # until init has read its status
-
-    assert not psutil.pid_exists(child)
+    return alive
 
 
 def test_a_second_process_is_refused_the_lock(tmp_path: Path):
