@@ -191,14 +191,14 @@ def stopped_after(
             if over.wait(LOOK) or process_time() - begun > seconds:
                 break
         if not over.is_set():
-            kind = ctypes.py_object(_TimeIsUp)
+            kind = ctypes.py_object(TimeIsUp)
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(main), kind)
 
     thread = threading.Thread(target=wait, daemon=True)
     thread.start()
     try:
         yield
-    except _TimeIsUp:
+    except TimeIsUp:
         raise stop() from None
     finally:
         over.set()
@@ -247,8 +247,8 @@ def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-class _TimeIsUp(BaseException):
-    """Raised by the thread in the main thread."""
+class TimeIsUp(BaseException):
+    """Raised by the thread in the main thread; what catches it must raise it again."""
 
 
 @contextmanager

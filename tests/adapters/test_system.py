@@ -108,6 +108,27 @@ def test_a_bad_engine_ends_the_same_on_the_portable_branch():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("system_is", ["kernel", "portable"])
+def test_an_endless_function_is_stopped_as_such(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, system_is: str
+):
+    """Not as one that threw, which would be called again."""
+    file = tmp_path / "solver.py"
+    file.write_text(
+        "def integrate(s, dt):\n    while True:\n        pass\n\n"
+        "def sphereSphereCollisionHandling(a, b):\n    pass\n"
+    )
+    monkeypatch.setenv("CROSSCHECK_SYSTEM", system_is)
+    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
+    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
+    with SolverProcess(read_solver(file)) as solver:
+        first, again = solver.request([("ask", question, 1.0)] * 2)
+
+    assert first.kind == "timeout"
+    assert str(first) == str(again) == "does not come back within 1 s in one call"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("environment", [os.environ, PORTABLE], ids=["kernel", "portable"])
 def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
     tmp_path: Path, environment: dict[str, str]
