@@ -63,6 +63,21 @@ def limit_memory(most: int) -> None:
         watch(too_much, OUT_OF_MEMORY)
 
 
+def holds_more(pid: int, most: int) -> bool:
+    """Whether a process holds more than `most` bytes. Never on Linux: there the kernel refuses it.
+
+    For its parent: a thread of the process itself does not run during a call into C.
+    """
+    if KERNEL:
+        return False
+    import psutil
+
+    try:
+        return bool(psutil.Process(pid).memory_info().rss > most)
+    except psutil.NoSuchProcess:
+        return False
+
+
 def write_no_core() -> None:
     """Switch off core dumps of this process."""
     if KERNEL:

@@ -18,13 +18,14 @@ from typing import Any, NamedTuple
 from adapters import system
 from adapters.engine import NotStarted
 from adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
-from adapters.own_solver.worker import HERE
+from adapters.own_solver.worker import HERE, MEMORY
 from adapters.safe_path import path_of_this, python
 from scenarios.truth.cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
 WORK = "from adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
+TOO_LARGE = "wants more memory than it is given, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
@@ -229,7 +230,10 @@ class SolverProcess:
         received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
             left = deadline - monotonic()
-            chunk = self.pieces.next(left)
+            chunk = self.pieces.next(min(left, system.LOOK))
+            if chunk is None and left > system.LOOK:
+                self.end_if_too_large()
+                continue
             if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
                 self.end()
                 raise SolverFailed(
@@ -246,6 +250,13 @@ class SolverProcess:
         except ValueError:
             raise SolverFailed("crashed", INTRUDED) from None
 
+    def end_if_too_large(self) -> None:
+        """End a process that takes more memory than it is given; raises `SolverFailed`."""
+        assert self.process is not None
+        if system.holds_more(self.process.pid, MEMORY):
+            self.end()
+            raise SolverFailed("memory", TOO_LARGE)
+
     def lost(self) -> SolverFailed:
         """The failure of a process that has ended."""
         assert self.process is not None
@@ -253,9 +264,7 @@ class SolverProcess:
         # what V8 sends when its heap is full
         ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
         if ends_v8 or code == system.OUT_OF_MEMORY:
-            return SolverFailed(
-                "memory", "wants more memory than it is given, and its process was ended"
-            )
+            return SolverFailed("memory", TOO_LARGE)
         if code == system.KILLED:
             return SolverFailed(
                 "crashed",

@@ -108,6 +108,21 @@ def test_a_bad_engine_ends_the_same_on_the_portable_branch():
 
 
 @pytest.mark.slow
+def test_a_solver_that_takes_all_memory_in_one_call_into_c_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """No thread of it runs meanwhile, so that its parent ends it, before it has what it wants."""
+    file = tmp_path / "solver.py"
+    file.write_text("x = bytearray(10**10)\ndef integrate(s, dt): pass\n")
+    monkeypatch.setenv("CROSSCHECK_SYSTEM", "portable")
+    monkeypatch.setattr(system, "KERNEL", False)
+    with pytest.raises(SolverFailed) as failed:
+        SolverProcess(read_solver(file))
+
+    assert failed.value.kind == "memory"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("system_is", ["kernel", "portable"])
 def test_an_endless_function_is_stopped_as_such(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, system_is: str
