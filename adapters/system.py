@@ -63,6 +63,21 @@ def limit_memory(most: int) -> None:
         watch(too_much, OUT_OF_MEMORY)
 
 
+def holds_more(pid: int, most: int) -> bool:
+    """Whether a process holds more than `most` bytes. Never on Linux: there the kernel refuses it.
+
+    For its parent: a thread of the process itself does not run during a call into C.
+    """
+    if KERNEL:
+        return False
+    import psutil
+
+    try:
+        return bool(psutil.Process(pid).memory_info().rss > most)
+    except psutil.NoSuchProcess:
+        return False
+
+
 def write_no_core() -> None:
     """Switch off core dumps of this process."""
     if KERNEL:
@@ -97,11 +112,18 @@ def own_group() -> dict[str, Any]:
 
 
 def end_all(pid: int) -> None:
-    """End a process and all its children; does nothing if it has ended."""
-    if KERNEL:
-        with suppress(ProcessLookupError):
-            os.killpg(pid, signal.SIGKILL)
-        return
+    """End a process and all its children, on Linux also those of its group whose parent has ended;
+    does nothing if the process has ended."""
+    try:
+        end_tree(pid)  # also children that have left the group
+    finally:  # even without memory for psutil
+        if KERNEL:
+            with suppress(ProcessLookupError):
+                os.killpg(pid, signal.SIGKILL)
+
+
+def end_tree(pid: int) -> None:
+    """End the children of a process, and theirs, then the process; does nothing if it has ended."""
     import psutil
 
     with suppress(psutil.NoSuchProcess):
@@ -184,14 +206,14 @@ def stopped_after(
             if over.wait(LOOK) or process_time() - begun > seconds:
                 break
         if not over.is_set():
-            kind = ctypes.py_object(_TimeIsUp)
+            kind = ctypes.py_object(TimeIsUp)
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(main), kind)
 
     thread = threading.Thread(target=wait, daemon=True)
     thread.start()
     try:
         yield
-    except _TimeIsUp:
+    except TimeIsUp:
         raise stop() from None
     finally:
         over.set()
@@ -240,8 +262,8 @@ def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-class _TimeIsUp(BaseException):
-    """Raised by the thread in the main thread."""
+class TimeIsUp(BaseException):
+    """Raised by the thread in the main thread; what catches it must raise it again."""
 
 
 @contextmanager

@@ -346,7 +346,8 @@ def check(
     scaffold: Annotated[
         str,
         typer.Option(
-            metavar="gradescope|classroom", help="Write an autograder to DIR, and check nothing."
+            metavar="gradescope|classroom|prairielearn",
+            help="Write an autograder to DIR, and check nothing.",
         ),
     ] = "",
 ) -> None:

@@ -18,13 +18,14 @@ from typing import Any, NamedTuple
 from adapters import system
 from adapters.engine import NotStarted
 from adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
-from adapters.own_solver.worker import HERE
+from adapters.own_solver.worker import HERE, MEMORY
 from adapters.safe_path import path_of_this, python
 from scenarios.truth.cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
 WORK = "from adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
+TOO_LARGE = "wants more memory than it is given, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]
@@ -73,7 +74,7 @@ def processes_reused() -> Iterator[None]:
 
 def end(process: subprocess.Popen[bytes]) -> None:
     """End a process and all it has started."""
-    if process.poll() is None:
+    if process.returncode is None:  # nobody else has its number before its status is read
         system.end_all(process.pid)
     process.wait()
     for stream in (process.stdin, process.stdout):
@@ -194,9 +195,10 @@ class SolverProcess:
     ) -> list[Any | SolverFailed]:
         """The answer to each request, or its failure, within `total` s; raises `SolverFailed` if
         the process is lost."""
-        # After a call that does not return the worker makes no other like it, so a few limits
-        # are enough.
-        most = PATIENCE * max((limit for _, _, limit in requests), default=0.0)
+        # After a call that does not return the worker makes no other like it.
+        stopped_once = max(1, len({call for each in requests for call in calls_of(each)}))
+        longest = max((limit for _, _, limit in requests), default=0.0)
+        most = stopped_once * PATIENCE * longest
         answers = self.exchange(requests, min(most + GRACE, total))
         if not isinstance(answers, list) or len(answers) != len(requests):
             self.end()
@@ -214,7 +216,8 @@ class SolverProcess:
 
     def exchange(self, what: Any, limit: float) -> Any:
         """Send one line, and return the line that answers it."""
-        assert self.process is not None
+        if self.process is None:
+            raise SolverFailed("crashed", "its process has been stopped before")
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(json.dumps(what).encode() + b"\n")
@@ -227,7 +230,10 @@ class SolverProcess:
         received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
             left = deadline - monotonic()
-            chunk = self.pieces.next(left)
+            chunk = self.pieces.next(min(left, system.LOOK))
+            if chunk is None and left > system.LOOK:
+                self.end_if_too_large()
+                continue
             if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
                 self.end()
                 raise SolverFailed(
@@ -244,6 +250,13 @@ class SolverProcess:
         except ValueError:
             raise SolverFailed("crashed", INTRUDED) from None
 
+    def end_if_too_large(self) -> None:
+        """End a process that takes more memory than it is given; raises `SolverFailed`."""
+        assert self.process is not None
+        if system.holds_more(self.process.pid, MEMORY):
+            self.end()
+            raise SolverFailed("memory", TOO_LARGE)
+
     def lost(self) -> SolverFailed:
         """The failure of a process that has ended."""
         assert self.process is not None
@@ -251,9 +264,7 @@ class SolverProcess:
         # what V8 sends when its heap is full
         ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
         if ends_v8 or code == system.OUT_OF_MEMORY:
-            return SolverFailed(
-                "memory", "wants more memory than it is given, and its process was ended"
-            )
+            return SolverFailed("memory", TOO_LARGE)
         if code == system.KILLED:
             return SolverFailed(
                 "crashed",
@@ -278,6 +289,12 @@ class SolverProcess:
         if self.process is not None:
             end(self.process)
             self.process = None
+
+
+def calls_of(request: Request) -> list[str]:
+    """The names of the functions that a request calls."""
+    command, argument, _ = request
+    return [call[0] for call in argument["calls"]] if command == "ask" else [command]
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:

@@ -15,7 +15,7 @@ from typing import Any
 from adapters.own_solver.beside import Neighbours
 from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
 from adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
-from adapters.system import stopped_after
+from adapters.system import TimeIsUp, stopped_after
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
 LOGGED = 400  # contacts kept for the check
@@ -187,7 +187,7 @@ class PythonSolver:
                 )
                 spheres = self.everybody() if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
-        except SolverFailed:
+        except (SolverFailed, TimeIsUp):
             raise
         except BaseException as raised:
             error = vars(self.failure(raised, "in one call"))

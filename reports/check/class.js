@@ -20,6 +20,10 @@ headings.forEach((heading, column) => {
 
 document.getElementById("filter").oninput = (event) => {
   const wanted = event.target.value.toLowerCase();
-  rows.forEach((row) => { row.hidden = !row.textContent.toLowerCase().includes(wanted); });
+  // not in the titles of tasks, which every row has
+  const texts = "th, td:not(.begin), summary, li, p";
+  const holds = (row) => [...row.querySelectorAll(texts)]
+    .some((one) => one.textContent.toLowerCase().includes(wanted));
+  rows.forEach((row) => { row.hidden = !holds(row); });
   shown.value = wanted ? `${rows.filter((row) => !row.hidden).length} of ${rows.length}` : "";
 };

@@ -29,7 +29,7 @@ from adapters.own_solver.process import SolverProcess, keep_processes
 from reports.check.formats.formats import FORMATS
 from reports.check.formats.table import show
 from reports.check.functions import keeps_state
-from reports.check.marks import Marked, id_of, place_of
+from reports.check.marks import Marked, id_of, matched, place_of
 from reports.check.points import DEFAULT, BadPoints, Points, read_points
 from reports.check.rows import CheckRow
 from reports.check.terminal import print_scene, sentence_on
@@ -167,7 +167,7 @@ def marks_of(
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
     if pattern is not None:
-        odd = [str(file) for file in within if not pattern.search(place_of(file, path))]
+        odd = [str(file) for file in within if not matched(file, path, pattern)]
         if odd:
             say(f"--id-pattern does not match {named(odd)}: its folder or file name is the id")
     if twice := [name for name, times in Counter(ids).items() if times > 1]:

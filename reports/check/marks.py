@@ -178,18 +178,26 @@ def asked(name: str, rows: Sequence[CheckRow]) -> bool:
 def id_of(file: Path, root: Path, pattern: re.Pattern[str] | None = None) -> str:
     """The id of the student whose file or folder `file` is at or below `root`.
 
-    It is the match of `pattern` in the path, or its first group. Without a match it is the name of
+    It is what `pattern` has `matched` in the path. Without a match it is the name of
     the student's folder, or of the file; for an Exercise.js or solver.py without a student's
     folder, the name of its folder.
     """
-    if pattern is not None and (match := pattern.search(place_of(file, root))):
-        return match[1] if pattern.groups and match[1] is not None else match[0]
+    if found := matched(file, root, pattern):
+        return found
     within = Path(place_of(file, root))
     if len(within.parts) > 1:
         return within.parts[0]
     if file.stem.lower() in ANYBODYS and not file.is_dir():
         return file.resolve().parent.name or file.stem
     return within.name if file.is_dir() else within.stem
+
+
+def matched(file: Path, root: Path, pattern: re.Pattern[str] | None) -> str:
+    """The match of a pattern in the path of a file, or its first group; "" if there is none."""
+    match = pattern.search(place_of(file, root)) if pattern is not None else None
+    if match is None:
+        return ""
+    return match[1] if match.re.groups and match[1] is not None else match[0]
 
 
 def place_of(file: Path, root: Path) -> str:

@@ -56,8 +56,11 @@ def read_points(path: Path = DEFAULT) -> Points:
     if unknown := [task for task in given if task not in QUESTIONS]:
         raise BadPoints(f"{path}: there is no task {unknown[0]!r}; tasks: {', '.join(QUESTIONS)}")
     points = {task: of_task(path, task, given[task]) for task in TASKS if task in given}
-    if not sum(sum(questions.values()) for questions in points.values()):
-        raise BadPoints(f"{path}: gives no points at all")
+    total = sum(sum(questions.values()) for questions in points.values())
+    if not total or not math.isfinite(total):
+        raise BadPoints(
+            f"{path}: gives {'more than can be added' if total else 'no points at all'}"
+        )
     return points
 
 

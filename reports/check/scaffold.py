@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import NamedTuple
+from uuid import uuid4
 
 from reports.check.points import DEFAULT, BadPoints, points_text, read_points
 from reports.terminal.exits import refuse, say
@@ -29,6 +30,13 @@ SCAFFOLDS = {
         " {folder}/.github and {folder}/.grading into the template repository of the assignment.",
         ".grading/tasks.toml",
     ),
+    "prairielearn": Kind(
+        "Now, where the project is: uv build --wheel --out-dir {folder}/image; then docker build"
+        " --platform linux/amd64 -t YOUR/IMAGE {folder}/image, push it, write its name into"
+        " {folder}/question/info.json, and copy {folder}/question into the questions of the"
+        " course.",
+        "question/tests/tasks.toml",
+    ),
 }
 
 
@@ -43,6 +51,7 @@ def write_scaffold(kind: str, folder: Path, points: Path | None, hints: str) -> 
         folder.mkdir(parents=True, exist_ok=True)
         for template in sorted(one for one in (KINDS / kind).rglob("*") if one.is_file()):
             text = template.read_text(encoding="utf-8").replace("HINTS", hints)
+            text = text.replace("NEW_UUID", str(uuid4()))
             put(folder / template.relative_to(KINDS / kind), text)
         put(folder / SCAFFOLDS[kind].points, points_text(points or DEFAULT))
     except BadPoints as fault:

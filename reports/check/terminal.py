@@ -40,8 +40,10 @@ def print_file(one: FileCheck) -> None:
     """Print the sentences with lines and numbers, the verdict of every task, the consequences of
     the faults, and the free choices under an explaining title."""
     console = Console()
-    if one.passed:
-        console.print(one.sentences[0], highlight=False)
+    if one.passed or one.refused:
+        console.print(legible(one.sentences[0]), highlight=False)
+    if one.refused:
+        return
     for k, row in enumerate(one.findings, 1):
         print_fault(console, k, row, one.also(row))
     console.print()

@@ -7,10 +7,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+import psutil
 import pytest
 
 from adapters import system
@@ -103,6 +104,82 @@ def test_a_bad_engine_ends_the_same_on_the_portable_branch():
     )
 
     assert done.returncode == 0, done.stdout[-3000:]
+
+
+@pytest.mark.slow
+def test_a_solver_that_takes_all_memory_in_one_call_into_c_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """No thread of it runs meanwhile, so that its parent ends it, before it has what it wants."""
+    file = tmp_path / "solver.py"
+    file.write_text("x = bytearray(10**10)\ndef integrate(s, dt): pass\n")
+    monkeypatch.setenv("CROSSCHECK_SYSTEM", "portable")
+    monkeypatch.setattr(system, "KERNEL", False)
+    with pytest.raises(SolverFailed) as failed:
+        SolverProcess(read_solver(file))
+
+    assert failed.value.kind == "memory"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("system_is", ["kernel", "portable"])
+def test_an_endless_function_is_stopped_as_such(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, system_is: str
+):
+    """Not as one that threw, which would be called again."""
+    file = tmp_path / "solver.py"
+    file.write_text(
+        "def integrate(s, dt):\n    while True:\n        pass\n\n"
+        "def sphereSphereCollisionHandling(a, b):\n    pass\n"
+    )
+    monkeypatch.setenv("CROSSCHECK_SYSTEM", system_is)
+    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
+    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
+    with SolverProcess(read_solver(file)) as solver:
+        first, again = solver.request([("ask", question, 1.0)] * 2)
+
+    assert first.kind == "timeout"
+    assert str(first) == str(again) == "does not come back within 1 s in one call"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("environment", [os.environ, PORTABLE], ids=["kernel", "portable"])
+def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
+    tmp_path: Path, environment: dict[str, str]
+):
+    """setsid leaves the group that the kernel ends at once."""
+    assert not lives_on(tmp_path, environment, "os.setsid()", "pass")
+
+
+@pytest.mark.slow
+def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path):
+    """The child keeps the pipe open, so that its parent's end is not seen by it."""
+    assert not lives_on(tmp_path, os.environ, "pass", "os._exit(0)")
+
+
+def lives_on(
+    folder: Path, environment: Mapping[str, str], child_does: str, parent_does: str
+) -> bool:
+    """Whether a child that a solver starts lives on after the check."""
+    file = folder / "pid"
+    (folder / "solver.py").write_text(
+        "import os, pathlib, time\n"
+        f"if os.fork() == 0:\n    {child_does}\n"
+        f"    pathlib.Path({str(file)!r}).write_text(str(os.getpid()))\n"
+        "    time.sleep(300)\n    os._exit(0)\n"
+        f"time.sleep(0.3)\n{parent_does}\n"
+    )
+    subprocess.run(
+        [CROSSCHECK, "check", "solver.py"],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        timeout=200,
+    )
+    child, end = int(file.read_text()), time.monotonic() + 10.0
+    while (alive := psutil.pid_exists(child)) and time.monotonic() < end:
+        time.sleep(0.05)  # until init has read its status
+    return alive
 
 
 def test_a_second_process_is_refused_the_lock(tmp_path: Path):

@@ -167,3 +167,14 @@ def test_what_is_no_solver_is_named(tmp_path: Path):
     assert check_file(tmp_path / "eva").refused.endswith(
         "holds no .js and no .py file, only report.pdf"
     )
+
+
+def test_a_file_that_is_no_solver_is_said_to_be_none_beside_its_marks(tmp_path: Path):
+    """The terminal says it, too, and shows no table of no tasks."""
+    (tmp_path / "anna.pdf").write_text("")
+    done = crosscheck(
+        "check", "anna.pdf", "--format", "gradescope", "--out", "results.json", cwd=tmp_path
+    )
+
+    assert done.returncode == 1
+    assert done.stdout == "anna.pdf: ends in .pdf; a solver is a .js or a .py file\n"

@@ -56,6 +56,10 @@ def test_a_class_is_sorted_filtered_and_opens_offline(browser: Browser, tmp_path
     filtered = ids.all_inner_texts()
     page.locator(".students details:visible summary").click()
     opened_text = page.locator(".students details[open]").inner_text()
+    page.locator("#filter").fill("Task 2d velocities: ")  # the title of every row's task, too
+    titled = ids.all_inner_texts()
+    page.locator("#filter").fill("")
+    closed = page.locator(".students tbody tr").count() - page.locator(".students details").count()
     same = page.locator(".copies li").all_inner_texts()
     wide = overhang(page)
     page.set_viewport_size({"width": 400, "height": 800})
@@ -65,7 +69,9 @@ def test_a_class_is_sorted_filtered_and_opens_offline(browser: Browser, tmp_path
     assert heard == []
     assert everybody == len(group) + len(copies)
     assert totals == sorted(totals)
-    assert filtered == ["zoe"]
+    assert filtered == titled == ["zoe"]
+    assert closed == 0, "every row opens"
+    assert "Task 2d velocities: " in opened_text
     assert "Got: 1 m. Expected: 2 m." in opened_text
     assert same == ["kim/Exercise.js, lou/Exercise.js"]
     assert (wide <= 0, narrow <= 0) == (True, True)

@@ -125,6 +125,7 @@ def test_points_are_given_a_task_or_a_question(tmp_path: Path):
         ("2a = 'two'", "task 2a: 'two' is no number"),
         ("1 = 0", "gives no points at all"),
         ("", "gives no points at all"),
+        ("1 = 1e308\n2c = 1e308", "gives more than can be added"),
     ],
 )
 def test_bad_points_are_one_sentence(tmp_path: Path, text: str, message: str):
@@ -185,6 +186,7 @@ def test_every_question_that_may_have_points_is_asked():
         ("anna_123_Exercise.js", r"_(\d+)_", "123"),
         ("Anna M_77_file/Exercise.js", r"\d+", "77"),
         ("anna/Exercise.js", r"\d+", "anna"),
+        ("anna/Exercise.js", r"\d*", "anna"),  # it matches nothing at all, which is no id
         ("Exercise.js", "", "class"),
         ("gus.zip", "", "gus"),
     ],

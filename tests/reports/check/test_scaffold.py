@@ -1,10 +1,12 @@
-"""The autograders for Gradescope and GitHub Classroom, in folders that stand for their machines."""
+"""The autograders for Gradescope, GitHub Classroom and PrairieLearn, in folders that stand for
+their machines."""
 
 from __future__ import annotations
 
 import base64
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -33,7 +35,7 @@ def test_a_scaffold_is_written_to_an_empty_folder_only(tmp_path: Path):
 
     assert [one.returncode for one in (first, again, other, bad)] == [0, 2, 2, 2]
     assert again.stderr == "new: is there and not empty; name another folder\n"
-    assert other.stderr == "--scaffold moodle: is none of gradescope, classroom\n"
+    assert other.stderr == "--scaffold moodle: is none of gradescope, classroom, prairielearn\n"
     assert "task 1: -1 is no number of points" in bad.stderr
     assert {name for name, runs in files.items() if runs} == {"setup.sh", "run_autograder"}
     assert (tmp_path / "new" / "tasks.toml").read_text() == DEFAULT.read_text()
@@ -131,3 +133,68 @@ def test_the_step_of_classroom_answers_every_submission(tmp_path: Path):
 
     assert scores == [(0, "result", 20.0), (0, "result", 17.0), (0, "result", 0.0)]
     assert play() != 0
+
+
+def test_the_question_of_prairielearn_names_its_grader_and_its_file(tmp_path: Path):
+    """As PrairieLearn's documentation of questions and of external grading has it; two questions
+    of a course have two UUIDs."""
+    done = [crosscheck("check", "--scaffold", "prairielearn", n, cwd=tmp_path) for n in "ab"]
+    infos = [json.loads((tmp_path / n / "question" / "info.json").read_text()) for n in "ab"]
+    question = tmp_path / "a" / "question"
+    entrypoint = infos[0]["externalGradingOptions"]["entrypoint"]
+    grader = question / Path(entrypoint).relative_to("/grade")
+
+    assert [one.returncode for one in done] == [0, 0]
+    for info in infos:
+        jsonschema.validate(info, schema_of("prairielearn_question"))
+    assert infos[0]["uuid"] != infos[1]["uuid"]
+    assert os.access(grader, os.X_OK)
+    assert (grader.parent / "tasks.toml").read_text() == DEFAULT.read_text()
+    assert '<pl-file-upload file-names="Exercise.js">' in (question / "question.html").read_text()
+    copied = re.search(
+        r"^COPY (.+) \./$", (tmp_path / "a" / "image" / "Dockerfile").read_text(), re.M
+    )
+    assert copied is not None
+    assert copied[1].split() == ["uv.toml", "crosscheck2d-*.whl"]
+
+
+@pytest.mark.slow
+def test_the_grader_of_prairielearn_answers_every_submission(tmp_path: Path):
+    """Played as PrairieLearn plays it, in a folder that stands for /grade: a right file, a wrong
+    one, one that does not load, none; a bad grader leaves no results."""
+    crosscheck("check", "--scaffold", "prairielearn", "new", "--hints", "low", cwd=tmp_path)
+    grade, programs = tmp_path / "grade", tmp_path / "programs"
+    shutil.copytree(tmp_path / "new" / "question" / "tests", grade / "tests")
+    programs.mkdir()
+    (programs / "crosscheck").symlink_to(CROSSCHECK)
+
+    def play(text: str | None) -> int:
+        shutil.rmtree(grade / "student", ignore_errors=True)
+        shutil.rmtree(grade / "results", ignore_errors=True)  # a container of its own for each
+        (grade / "student").mkdir()
+        if text is not None:
+            (grade / "student" / "Exercise.js").write_text(text)
+        return subprocess.run(
+            [grade / "tests" / "grade.sh"],
+            env=os.environ | {"GRADE": str(grade), "PATH": f"{programs}:{os.environ['PATH']}"},
+            capture_output=True,
+            timeout=120,
+        ).returncode
+
+    answers = []
+    wrong = WRONG.write(tmp_path).read_text()
+    for text in (RIGHT.read_text(), wrong, "function integrate( {", None):
+        status = play(text)
+        results = json.loads((grade / "results" / "results.json").read_text(encoding="utf-8"))
+        jsonschema.validate(results, schema_of("prairielearn"))
+        answers.append((status, results["gradable"], results.get("score"), "images" in results))
+    (grade / "tests" / "tasks.toml").write_text("1 = -1")
+
+    assert answers == [
+        (0, True, 1.0, False),
+        (0, True, 17 / 20, True),
+        (0, False, None, False),
+        (0, False, None, False),
+    ]
+    assert play(wrong) != 0
+    assert not (grade / "results" / "results.json").exists()

@@ -15,11 +15,14 @@ from unittest import mock
 import pytest
 from py_mini_racer import JSTimeoutException
 
-from adapters.own_solver.file import NotASolver, SolverFailed, read_solver
+from adapters.own_solver.file import PATIENCE, NotASolver, SolverFailed, read_solver
 from adapters.own_solver.javascript import JavaScriptSolver
-from adapters.own_solver.process import WORK, SolverProcess
+from adapters.own_solver.process import GRACE, WORK, SolverProcess
 from adapters.own_solver.worker import HERE
 from adapters.safe_path import python
+from reports.check.lines import Source
+from reports.check.rows import judged
+from reports.check.solver import with_lines
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
@@ -79,6 +82,37 @@ def test_questions_put_together_are_answered_as_one_by_one(tmp_path: Path, fails
     assert isinstance(together[3], SolverFailed) == bool(fails)
     # no call is made again that did not come back
     assert str(together[4]) == str(together[3] if fails else together[0])
+
+
+def test_both_functions_may_be_endless_on_a_busy_machine(tmp_path: Path):
+    """Each may have to be asked again, so that the process has the time of two."""
+    (tmp_path / "Exercise.js").write_text(JS)
+    ball = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0, 0.7, 0.8, 0.9, 1.0, 0.5]
+    ask = [
+        ("ask", {"spheres": [ball, ball], "calls": [call], "world": False}, 1.0)
+        for call in (["integrate", 0, 0.1], ["integrate", 1, 0.1], ["collide", 0, 1])
+    ]
+    with SolverProcess(read_solver(tmp_path / "Exercise.js")) as process:
+        given = mock.Mock(side_effect=lambda asked, _: [{"done": None}] * len(asked))
+        process.exchange = given  # type: ignore[method-assign]
+        process.request(ask)
+        process.request(ask[:2])
+        process.request([("left", None, 1.0)])
+    both, one, left = (call.args[1] for call in given.call_args_list)
+
+    assert both == 2 * PATIENCE + GRACE
+    assert one == left == PATIENCE + GRACE
+
+
+def test_a_process_that_was_stopped_fails_again_when_it_is_asked(tmp_path: Path):
+    """As a failure of the solver, which the rows say; a fault's lines are then left out."""
+    (tmp_path / "Exercise.js").write_text(JS)
+    with SolverProcess(read_solver(tmp_path / "Exercise.js")) as process:
+        process.end()
+        with pytest.raises(SolverFailed, match="stopped before"):
+            process.do("left")
+        row = judged("scenes", "scenes", "Does it play?", "it fails", "yes", False, "too slow")
+        assert with_lines([row], Source(process, JS)) == [row]
 
 
 @pytest.mark.slow
