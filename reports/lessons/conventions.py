@@ -46,7 +46,7 @@ def table(engines: Mapping[str, EngineRow]) -> list[Convention]:
     for probe in ASKED:
         answers = {name: found[probe] for name, found in findings.items() if probe in found}
         expected = (
-            "by its order" if probe == "free_flight" else number(stated(list(answers.values())))
+            "0 if exact" if probe == "free_flight" else number(stated(list(answers.values())))
         )
         got = {name: (reading(each), each.verdict) for name, each in answers.items()}
         rows.append(Convention(PROBES[probe].asked, expected, got))

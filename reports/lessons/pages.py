@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, FETCHED
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
 from reports.lessons.friction.bounce import CONE as EDGES
@@ -98,6 +98,7 @@ def lesson_page(
         links=links,
         about=about(),
         first=first,
+        javascript=any(name in FETCHED for name in lesson.names),
     )
 
 

@@ -100,6 +100,21 @@ def test_a_page_that_is_printed_too_early_says_so(sheet: Page):
     assert drawn == "none"
 
 
+def test_panels_that_are_printed_too_early_say_so(sheet: Page):
+    """Until the first scene is drawn in them; then they are printed."""
+    content = "getComputedStyle(document.querySelector('#panels'), '::after').content"
+    sheet.wait_for_function("() => document.querySelector('#panels').dataset.shown")
+    sheet.emulate_media(media="print")
+    drawn, seen = sheet.evaluate(content), sheet.locator(".panels").is_visible()
+    sheet.evaluate("document.querySelector('#panels').removeAttribute('data-shown')")
+    early, blank = sheet.evaluate(content), sheet.locator(".panels").is_visible()
+    sheet.evaluate("document.querySelector('#panels').dataset.shown = 'again'")
+    sheet.emulate_media(media="screen")
+
+    assert (drawn, seen, blank) == ("none", True, False)
+    assert "print again" in early
+
+
 CUT = """() => [...document.querySelectorAll('table')].filter(t => t.offsetParent)
   .filter(t => t.getBoundingClientRect().right > innerWidth + 1).length"""
 
