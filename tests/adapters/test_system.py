@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import signal
 import subprocess
@@ -61,6 +62,44 @@ def test_everything_is_imported_without_what_only_linux_has(platform: str):
 
     assert done.stdout == "all imported\n", done.stderr[-2000:]
     assert "import of fcntl halted" in done.stderr
+
+
+# psutil's own way of ending a process on Linux needs SIGKILL; that of Windows does not
+MARKED = """
+import psutil
+psutil.Process.kill = lambda self: os.kill(self.pid, 9)
+from reports.__main__ import main
+sys.argv = ["crosscheck", "check", "CLASS", "--format", "csv", "--out", "CLASS.csv"]
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", ["win32", "darwin"])
+def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform: str):
+    """JavaScript and Python, right and wrong, with Windows' line ends: the marks of Linux."""
+    group = tmp_path / "class"
+    for name in ("plain.js", "plain.py"):
+        text = (ROOT / "tests" / "solvers" / "correct" / name).read_bytes()
+        for student, given in {"änne b": text, "cem": text.replace(b" / ", b" * ")}.items():
+            (group / f"{student} {name}").mkdir(parents=True)
+            crlf = given.replace(b"\n", b"\r\n")
+            (group / f"{student} {name}" / f"Exercise{name[-3:]}").write_bytes(crlf)
+    words = ["check", str(group), "--format", "csv", "--out", str(tmp_path / "here.csv")]
+    here = subprocess.run([CROSSCHECK, *words], capture_output=True, timeout=200)
+    code = (ELSEWHERE + MARKED).replace("PLATFORM", platform).replace("CLASS", str(group))
+    there = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=200
+    )
+    marks = [
+        [{k: v for k, v in row.items() if k != "seconds"} for row in csv.DictReader(file)]
+        for path in (tmp_path / "here.csv", tmp_path / "class.csv")
+        for file in [path.open(encoding="utf-8", newline="")]
+    ]
+
+    assert (here.returncode, there.returncode) == (1, 1), there.stderr[-2000:]
+    assert len(marks[0]) == 4
+    assert marks[0] == marks[1]
 
 
 @pytest.mark.slow

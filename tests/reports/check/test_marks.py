@@ -24,6 +24,7 @@ from reports.check.outcomes import OUTCOMES
 from reports.check.points import DEFAULT, QUESTIONS, BadPoints, Points, read_points
 from reports.check.rows import UNKNOWN, CheckRow, Verdict
 from reports.check.verdict import FileCheck
+from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
 DATA = Path(__file__).parents[2] / "data" / "marks"
@@ -259,6 +260,16 @@ def schema_of(name: str) -> dict[str, Any]:
     schema = json.loads(path.read_text())
     jsonschema.Draft202012Validator.check_schema(schema)
     return {"type": "array", "items": schema, "$defs": schema["$defs"]} if name == "csv" else schema
+
+
+def test_every_format_has_a_reader_a_schema_and_a_place_in_the_help():
+    """All but the table, which is for people."""
+    schemas = {path.name.partition(".")[0] for path in DATA.glob("*.schema.json")} | {"json"}
+    words = re.findall(r"\w+", crosscheck("check", "--help", cwd=DATA).stdout)
+
+    assert set(FORMATS) - {"table"} == set(READERS)
+    assert set(READERS) <= schemas
+    assert set(FORMATS) <= set(words)
 
 
 @pytest.mark.parametrize("name", READERS)
