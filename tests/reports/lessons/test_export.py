@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
+from adapters.engines import ENGINES
 from reports.lessons import command, pages
 from reports.lessons.catalogue import LESSONS
+from reports.lessons.conventions import Convention
 from reports.lessons.lesson import Shown
-from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, linked, offline
+from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, index_page, linked, offline
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -47,6 +49,27 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     assert heard == []
     assert len(held) == len(lesson.grid)
     assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).to_json()["charts"]))
+
+
+@pytest.mark.slow
+def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path: Path):
+    """A sheet of A4 sideways, with the longest answers; in letters as on the screen they do not."""
+    got = dict.fromkeys(ENGINES, ("not modelled", "keeps"))
+    asked = [
+        Convention("What friction acts in a bounce with e = 0, where 0.2 is stated?", "0", got)
+    ]
+    path = tmp_path / "index.html"
+    path.write_text(index_page(FILES, asked), encoding="utf-8")
+    page, heard = opened(browser, path.as_uri(), viewport={"width": 1032, "height": 703})
+    page.emulate_media(media="print")
+    end = "document.querySelector('.conventions').getBoundingClientRect().right - innerWidth"
+    right = page.evaluate(end)
+    page.evaluate("document.querySelector('.conventions').style.fontSize = '1rem'")
+    wide = page.evaluate(end)
+    page.context.close()
+
+    assert right <= 1 < wide
+    assert heard == []
 
 
 @pytest.mark.slow
