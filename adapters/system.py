@@ -123,12 +123,15 @@ def end_all(pid: int) -> None:
 
 
 def end_tree(pid: int) -> None:
-    """End the children of a process, and theirs, then the process; does nothing if it has ended."""
+    """End the children of a process, and theirs, then the process; does nothing if it has ended.
+
+    On Linux the process ends with its group, so that one that ends itself ends all of the group.
+    """
     import psutil
 
     with suppress(psutil.NoSuchProcess):
         process = psutil.Process(pid)
-        for each in (*process.children(recursive=True), process):
+        for each in process.children(recursive=True) + [process] * (not KERNEL):
             with suppress(psutil.NoSuchProcess):
                 each.kill()
 

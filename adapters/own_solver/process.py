@@ -261,6 +261,7 @@ class SolverProcess:
         """The failure of a process that has ended."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
+        system.end_all(self.process.pid)  # what it has left in its group
         # what V8 sends when its heap is full
         ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
         if ends_v8 or code == system.OUT_OF_MEMORY:

@@ -191,9 +191,10 @@ def test_a_child_in_a_group_of_its_own_ends_with_its_solver(
 
 
 @pytest.mark.slow
-def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path):
-    """The child keeps the pipe open, so that its parent's end is not seen by it."""
-    assert not lives_on(tmp_path, os.environ, "pass", "os._exit(0)")
+@pytest.mark.parametrize("child_does", ["pass", "os.closerange(0, 100)"])
+def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path, child_does: str):
+    """Whether or not it keeps the pipe open, so that its parent's end is not seen by it."""
+    assert not lives_on(tmp_path, os.environ, child_does, "os._exit(0)")
 
 
 def lives_on(
