@@ -159,7 +159,7 @@ def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[st
     if first:
         console.print("\nTo begin with:")
     for name, sentence in first.items():
-        begin = Text.assemble((name, "bold"), ": ", legible(sentence))
+        begin = Text.assemble((legible(name), "bold"), ": ", legible(sentence))
         console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
     console.print()
     for names in same_code(folder, checks):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,12 +15,15 @@ from adapters.own_solver.file import printable
 
 
 def legible(text: str) -> str:
-    """The text with escape codes and bytes that are not UTF-8 escaped: they would act on a
-    terminal.
+    """The text with escape codes and bytes that are not UTF-8 escaped, which would act on a
+    terminal, and with what standard output cannot encode, which would be escaped after a table is
+    laid out.
 
     Line ends stay, because messages of this program contain some.
     """
-    return "\n".join(map(printable, text.split("\n")))
+    safe = "\n".join(map(printable, text.split("\n")))
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    return safe.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def encoded(text: str) -> bytes:

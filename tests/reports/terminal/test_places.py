@@ -166,3 +166,25 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
         encoding="utf-8"
     ) in page
     assert "own" in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["ascii", "cp437", "cp1252"])
+def test_what_a_console_cannot_write_is_escaped_before_a_table_is_laid_out(
+    tmp_path: Path, encoding: str
+):
+    """Escaped afterwards, its lines would be wider than the terminal."""
+    # one right, and one with a fault, whose sentence is folded
+    for name, old in (
+        ("Übung 3 Müller (final)", ""),
+        ("Zoë Ångström, Gruppe 17", " / sphere.mass"),
+    ):
+        (tmp_path / "class" / name).mkdir(parents=True)
+        text = SOLVER.read_text("utf-8").replace(old or "\0", "")
+        (tmp_path / "class" / name / "Exercise.py").write_text(text, "utf-8")
+    done = shell("$C check class", tmp_path, PYTHONIOENCODING=encoding, COLUMNS="80")
+    lines = done.stdout.decode(encoding).splitlines()
+
+    assert done.returncode == 1, done.stderr
+    assert any(r"\xc5ngstr" in line for line in lines) == (encoding == "ascii")
+    assert [line for line in lines if len(line) > 80] == []
