@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of
-from reports.check.impacts import AS_IF_EQUAL
+from reports.check.impacts import APPROACH, AS_IF_EQUAL
 from reports.check.questions import QUESTIONS, Question, fresh_world
 from reports.check.rows import SAME_AGAIN, CheckRow
 
@@ -155,6 +155,8 @@ SIGN_OF_J = "sign of the normal or of J"
 NO_MASSES = "the masses are missing"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
 GUARD = re.compile(r"==\s*0\b")  # two at the same place
+HEAD_OF_LOOP = re.compile(r"\b(?:for|while|forEach|map)\b")
+BRANCH = re.compile(r"\bif\b.*[<>]|[<>].*\?")  # on the order of two numbers
 ASSIGNS = re.compile(r"([\w.,\s\[\]]+?)\s*[-+*/]?=(?![=>])")
 
 
@@ -201,6 +203,17 @@ def impulse_lines(seen: Sequence[Access], cause: str) -> list[int]:
     return writes
 
 
+NAMED = re.compile(r"\(line (\d+)\b|\bline (\d+) has\b")
+
+
+def named_line(cause: str, text: str) -> list[tuple[int, str]]:
+    """The line of a file's text that a cause names, with its number from 1; none if it names
+    none."""
+    named, lines = NAMED.search(cause), text.splitlines()
+    number = int(named[1] or named[2]) if named else 0
+    return [(number, cut(lines[number - 1].strip()))] if 0 < number <= len(lines) else []
+
+
 def cut(line: str) -> str:
     """A line of at most `LONGEST` characters."""
     return line if len(line) <= LONGEST else f"{line[: LONGEST - 4]} ..."
@@ -231,9 +244,9 @@ class Source:
 
     def of(self, row: CheckRow) -> list[tuple[int, str]]:
         """The lines that a row is about, at most `MOST`, each with its number from 1."""
-        named = re.search(r"\(line (\d+)\b|\bline (\d+) has\b", row.cause)
-        if named:
-            numbers = [int(named[1] or named[2])]
+        if named := named_line(row.cause, self.text):
+            # What performSimStep calls fails by what it is called with: that is at its loops.
+            numbers = [named[0][0], *(self.loops() if row.task == "loop" else [])]
         elif row.task == "loop":
             numbers = self.calls(row.name)
         elif "does not come back" in row.cause:
@@ -251,11 +264,9 @@ class Source:
         seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
         if row.name in WRITTEN:
             who = {"velocity of A": {0}, "velocity of B": {1}}.get(row.name, {0, 1})
-            return [
-                a.line
-                for a in seen
-                if a.kind == "w" and a.field in WRITTEN[row.name] and a.sphere in who
-            ]
+            writes = [a for a in seen if a.kind == "w" and a.field in WRITTEN[row.name]]
+            # Where one sphere is not written at all, its lines belong beside those of the other.
+            return [a.line for a in writes if a.sphere in who] or [a.line for a in writes]
         made = self.normal_lines(seen, row.cause)
         if row.task == "2a":
             return [*made, *detection_lines(seen)]
@@ -269,11 +280,21 @@ class Source:
             ]
         if row.task == "2c" and row.cause.startswith(AS_IF_EQUAL):
             return [*self.lines_of_j(seen), *(a.line for a in seen if is_write(a, "velocity"))]
+        if row.task == "2c" and row.cause == APPROACH:
+            return self.branches(seen) or impulse_lines(seen, row.cause)
         if row.task == "2c" and NO_MASSES in row.cause:
             return self.lines_of_j(seen) or impulse_lines(seen, row.cause)
         if row.task == "2c":
             return made or impulse_lines(seen, row.cause)
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
+
+    def branches(self, seen: Sequence[Access]) -> list[int]:
+        """The first line from the last that reads a velocity on which compares two numbers in a
+        condition."""
+        last = max((a.line for a in seen if a.field == "velocity"), default=0)
+        code = code_of(self.text).splitlines()
+        after = range(last, min(last + MOST, len(code)) + 1) if last else ()
+        return [k for k in after if BRANCH.search(code[k - 1])][:1]
 
     def lines_of_j(self, seen: Sequence[Access]) -> list[int]:
         """The lines that set a variable after the last that reads a velocity, up to the first that
@@ -330,6 +351,17 @@ class Source:
         if found and name == "itself":  # the loop over j stands last, its head before the call
             return [found[-1] - 1, found[-1]]
         return found or self.heads("performSimStep")
+
+    def loops(self) -> list[int]:
+        """The lines of performSimStep that collide pairs, and the heads of their loops."""
+        code = code_of(self.text).splitlines()
+        begin = next(iter(self.heads("performSimStep")), 0)
+        calls = [k for k in self.calls("pairs") if k > begin]
+        heads = [
+            next((k for k in range(call, begin, -1) if HEAD_OF_LOOP.search(code[k - 1])), 0)
+            for call in calls
+        ]
+        return [*heads, *calls]
 
     def heads(self, function: str) -> list[int]:
         """The lines where a function is defined."""

@@ -15,7 +15,7 @@ from reports.check.failing import rows_until_failure
 from reports.check.functions import failed_calls, implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
 from reports.check.impulse import impulse_rows
-from reports.check.lines import Source
+from reports.check.lines import Source, named_line
 from reports.check.loop import loop_rows
 from reports.check.motion import TURNED, motion_rows
 from reports.check.projection import (
@@ -44,7 +44,8 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
     try:
         process = SolverProcess(solver)
     except SolverFailed as failure:
-        return [judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))], None
+        row = judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))
+        return [replace(row, lines=named_line(row.cause, solver.text))], None
     try:
         with process:
             return rows_of(process, solver.text, own_text(solver))

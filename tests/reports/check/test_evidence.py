@@ -151,6 +151,42 @@ def test_a_wrong_sign_of_j_shows_the_line_of_j_first(checks: dict[str, FileCheck
     assert all(".velocity." in line for line in lines[1:])
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "shown"),
+    [
+        ("if (vn >= 0) return;", "if (vn <= 0) return;", "if (vn <= 0) return;"),
+        (
+            "for (var j = i + 1; j < numAsteroids; j++)",
+            "for (var j = i + 1; j < numAsteroids; i++)",
+            "for (var j = i + 1; j < numAsteroids; i++) sphere",
+        ),
+        ("var vn = (", "var vn = ((", "var vn = (("),
+        ("(1 / sphereA.mass + 1 / sphereB.mass)", "1", "var J = -(1 + restitution) * vn / 1;"),
+        (
+            """
+  sphereB.velocity.x -= J / sphereB.mass * nx;
+  sphereB.velocity.y -= J / sphereB.mass * ny;
+""",
+            "\n",
+            "sphereA.velocity.x += J / sphereA.mass * nx;",
+        ),
+    ],
+    ids=["the guard", "the loop", "what cannot be read", "J without masses", "B left out"],
+)
+def test_the_line_at_fault_is_shown_even_if_it_reads_no_sphere(
+    tmp_path: Path, old: str, new: str, shown: str
+):
+    """The condition, the head of the loop, the line that does not parse, that of J; and where B is
+    left out, the lines beside which its own belong."""
+    path = tmp_path / "Exercise.js"
+    text = (CORRECT_FILES / "plain.js").read_text("utf-8")
+    path.write_text(text.replace(old, new), "utf-8")
+    (one,) = judged([path]).values()
+
+    assert old in text
+    assert any(line.startswith(shown) for _, line in begin_with(one).lines)
+
+
 def test_a_fault_shows_the_lines_of_the_file_and_the_formula(checks: dict[str, FileCheck]):
     """Of each of two faults: the lines that write what is wrong, and how the exercise has it; in
     JSON, too."""
