@@ -46,7 +46,7 @@ NAMES = (
     AIR,
     SIDES,
 ) = NAMES
-MANY_SIDES = 400  # of matter's disks, which are polygons: what is left of them at 400 is residual
+MANY_SIDES = 800  # of matter's disks, which are polygons: what is left of them is residual
 # Exact flight; bodies that overlap at the end of a step exchange their impulse there; nothing is
 # moved out of overlap.
 END_OF_STEP: dict[str, Any] = {
@@ -71,7 +71,8 @@ class Mechanism:
         name: one of `NAMES`.
         parameters: of `AblatedReference`; empty: the reference does not have the mechanism.
         on_top: the mechanisms on which it acts, and with which it is enabled.
-        without: makes the engine without it, if the engine has a parameter for that.
+        without: makes the engine without it, if the engine has a parameter for that; of a mechanism
+            that the reference does not have, without those before it, too.
     """
 
     name: str
@@ -349,19 +350,28 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
 def _matter(
     _reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str
 ) -> list[Mechanism]:
-    """The mechanisms that matter can switch off; the reference has none of them.
+    """The mechanisms that matter can switch off, one after the other; the reference has none of
+    them.
 
-    Not known: the rest of the polygons, its contacts below the resting threshold, and the place of
-    its position correction.
+    Its disks are polygons, so that an impulse acts at a corner and turns them; without friction
+    nothing else does. The iterations of a collision after the first stop pairs that are slow.
     """
-    made = partial(_javascript, "matter", profile)
-    smooth = Mechanism(FRICTION, without=made(friction=0))
-    return [
-        *([Mechanism(AIR, without=made(friction_air=0))] if profile == "shipped" else []),
-        *([smooth] if profile == "shipped" or scene.friction else []),
-        Mechanism(POSITION_CORRECTION, without=made(position_iterations=0)),
-        Mechanism(SIDES, without=made(sides=MANY_SIDES)),
+    air = {"friction_air": 0} if profile == "shipped" else {}
+    smooth = {"friction": 0} if profile == "shipped" or scene.friction else {}
+    turning = {} if scene.friction else {"turning": False}
+    steps = [
+        (AIR, air),
+        (FRICTION, smooth),
+        (SIDES, {"sides": MANY_SIDES, **turning}),
+        (RESTITUTION, {"velocity_iterations": 1}),
+        (POSITION_CORRECTION, {"position_iterations": 0}),
     ]
+    found, off = list[Mechanism](), dict[str, Any]()
+    for name, options in steps:
+        if options:
+            off |= options
+            found.append(Mechanism(name, without=_javascript("matter", profile, **off)))
+    return found
 
 
 def _javascript(name: str, profile: str, **changed: Any) -> Callable[[], Engine]:

@@ -218,10 +218,10 @@ class Budget:
         engine.
 
         Each is enabled by itself in the reference with end-of-step detection, or on top of
-        those it acts on; for a mechanism that the reference does not have, the engine is compared
-        with itself without it.
+        those it acts on. Those that the reference does not have are disabled in the engine, one
+        after the other.
         """
-        contributions = {TIME: self.reference([])}
+        contributions, engine = {TIME: self.reference([])}, self.total
         for mechanism in self.mechanisms:
             if mechanism.parameters:
                 below = [each for each in self.mechanisms if each.name in mechanism.on_top]
@@ -229,9 +229,9 @@ class Budget:
                     [*below, mechanism]
                 ) - self.reference(below)
             elif mechanism.without is not None:
-                contributions[mechanism.name] = self.total - self.at.offset(
-                    self.at.played(mechanism.without)
-                )
+                without = self.at.offset(self.at.played(mechanism.without))
+                contributions[mechanism.name] = engine - without
+                engine = without
         outside = [
             contributions[mechanism.name]
             for mechanism in self.mechanisms

@@ -25,6 +25,7 @@ from adapters.conformance.probe import history, loaded, plain, scene_of
 from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
 from adapters.javascript.engine import IDLE, JavaScriptEngine
+from adapters.mechanisms import table as mechanisms
 from adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
 from adapters.own_solver import gl_matrix
@@ -341,13 +342,24 @@ def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name
 
 @fetched
 @pytest.mark.slow
-def test_what_brakes_matter_in_flight_is_its_air_and_its_order_of_updates():
-    """Of a free fall nothing is left over; of a pair some percent are not known, of an oblique
-    collision up to a half, of friction nearly all, as adapters/README.md says."""
-    for profile in ("shipped", "matched"):
-        assert left_over("free_fall", f"matter:{profile}") < 1e-9
-        assert 0.05 < left_over("head_on_equal_e09", f"matter:{profile}") < 0.1
-        assert 0.02 < left_over("oblique_e09", f"matter:{profile}") < 0.5
+@pytest.mark.parametrize("profile", ["shipped", "matched"])
+@pytest.mark.parametrize("scene", ["free_fall", "head_on_equal_e09", "bouncing_ball_e1"])
+def test_air_polygons_and_iterations_are_all_that_matter_does_along_a_line(scene, profile):
+    """Switched off one after the other; what is left over is the reference's own error."""
+    assert left_over(scene, f"matter:{profile}") < 1e-9
+
+
+@fetched
+@pytest.mark.slow
+def test_of_oblique_collisions_with_matter_the_polygons_leave_a_tenth(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Four times as many sides leave less than half of it. As shipped a disk has 10 to 26 sides,
+    whatever is asked for. Of friction nearly all is not known, as adapters/README.md says."""
+    matched = left_over("oblique_e09", "matter:matched")
+    assert 0.02 < left_over("oblique_e09", "matter:shipped") < 0.1
+    monkeypatch.setattr(mechanisms, "MANY_SIDES", 4 * mechanisms.MANY_SIDES)
+    assert left_over("oblique_e09", "matter:matched") < 0.5 * matched < 0.1
     assert left_over("slip_to_roll", "matter:matched") > 0.9
 
 
