@@ -80,9 +80,9 @@ class CollisionCase:
     @property
     def right_d(self) -> bool:
         """Whether the update is known to be right."""
-        if self.found is None or self.found.impulse in MASSLESS:
+        if self.found is None:
             return False
-        return not self.found.update or self.found.task != "2d"
+        return self.found.change is UPDATES[""].change or self.found.task != "2d"
 
 
 def impulse_rows(
