@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from datetime import date
-from io import StringIO
 from pathlib import Path
 
 import pandas as pd
@@ -24,13 +23,10 @@ def keep(path: Path, found: pd.DataFrame, runs: Iterable[Run]) -> None:
 
 def table_in(path: Path) -> pd.DataFrame:
     """The table as it was last written."""
-    return pd.read_csv(StringIO("\n".join(_lines(path)[1:])))
+    return pd.read_csv(path, comment="#")
 
 
 def made_with(path: Path) -> str:
     """When and with which versions it was written."""
-    return _lines(path)[0].removeprefix("# ")
-
-
-def _lines(path: Path) -> list[str]:
-    return path.read_text(encoding="utf-8").splitlines()
+    with path.open(encoding="utf-8") as file:
+        return file.readline().rstrip("\n").removeprefix("# ")
