@@ -32,7 +32,7 @@ from reports.check.functions import keeps_state
 from reports.check.marks import Marked, id_of, matched, place_of
 from reports.check.points import DEFAULT, BadPoints, Points, read_points
 from reports.check.rows import CheckRow
-from reports.check.terminal import print_scene, sentence_on
+from reports.check.terminal import print_scene, print_total, sentence_on
 from reports.check.verdict import FileCheck, check_file, named, nothing_in
 from reports.run.made import may_overwrite
 from reports.run.runner import run_all
@@ -95,20 +95,22 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
     scenes = scenes_of(checks[0]) if any(wanted) else []
     marked = marks_of(path, checks, grading, not_read, scenes)
-    printed = [one.format for one in outputs if one.path is None] or ["table"]
-    if printed == ["table"]:
-        show(marked)
-    else:
-        sys.stdout.write(FORMATS[printed[0]].text(marked))
+    printed = next((one.format for one in outputs if one.path is None), "")
+    if printed:
+        sys.stdout.write(FORMATS[printed].text(marked))
         if not_read:
             say(sentence_on(not_read))
+    elif several and any(one.option == "--out" for one in outputs):
+        print_total(checks, not_read)
+    else:
+        show(marked)
     for one in outputs:
         if one.path is not None:
             write(one, FORMATS[one.format].text(marked))
     if page is not None and several:
         make_class_page(page, marked)
     elif page is not None:
-        if scenes and printed == ["table"]:
+        if scenes and not printed:
             print_scene(scenes, page)
         make_page(page, checks[0], scenes)
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)

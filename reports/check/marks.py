@@ -105,7 +105,13 @@ class Marked:
         if self.check.refused:
             return self.brief
         said = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
-        return f"{said} {number(self.points)} of {number(self.most)} points."
+        said = f"{said} {number(self.points)} of {number(self.most)} points."
+        return " ".join([said, *(f"{title} gives no points." for title in self.without_points)])
+
+    @property
+    def without_points(self) -> list[str]:
+        """The tasks that have a fault and give no points."""
+        return [mark.title for mark in self.tasks if mark.status == "fault" and not mark.most]
 
     def feedback(self, task: str) -> list[str]:
         """The lines for a student about a task: faults with their numbers, consequences, free

@@ -1,5 +1,5 @@
 """Writes check.html: the findings in one file, and the smallest scenes that show them, with the
-file's motion beside the exact one."""
+file's motion beside the right one."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from adapters.run import Run
+from reports.check.picture import data_url, legend
 from reports.check.rows import TASKS, Verdict, shown
 from reports.check.scene_words import faults_of, scene_lines, together
 from reports.check.smallest_scene import DT, Smallest
@@ -45,7 +46,8 @@ SCRIPTS = (*ENGINE, "check/check.js")
 
 
 class SceneShown(NamedTuple):
-    """A smallest scene on the page: in words, and as a replay with its layers."""
+    """A smallest scene on the page: in words, as a replay with its layers, and for paper as a
+    picture with its caption."""
 
     smallest: Smallest
     title: str
@@ -53,6 +55,8 @@ class SceneShown(NamedTuple):
     layers: list[str]
     replay: str
     ratio: float
+    picture: str
+    caption: str
 
 
 def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None:
@@ -97,15 +101,17 @@ def scene_shown(name: str, smallest: Smallest) -> SceneShown:
         [style.TRUTH if run is None else run.name for run, _ in layers],
         pack_layers(scenario, layers),
         ratio_of(scenario, layers),
+        data_url(smallest),
+        legend(smallest),
     )
 
 
 def layers_of(name: str, smallest: Smallest) -> list[tuple[Run | None, Trajectory]]:
-    """The layers of the replay: the file's motion, and the exact one on top."""
+    """The layers of the replay: the file's motion, and the right one on top."""
     yours = Run(
         name.replace(":", "_"), "own", smallest.scenario.name, DT, trajectory=smallest.yours
     )
-    exact: list[tuple[Run | None, Trajectory]] = (
-        [] if smallest.truth is None else [(None, smallest.truth)]
+    right: list[tuple[Run | None, Trajectory]] = (
+        [] if smallest.right is None else [(None, smallest.right)]
     )
-    return [(yours, smallest.yours), *exact]
+    return [(yours, smallest.yours), *right]

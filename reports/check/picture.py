@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 SIDE = 480  # pixels, of the longer side
 MARGIN = 0.2  # margin, m
 FARTHEST = 20.0  # m: what is farther away is not drawn
-START, EXACT, YOURS = (150, 150, 150), (30, 30, 30), (163, 18, 58)  # as on the page of a file
+START, RIGHT, YOURS = (150, 150, 150), (30, 30, 30), (163, 18, 58)  # as on the page of a file
 THIN, THICK = 2, 3  # pixels
 FINER = 4  # drawn this many times larger and scaled down, for smooth edges
 EVERY = 2  # samples between two dots
 LEGEND = (
-    "Grey: the start. Black: the exact answer after {t:g} s. Red: your solver after {t:g} s. The"
+    "Grey: the start. Black: {right} after {t:g} s. Red: your solver after {t:g} s. The"
     " line from a centre shows the angle; dots show the way."
 )
 
@@ -37,7 +37,12 @@ def label(one: Smallest) -> str:
     """A caption: what the picture shows and what is wrong in it."""
     said = f"The smallest scene that shows {faults_of(one)}: {one.fault}."
     spheres = [f"Sphere {k} starts {line}." for k, line in enumerate(scene_lines(one.scenario))]
-    return " ".join([said, *spheres, LEGEND.format(t=one.scenario.duration)])
+    return " ".join([said, *spheres, legend(one)])
+
+
+def legend(one: Smallest) -> str:
+    """What is drawn in which colour."""
+    return LEGEND.format(right=one.right_is, t=one.scenario.duration)
 
 
 def png(picture: Image.Image) -> bytes:
@@ -50,7 +55,7 @@ def png(picture: Image.Image) -> bytes:
 def drawn(one: Smallest) -> Image.Image:
     """The picture: start of the spheres, end of each motion, and the paths."""
     scene = one.scenario.scene
-    motions = [(one.truth, EXACT, THICK), (one.yours, YOURS, THIN)]
+    motions = [(one.right, RIGHT, THICK), (one.yours, YOURS, THIN)]
     there = [(motion, colour, width) for motion, colour, width in motions if motion is not None]
     paper = Paper(np.concatenate([motion.position.reshape(-1, 2) for motion, _, _ in there]), scene)
     for k in range(scene.n):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from adapters.own_solver.restitution import (
     separation,
 )
 from reports.check.questions import QUESTIONS, Answer
-from reports.check.rows import CheckRow, judged, near, shown
+from reports.check.rows import FOLLOWS, CheckRow, judged, near, shown
 
 
 @dataclass(frozen=True)
@@ -97,16 +97,19 @@ class Restitution:
         return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
 
     def speeds(self, mistake: str) -> CheckRow:
-        """The row on e at other speeds; `mistake` as above."""
-        return judged(
+        """The row on e at other speeds; `mistake` as above. A wrong e at every speed is the fault
+        of the row before."""
+        right, alike = self.row(mistake).verdict != "fault", near([self.slow, self.fast], self.came)
+        row = judged(
             "restitution at other speeds",
             "2c",
-            "Do the same two spheres have that restitution at 2 mm/s and at 200 m/s, too?",
+            "Do the same two spheres have the right restitution at 2 mm/s and at 200 m/s, too?",
             f"{shown(self.slow)} and {shown(self.fast)}",
-            f"{shown(self.came)}, as at 2 m/s",
-            near([self.slow, self.fast], self.came),
+            shown(self.came if right else self.own),
+            right and alike,
             mistake or "the restitution depends on the speed",
         )
+        return replace(row, verdict="follows", cause=FOLLOWS) if alike and not right else row
 
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:

@@ -215,15 +215,12 @@ MEETING = {"2d": "2c"}  # any wrong velocity, if only 2d has a fault
 
 
 def flight_fault(scenario: Scenario, played: SceneAnswer, part: str) -> str:
-    """What is wrong with the flight of a sphere without collisions; symplectic Euler gives x0 + v0
-    t + a t (t + dt) / 2. `part`: "place", "turn", or "1" for both."""
-    scene, t = scenario.scene, scenario.duration
+    """What is wrong with the flight of a sphere without collisions. `part`: "place", "turn", or "1"
+    for both."""
+    t, right = scenario.duration, by_formulas(scenario)
     met = {int(i) for row in played.contacts for i in row[1:3]}
-    for k in set(range(scene.n)) - met:
-        force = sum((thrust.force for thrust in scenario.thrusts if thrust.disk == k), np.zeros(2))
-        torque = sum(thrust.torque for thrust in scenario.thrusts if thrust.disk == k)
-        x = scene.position[k] + scene.velocity[k] * t + force / scene.mass[k] * t * (t + DT) / 2
-        angle = torque / scene.inertia[k] * t * (t + DT) / 2
+    for k in set(range(scenario.scene.n)) - met:
+        x, angle = right.position[-1, k], right.angle[-1, k]
         if part != "turn" and not near(played.position[-1, k], x, SINGLE):
             return (
                 f"sphere {k} is at {shown(played.position[-1, k])} m after {shown(t)} s, not at"
@@ -238,10 +235,29 @@ def flight_fault(scenario: Scenario, played: SceneAnswer, part: str) -> str:
     return ""
 
 
+def by_formulas(scenario: Scenario) -> Trajectory:
+    """The motion by the exercise's formulas in steps of `DT`, as if no spheres met: symplectic
+    Euler gives v0 + a t and x0 + v0 t + a t (t + dt) / 2."""
+    scene, t = scenario.scene, scenario.times[:, None]
+    acceleration, spin = np.zeros((scene.n, 2)), np.zeros(scene.n)
+    for thrust in scenario.thrusts:
+        acceleration[thrust.disk] += thrust.force / scene.mass[thrust.disk]
+        spin[thrust.disk] += thrust.torque / scene.inertia[thrust.disk]
+    far, seconds = t * (t + DT) / 2, t[:, None]
+    return Trajectory(
+        frozen(scenario.times),
+        frozen(scene.position + scene.velocity * seconds + acceleration * far[:, None]),
+        frozen(scene.velocity + acceleration * seconds),
+        frozen(scene.angle + scene.angular_velocity * t + spin * far),
+        frozen(scene.angular_velocity + spin * t),
+        Collisions.of([]),
+    )
+
+
 def shown_by(
     play: Play, spheres: list[Sphere], thrust: tuple[int, int, int], e: float, part: str
 ) -> Smallest:
-    """The result: the scene with the file's motion and the exact one."""
+    """The result: the scene with the file's motion and the right one."""
     scenario = scenario_of(spheres, thrust, e, INTERVAL)
     assert scenario is not None
     fault = fault_of(play, spheres, thrust, e, part)
@@ -258,8 +274,15 @@ def shown_by(
         frozen(played.angular_velocity),
         collisions,
     )
+    return Smallest(scenario, fault.removeprefix("smallest, "), yours, right_motion(scenario))
+
+
+def right_motion(scenario: Scenario) -> Trajectory | None:
+    """The motion that is shown beside the file's: by the formulas under a force, else the exact
+    answer; None if there is none."""
+    if scenario.thrusts:
+        return by_formulas(scenario)
     try:
-        truth = truth_of(scenario, None if scenario.scene.n == 1 else computed(scenario))
+        return truth_of(scenario, None if scenario.scene.n == 1 else computed(scenario))
     except NoTruth:
-        truth = None
-    return Smallest(scenario, fault.removeprefix("smallest, "), yours, truth)
+        return None

@@ -13,7 +13,7 @@ DT = 1e-2
 
 @dataclass(frozen=True)
 class Smallest:
-    """A scene that shows a fault, what is wrong in it, the file's motion, and the exact one if
+    """A scene that shows a fault, what is wrong in it, the file's motion, and the right one if
     there is one.
 
     of: the numbers, from 1, of the faults shown.
@@ -22,5 +22,13 @@ class Smallest:
     scenario: Scenario
     fault: str
     yours: Trajectory
-    truth: Trajectory | None
+    right: Trajectory | None
     of: tuple[int, ...] = (1,)
+
+    @property
+    def right_is(self) -> str:
+        """What the right motion is. Under a force it is that of the exercise's formulas: from the
+        exact answer x' = x + v dt, with the old v, is as far as the right order, on the other
+        side."""
+        stepped = f"the exercise's formulas in steps of {DT:g} s"
+        return stepped if self.scenario.thrusts else "the exact answer"

@@ -31,8 +31,8 @@ STYLE = {
     "not asked": "dim",
 }
 LEGEND = (
-    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not asked,"
-    " as the file has no such part, or a FAULT hides it."
+    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not"
+    " asked, or only in part: the file has no such part, or a FAULT hides it."
 )
 
 
@@ -84,11 +84,11 @@ def print_tasks(console: Console, one: FileCheck) -> None:
     """Print the verdict of every task, the number of questions asked and of wrong answers."""
     table = Table("task", "verdict", "asked", "wrong", box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
-        rows, word = one.of(task), one.tasks[task]
+        rows, style = one.of(task), STYLE[one.tasks[task]]
         if rows:
             asked = sum(row.verdict != "not asked" for row in rows)
             wrong = sum(row.verdict in ("fault", "follows") for row in rows)
-            table.add_row(title, Text(word, STYLE[word]), str(asked), str(wrong or ""))
+            table.add_row(title, Text(one.word(task), style), str(asked), str(wrong or ""))
     console.print(table)
 
 
@@ -165,6 +165,12 @@ def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[st
     for names in same_code(folder, checks):
         said = f"The same code, but for spaces and lines of comments: {', '.join(names)}."
         console.print(legible(said), highlight=False)
+    print_total(checks, not_read)
+
+
+def print_total(checks: Sequence[FileCheck], not_read: Sequence[str] = ()) -> None:
+    """Print how many files have which result, and what is in the folder without a row."""
+    console = Console()
     console.print(total(checks), highlight=False)
     if any(one.faults for one in checks):
         console.print("crosscheck check FILE shows the lines and the numbers of one.")
@@ -181,7 +187,7 @@ def total(checks: Sequence[FileCheck]) -> str:
     """A sentence with the number of files and of each result."""
     right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
     parts = [f"{right} without a fault", f"{len(checks) - right - refused} with a fault"]
-    parts += [f"{refused} not checked, as said above"] * bool(refused)
+    parts += [f"{refused} that could not be checked"] * bool(refused)
     return f"{counted(len(checks), 'solver')}: {', '.join(parts)}."
 
 

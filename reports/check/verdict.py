@@ -74,6 +74,12 @@ class FileCheck:
         """Task -> its worst verdict."""
         return {task: worst(self.of(task)) for task in TASKS}
 
+    def word(self, task: str) -> str:
+        """The verdict of a task for people: "partly asked" if all that could be asked is right."""
+        word = self.tasks[task]
+        some = any(row.verdict != "not asked" for row in self.of(task))
+        return "partly asked" if word == "not asked" and some else word
+
     @property
     def sentences(self) -> list[str]:
         """At most `MOST` sentences, in the order of the tasks. Each cause has one; consequences of

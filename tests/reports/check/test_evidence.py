@@ -74,6 +74,23 @@ def test_a_sphere_against_itself_is_the_only_fault_that_is_named(checks: dict[st
     assert any("var j = i;" in text for _, text in begin_with(one).lines)
 
 
+def test_a_wrong_restitution_is_right_at_no_speed(checks: dict[str, FileCheck]):
+    """That it is the same wrong one at every speed follows from the fault and is not "right"."""
+    speeds = "restitution at other speeds"
+    (wrong,) = (row for row in checks["impulse_sign.js"].rows if row.name == speeds)
+    (right,) = (row for row in checks["every_order.js"].rows if row.name == speeds)
+
+    assert (wrong.verdict, right.verdict) == ("follows", "right")
+    assert (wrong.expected, right.expected) == ("0.9", "0.9")
+
+
+def test_a_step_whose_functions_are_wrong_is_partly_asked(checks: dict[str, FileCheck]):
+    """What projectObjects does is asked, what the step does with wrong functions is not."""
+    assert checks["impulse_sign.js"].word("loop") == "partly asked"
+    assert checks["impulse_sign.js"].word("1") == "right"
+    assert checks["against_itself.js"].word("loop") == "fault"
+
+
 def test_a_sphere_against_itself_is_free_where_it_changes_nothing(checks: dict[str, FileCheck]):
     """A function that returns for it is right."""
     one = checks["every_order.js"]

@@ -82,6 +82,14 @@ def test_a_fault_in_a_question_without_points_costs_as_the_cheapest_that_has_som
     }
 
 
+def test_full_points_for_a_file_with_a_fault_are_explained():
+    """The step has no points: who is told of a fault and of 20 of 20 is told why."""
+    said = marked(row("loop", "all spheres", "fault", "any")).summary
+
+    assert said.endswith("20 of 20 points. The step, performSimStep gives no points.")
+    assert "no points" not in marked(row("1", "spin", "fault", "any")).summary
+
+
 def test_what_could_not_be_asked_gives_no_points_and_is_counted():
     """A task of which nothing was asked; one question of several; one that fails as a whole."""
     check = marked().check

@@ -16,7 +16,7 @@ from PIL import Image
 from reports.check.formats import prairielearn
 from reports.check.formats.formats import FORMATS
 from reports.check.formats.prairielearn import LARGEST, LONGEST
-from reports.check.picture import EXACT, FARTHEST, START, YOURS, data_url, drawn, label, png
+from reports.check.picture import FARTHEST, RIGHT, START, YOURS, data_url, drawn, label, png
 from reports.check.smallest import Smallest, scenario_of
 from scenarios.model import Array, Trajectory
 from tests.reports.check.test_marks import marked, row, schema_of
@@ -48,12 +48,12 @@ def test_a_picture_shows_the_start_the_exact_answer_and_yours():
     """In three colours, without the exact answer in two; in words which sphere is which."""
     url = data_url(smallest())
     seen = colours(b64decode(url.partition(",")[2]))
-    alone = colours(png(drawn(replace(smallest(), truth=None))))
+    alone = colours(png(drawn(replace(smallest(), right=None))))
 
     assert url.startswith("data:image/png;base64,")
-    assert {EXACT, YOURS} <= seen
-    assert EXACT not in alone
-    assert START not in {EXACT, YOURS}
+    assert {RIGHT, YOURS} <= seen
+    assert RIGHT not in alone
+    assert START not in {RIGHT, YOURS}
     assert "sphere 0 rests. Sphere 0 starts at (-0.5, 0) m" in label(smallest())
 
 
@@ -62,10 +62,10 @@ def test_a_motion_that_leaves_for_nowhere_has_a_picture(place: float):
     """Also if all of it is there; the picture keeps its size."""
     yours = smallest().yours
     gone = replace(yours, position=np.full_like(yours.position, place))
-    one = replace(smallest(), yours=gone, truth=None)
+    one = replace(smallest(), yours=gone, right=None)
 
     assert max(drawn(one).size) <= max(drawn(smallest()).size) + 1
-    assert EXACT in colours(png(drawn(replace(one, truth=smallest().truth))))
+    assert RIGHT in colours(png(drawn(replace(one, right=smallest().right))))
 
 
 def test_the_loudest_file_and_its_pictures_fit_into_what_prairielearn_reads(
