@@ -227,10 +227,13 @@ class SolverProcess:
 
     def receive(self, limit: float) -> Any:
         """Read one line from the process, within `limit` s."""
+        assert self.process is not None
         received, deadline = bytearray(), monotonic() + limit
         while not received.endswith(b"\n"):
             left = deadline - monotonic()
             chunk = self.pieces.next(min(left, system.LOOK))
+            if chunk is None and self.process.poll() is not None:
+                chunk = self.pieces.next(0.0) or b""  # its child may keep the pipe open
             if chunk is None and left > system.LOOK:
                 self.end_if_too_large()
                 continue

@@ -197,6 +197,20 @@ def test_a_child_ends_with_its_solver_that_has_ended_itself(tmp_path: Path, chil
     assert not lives_on(tmp_path, os.environ, child_does, "os._exit(0)")
 
 
+@pytest.mark.slow
+def test_a_solver_that_has_ended_itself_is_said_to_have_though_its_child_keeps_the_pipe(
+    tmp_path: Path,
+):
+    """Not that it does not come back, half a minute later."""
+    (tmp_path / "solver.py").write_text(
+        "import os, time\nif os.fork() == 0:\n    time.sleep(300)\nos._exit(0)\n"
+    )
+    with pytest.raises(SolverFailed, match=r"ended its own process \(exit status 0\)") as failed:
+        SolverProcess(read_solver(tmp_path / "solver.py"))
+
+    assert failed.value.kind == "crashed"
+
+
 def lives_on(
     folder: Path, environment: Mapping[str, str], child_does: str, parent_does: str
 ) -> bool:
