@@ -69,7 +69,7 @@ def lesson(browser: Browser, url: str) -> None:
     tab = browser.new_page(viewport={"width": 980, "height": 900})
     tab.goto(f"{url}/lesson/gravity")
     tab.wait_for_function("() => window.lesson")
-    tab.locator(".sliders [name=order]").fill("2")
+    tab.locator(".sliders [name=order]").select_option("2")
     tab.evaluate("lesson.ready")
     tab.add_style_tag(
         content=".stage-lesson .player{display:none!important}:focus{outline:none!important}"

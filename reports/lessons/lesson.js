@@ -8,7 +8,7 @@ const nameOf = (name) => document.querySelector(`.names [data-name="${CSS.escape
 
 class Lesson {
   constructor() {
-    this.sliders = [...document.querySelectorAll(".sliders input")];
+    this.sliders = [...document.querySelectorAll(".sliders :is(input, select)")];
     this.place = JSON.parse(document.getElementById("place").textContent);
     const packed = document.getElementById("grid").textContent;
     this.grid = packed ? inflate(packed).then((bytes) => JSON.parse(new TextDecoder().decode(bytes))) : null;
@@ -26,7 +26,7 @@ class Lesson {
   get at() { return this.sliders.map((slider) => slider.value).join(","); }
 
   moved(slider) {
-    this.say(slider, JSON.parse(slider.dataset.shown)[slider.value]);
+    if (slider.dataset.shown) this.say(slider, JSON.parse(slider.dataset.shown)[slider.value]);  // a list says its own
     this.asking ??= this.ask().finally(() => { this.asking = null; });  // one at a time; it goes on to where the slider is by then
     this.ready = this.asking;
   }

@@ -35,8 +35,11 @@ Settings = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Slider:
-    """One thing that can be changed. values: what it goes through; start: the index it begins
-    with; read_as: how the values are read where that is not the value and its unit."""
+    """One thing that can be changed: a slider, or a list to choose from where its values are names.
+
+    values: what it goes through; start: the index it begins with; read_as: how the values are read
+    where that is not the value and its unit.
+    """
 
     key: str
     label: str
@@ -44,6 +47,11 @@ class Slider:
     start: int = 0
     unit: str = ""
     read_as: Sequence[str] = ()
+
+    @property
+    def of_names(self) -> bool:
+        """Whether its values are names, which lie on no scale."""
+        return all(isinstance(value, str) for value in self.values)
 
     @property
     def shown(self) -> list[str]:

@@ -75,6 +75,14 @@ SEEN = {
     "a fast spin": Seen("spin", "Angle", "rad", lambda each: each.angle[:, 0]),
 }
 
+# What is changed in the engines of these cases whose names have a +.
+CHANGES = {
+    name.partition("+")[2]: VARIANTS[name].change
+    for seen in SEEN.values()
+    for name in CASES[seen.case].also
+    if VARIANTS[name].change
+}
+
 
 @cache
 def limits_of(name: str) -> list[Limit]:
@@ -252,6 +260,15 @@ LIMITS = Lesson(
             " in this one thing gets farther; else it is called likely. The command"
             " <code>crosscheck stability</code> searches all cases; these are the quick ones."
             " [threshold] and [digits] explain two of the reasons."
+        ),
+        (
+            "<b>Continuous collision detection</b> (CCD) looks for a contact along the whole way of"
+            " a disk in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk"
+            " against walls and static disks, and against moving disks only if it is marked as a"
+            " <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, and Box2D 2.3 at e = 1"
+            " without gravity. A name with a + is an engine with one change: "
+            + "; ".join(f"<code>+{name}</code>, {change}" for name, change in CHANGES.items())
+            + "."
         ),
     ),
     sliders=(

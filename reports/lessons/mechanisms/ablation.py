@@ -96,7 +96,7 @@ def distances(runs: Sequence[Run], curves: Sequence[Curve], unit: str) -> list[t
     return [
         (
             f"largest difference of the ablated reference from {run.name}",
-            f"{number(shown.gap(ABLATED, run.name), 2)} {unit}".strip(),
+            f"{number(shown.gap(ABLATED, run.name))} {unit}".strip(),
         )
         for run in runs
         if run.name not in (PLAIN, ABLATED)
@@ -125,13 +125,13 @@ def page(
     name: str,
     title: str,
     asks: str,
-    text: str,
+    text: str | tuple[str, ...],
     names: Sequence[str],
     show: Callable[[Settings], Shown],
     *sliders: Slider,
 ) -> Lesson:
-    """A page of this lesson."""
+    """A page of this lesson; text: its paragraph, or several."""
+    paragraphs = (text,) if isinstance(text, str) else text
     exact = () if name == "correction" else (TRUTH,)  # disks that overlap have no exact answer
-    return Lesson(
-        name, f"6.{part}", title, asks, (text,), sliders, (*names, PLAIN, ABLATED, *exact), show
-    )
+    drawn = (*names, PLAIN, ABLATED, *exact)
+    return Lesson(name, f"6.{part}", title, asks, paragraphs, sliders, drawn, show)

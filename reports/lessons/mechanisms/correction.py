@@ -89,9 +89,9 @@ CORRECTION = page(
     "What becomes of an overlap?",
     "The exercise projects two disks apart at once. Box2D undoes a share of their overlap at a"
     " time and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact. Here a"
-    " disk starts deep in a fixed one, for which there is no exact answer. The continuous"
-    " collision of Box2D is off (<code>+no_ccd</code>), because it removes the overlap by other"
-    " means.",
+    " disk starts deep in a fixed one, for which there is no exact answer. Continuous"
+    " collision detection (CCD, see [gravity]) is off in Box2D (<code>+no_ccd</code>), because it"
+    " removes the overlap by other means.",
     [NO_CCD],
     show_position_correction,
     Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),

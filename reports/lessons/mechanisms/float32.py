@@ -69,9 +69,9 @@ def show_float32(settings: Settings) -> Shown:
                 reverse=True,
             ),
             LessonChart(
-                "Share of float32 in the error of Box2D, all scenes",
+                "Share of float32 in the error, all scenes",
                 "scenes, from the smallest share",
-                "%",
+                "%, without its sign",
                 [Curve(box2d, np.arange(1, len(percent) + 1), percent, dots=True)],
                 "y",
                 guides=[("y", 1.0, "1 %")],
@@ -113,17 +113,22 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
     ms = np.asarray(curves[0].x, float)
 
     def share(shown: Shown) -> Array:
-        return np.abs(1 - shown.y(planck) / shown.y(box2d))
+        return 1 - shown.y(planck) / shown.y(box2d)
 
     def ends(values: Array) -> float:
         return float(values[-1] / values[0])
 
-    usual = float(abs(1 - p[middle] / b[middle]))
+    usual = float(1 - p[middle] / b[middle])
+    part = f"{number(100 * abs(usual), 2)} %"
+    effect = (
+        f"float32 is {part} of that error"
+        if usual >= 0
+        else f"without float32 the error would be {part} larger"
+    )
     claims = [
         Claim(
             f"At the middle step size, {number(ms[middle])} ms, {planck} is"
-            f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: float32 is"
-            f" {number(100 * usual, 2)} % of that error.",
+            f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: {effect}.",
             lambda shown: abs(share(shown)[middle] - usual) <= 1e-9,
         )
     ]
@@ -138,9 +143,9 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
     if worst <= ALIKE:
         claims.append(
             Claim(
-                "Float32 matters little here: at no step size it is more than"
-                f" {number(100 * worst, 2)} % of the error.",
-                lambda shown: share(shown).max() <= worst * (1 + 1e-9),
+                "Float32 matters little here: at no step size does it change the error by more"
+                f" than {number(100 * worst, 2)} %.",
+                lambda shown: np.abs(share(shown)).max() <= worst * (1 + 1e-9),
             )
         )
         return claims
@@ -174,17 +179,22 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
 
 
 def claim_of_all(profile: str, percent: Array) -> Claim:
-    """In how many scenes float32 matters at the middle step size."""
+    """In how many scenes float32 matters at the middle step size, and in which of them it makes the
+    error smaller."""
     small, large = int((percent < 1).sum()), int((percent > 10).sum())
-    names = list(shares_of(profile))[len(percent) - large :]
+    shares = shares_of(profile)
+    names = list(reversed(shares))[:large]
+    smaller = [name for name in names if shares[name] < 0]
     box2d = f"{BOX2D}:{profile}"
-    most = f"; it is more than a tenth in {', '.join(reversed(names))}" if names else ""
+    most = f"; by more than a tenth in {', '.join(names)}" if names else ""
+    sign = f". It makes the error smaller in {', '.join(smaller)}" if smaller else ""
     return Claim(
-        f"In {small} of {len(percent)} scenes float32 is less than 1 % of the error of {box2d} at"
-        f" the middle step size{most}.",
+        f"In {small} of {len(percent)} scenes float32 changes the error of {box2d} by less than 1 %"
+        f" at the middle step size{most}{sign}.",
         lambda shown: (
             int((shown.y(box2d, 1) < 1).sum()) == small
             and int((shown.y(box2d, 1) > 10).sum()) == large
+            and smaller == [name for name in names if dict(shown.facts)[name].startswith("−")]
         ),
     )
 
@@ -198,7 +208,8 @@ SINGLE = Lesson(
         (
             "Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which"
             " computes in float64. Both have the same settings here, so they differ by rounding"
-            " alone: the error of Box2D less that of planck is the <b>share of float32</b>."
+            " alone: the error of Box2D less that of planck is the <b>share of float32</b>. A share"
+            " below 0 means that float32 makes the error smaller."
         ),
         (
             "A smaller step makes the error of the method smaller. It also makes more steps, and"

@@ -68,19 +68,19 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
     fall = float(np.sqrt(2 * g * (start - radius)))
     continuous = (
         Claim(
-            "At this dt box2d:matched, whose continuous collision is on, does the same.",
+            "At this dt box2d:matched, whose CCD is on, does the same.",
             lambda shown: shown.gap("box2d:matched", NO_CCD) <= single,
         )
         if round(1 / dt) == 240
         else Claim(
-            "At this dt continuous collision (box2d:matched) acts in some bounces, and the ball"
-            " rises less high than without it.",
+            "At this dt CCD (box2d:matched) acts in some bounces, and the ball rises less high than"
+            " without it.",
             rises,
         )
     )
     return [
         Claim(
-            "Box2D without continuous collision (+no_ccd) turns round a velocity that gravity has"
+            "Box2D without CCD (+no_ccd) turns round a velocity that gravity has"
             " changed already. The ball gains |v| dt of height at each bounce, where v is its"
             f" speed: {number(1e3 * fall * dt)} mm at the first, and more at each later one.",
             lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
@@ -113,9 +113,10 @@ GRAVITY = page(
     "Impulse before or after gravity",
     "Why does a ball in Box2D bounce ever higher?",
     "A bounce turns round the velocity with which a ball meets the floor. If gravity has been"
-    " added to it already, the part that gravity added in this step is turned round, too. Box2D"
-    " plays twice, with its continuous collision on and off (<code>+no_ccd</code>), because"
-    " continuous collision hides the effect at some step sizes.",
+    " added to it already, the part that gravity added in this step is turned round, too."
+    " <b>Continuous collision detection</b> (CCD) looks for a contact along the whole way of a disk"
+    " in a step, not only at its end. Box2D plays twice, with CCD and without it"
+    " (<code>+no_ccd</code>), because CCD hides the effect at some step sizes.",
     [NO_CCD, "box2d:matched", "pymunk:matched"],
     show_gravity,
     Slider("order", "Velocity that is turned round", tuple(ORDERS), 0),

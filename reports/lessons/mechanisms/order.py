@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from adapters.mechanisms.ablated import EXERCISE, POSITION_FIRST, AblatedReference
 from reports.lessons.lesson import Claim, Settings, Shown, Slider, time_step
 from reports.lessons.mechanisms.ablation import PLAIN, follows, lies_on, page
@@ -15,7 +17,8 @@ def show_order(settings: Settings) -> Shown:
     position_first = settings["order"] == "position first"
 
     def claims(offset: Array) -> list[Claim]:
-        mm, half = number(offset[-1]), number(500 / 60 / settings["k"])
+        mm, both = number(offset[-1]), number(2 * offset[-1])
+        half = number(500 / 60 / settings["k"])
         return [
             Claim(
                 f"pymunk:matched moves first. It is g dt t / 2 above the parabola, {mm} mm in the"
@@ -23,9 +26,17 @@ def show_order(settings: Settings) -> Shown:
                 follows("pymunk:matched", offset, ROUNDING_MM),
             ),
             Claim(
-                "reference:exercise changes the velocity first. It is as far below: its fall is"
-                " early by dt / 2. The two are g dt t from each other.",
+                f"reference:exercise changes the velocity first. It is as far below, {mm} mm in the"
+                " end: its fall is early by dt / 2.",
                 follows(PLAIN, -offset, ROUNDING_MM),
+            ),
+            Claim(
+                "The distance between these two is g dt t, the sum of both offsets:"
+                f" {both} mm in the end.",
+                lambda shown: (
+                    np.abs(shown.y("pymunk:matched") - shown.y(PLAIN) - 2 * offset).max()
+                    <= ROUNDING_MM
+                ),
             ),
             lies_on("pymunk:matched", position_first, ROUNDING_MM, "mm"),
         ]

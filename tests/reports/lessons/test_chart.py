@@ -140,7 +140,7 @@ def test_a_name_in_the_table_of_facts_is_clear_of_its_value(page: Page, width: i
           document.querySelector(".facts-table tbody").append(line);
           const gap = drawn(line.lastChild).left - drawn(line.firstChild).right;
           line.remove();
-          const sliders = [...document.querySelectorAll(".sliders label")];
+          const sliders = [...document.querySelectorAll(".sliders label:has(output)")];
           return [gap, ...sliders.map((label) =>
             drawn(label.querySelector("output")).left - drawn(label.firstChild).right)];
         }"""

@@ -4,6 +4,8 @@ every number is of a run."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -21,9 +23,13 @@ from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import table
 from reports.lessons.lesson import Lesson, run_of
 from reports.lessons.mechanisms.ablation import ABLATED
+from reports.lessons.mechanisms.javascript_bounces import VERSIONS
+from reports.lessons.mechanisms.row import GAP, struck
 from reports.lessons.meeting import collision_of_the_reference, two
 from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
+from scenarios.no_truth import answered
+from scenarios.truth.exact import with_oracle
 from tests.reports.page.browsing import opened, overhang, served
 
 BROWSED, COSTLY = ("order",), ("box", "crowd", "horizon", "limits")
@@ -77,6 +83,26 @@ def test_the_exact_answer_to_a_row_is_that_of_pair_by_pair():
     assert curves[TRUTH].tolist() == [0, 0, 0, 0, 0, 5]
     assert np.abs(curves["reference:exercise"] - curves[TRUTH]).max() <= 1e-12
     assert np.abs(curves["box2d:matched"] - curves[TRUTH]).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("n", "change"), [(3, {"restitution": 0.9}), (5, {"mass": np.array([1.0, 2, 1, 3, 1, 2])})]
+)
+def test_a_row_whose_outcome_depends_on_the_order_has_no_exact_answer(
+    n: int, change: dict[str, Any]
+):
+    """With other masses, or e below 1, it ends when the row is struck; with gaps it goes on."""
+    ends = []
+    for gap in (0.0, GAP):
+        row = struck(n, gap)
+        _, truth = answered(with_oracle(replace(row, scene=replace(row.scene, **change))))
+        assert truth is not None
+        ends.append((truth.horizon, truth.reason))
+
+    (touching, reason), (apart, _) = ends
+    assert touching == pytest.approx(1.01 / 5)  # m, from the row, over m/s
+    assert "the outcome depends on the order of their collisions" in reason
+    assert apart == np.inf
 
 
 def test_the_numbers_of_a_collision_are_those_of_the_solver():
@@ -152,9 +178,11 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
         page.keyboard.press("End" if slider.start < len(slider.values) - 1 else "Home")
         page.evaluate("lesson.ready")
         assert page.evaluate(curves) != before, slider.key
-        shown = page.locator(f".sliders label:has([name={slider.key}]) output").inner_text()
+        chosen = "output, option:checked"
+        shown = page.locator(f".sliders label:has([name={slider.key}])").locator(chosen)
         own = slider.shown[-1 if slider.start < len(slider.values) - 1 else 0]
-        assert shown == page.evaluate("lesson.shown.said").get(slider.key, own)
+        said = page.evaluate("lesson.shown.said").get(slider.key, own)
+        assert shown.text_content() == said
     legend = page.locator(".names li:visible").evaluate_all(
         "all => all.map((item) => item.dataset.name)"
     )
@@ -167,6 +195,35 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
 
     assert sorted(legend) == sorted(drawn_now)  # who is drawn, and nobody else
     assert (narrow <= 0, wide <= 0, playing, heard) == (True, True, False, [])
+
+
+@pytest.mark.slow
+def test_names_are_chosen_from_a_list_and_numbers_by_a_slider(browser: Browser, url: str):
+    """A list says its choice itself, nothing beside it says it again; it goes with the arrow keys,
+    prints as it is, and a page that is loaded again starts where its curves do."""
+    page, heard = opened(browser, f"{url}/javascript", viewport={"width": 1280, "height": 900})
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    off = page.get_by_label("Switched off")
+    off.focus()
+    page.keyboard.press("ArrowDown")
+    page.evaluate("lesson.ready")
+    at = page.evaluate("lesson.at")
+    beside = page.locator(".sliders label:has(select) output").count()
+    options = off.locator("option").all_inner_texts()
+    page.emulate_media(media="print")
+    prints = off.is_visible()
+    page.emulate_media(media="screen")
+    page.reload()
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    again = page.evaluate("lesson.at")
+    page.context.close()
+
+    kinds = {slider.key: slider.of_names for slider in LESSONS["javascript"].sliders}
+    assert kinds == {"e": False, "off": True}
+    assert (at, again) == ("1,1", "1,0")
+    assert options == list(VERSIONS)
+    assert (beside, prints) == (0, True)
+    assert heard == []
 
 
 @pytest.mark.slow
@@ -254,7 +311,6 @@ def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url:
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
-    page.locator(".sliders input").first.focus()
     page.evaluate("""for (let k = 0; k < 12; k++) {
           lesson.sliders[1].value = k % 3;
           lesson.sliders[1].dispatchEvent(new Event("input"));

@@ -4,6 +4,7 @@ the one that fails."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from reports.page.style import TRUTH
 from reports.stability import variants
 from reports.stability.cases import CASES
-from reports.stability.variants import Variant
+from reports.stability.variants import Variant, play_as
 from tests.reports.stability.kept_limits import agrees, kept
 
 LESSON = LESSONS["limits"]
@@ -111,6 +112,45 @@ def test_refusals_are_shown_beside_the_exact_answer():
     assert [curve.name for curve in shown.charts[0].curves] == [TRUTH]
     assert "the most that Box2D allows" in dict(shown.steps)["Here"]
     assert "b2_maxRotation" in dict(shown.steps)["Why"]
+
+
+@pytest.mark.parametrize(
+    ("engine", "restitution", "on"),
+    [
+        ("box2d:shipped", 1.0, True),
+        ("box2d:matched", 1.0, False),
+        ("box2d:matched", 0.9, True),
+        ("box2d:matched+bullets", 1.0, True),
+        ("box2d_v3:shipped", 1.0, True),
+        ("box2d_v3:matched", 1.0, False),
+        ("box2d_v3:matched", 0.9, False),
+        ("box2d_v3:matched+bullets", 1.0, True),
+    ],
+)
+def test_ccd_is_on_where_the_text_says(engine: str, restitution: float, on: bool):
+    """As the engine itself reports it, in two disks that meet without gravity."""
+    scenario = CASES["tunnelling_head_on"].scene(0.5, 0)
+    scenario = replace(scenario, scene=replace(scenario.scene, restitution=restitution))
+
+    assert play_as(engine, scenario).settings["continuous collision"][1] is on
+
+
+def test_box2d_sweeps_disks_against_walls_and_only_bullets_against_disks():
+    """With CCD on it gets farther at a thin wall than without, and between two disks only where
+    what moves is a bullet."""
+    limit = {(row.case, row.engine): row for row in kept()}
+    for box in ("box2d", "box2d_v3"):
+        wall, pair = (
+            {
+                name: limit[case, f"{box}:{name}"]
+                for name in ("shipped", "matched", "matched+bullets")
+            }
+            for case in ("tunnelling_thin_wall", "tunnelling_head_on")
+        )
+        without = wall["matched"].fails_at
+        assert wall["shipped"].works_at > 2 * without
+        assert pair["shipped"].fails_at < 1.2 * pair["matched"].fails_at
+        assert pair["matched+bullets"].works_at > 2 * pair["matched"].fails_at
 
 
 def test_every_case_has_its_values_within_the_report():
