@@ -13,8 +13,8 @@ from pathlib import Path
 import pandas as pd
 
 from adapters.engines import ENGINES
-from reports.run.timing import summed_up
 from reports.speed import figures, sizes
+from reports.speed.tables import summed_up
 
 OUT = Path("reports/out/speed")
 # the fastest of many short samples: CI machines are seldom alone

@@ -16,13 +16,14 @@ from typing import Any, NoReturn
 
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, OWN, read_row, row_of
-from reports.run.archive import STATE, Archive, from_trail, load_trajectory, stored_trajectory
+from reports.run.archive import Archive, stored_trajectory
 from reports.run.arguments import go_where_files_are
 from reports.run.cells import Cell
 from reports.run.crew import new_worker
 from reports.run.folders import found
 from reports.run.playing import play_here
 from reports.run.scenes import played_scenario
+from reports.run.trajectories import STATE, from_trail, load_trajectory
 from reports.run.worker_process import Failure
 from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import legible

@@ -15,32 +15,22 @@ compared/       the scenarios' exact answers and parts of deviations.csv, so tha
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Hashable
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, BinaryIO
-
-import numpy as np
+from typing import Any
 
 from adapters.run import Run
 from reports.run.journal import JOURNAL
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.run_lines import KINDS
-from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
-from scenarios.regular import all_of, opened
+from reports.run.trajectories import load_trajectory
+from scenarios.model import Trajectory
+from scenarios.regular import all_of
 
 # subject of a line -> its number, and the line
 Numbered = dict[Hashable, tuple[int, dict[str, Any]]]
-STATE = ("position", "velocity", "angle", "angular_velocity")
-COLLISIONS = {
-    "t": "collision_t",
-    "i": "collision_i",
-    "j": "collision_j",
-    "impulse": "collision_impulse",
-}
 
 
 @dataclass(frozen=True)
@@ -205,52 +195,3 @@ def trajectory_file(folder: Path, key: str) -> Path:
 def stored_scene(folder: Path, name: str) -> Path:
     """The path of the copy of the scene file with this name."""
     return folder / "scenes" / f"{name}.toml"
-
-
-def packed(trajectory: Trajectory, small: bool = False) -> bytes:
-    """An .npz with the arrays of `Trajectory`; its collisions as collision_t, _i, _j, _impulse.
-    `small` compresses it, which is slower."""
-    arrays = {name: getattr(trajectory, name) for name in ("t", *STATE)}
-    collisions = {key: getattr(trajectory.collisions, name) for name, key in COLLISIONS.items()}
-    file = io.BytesIO()
-    (np.savez_compressed if small else np.savez)(file, **arrays, **collisions)
-    return file.getvalue()
-
-
-def load_trajectory(file: Path | BinaryIO) -> Trajectory:
-    """The trajectory that `packed` wrote."""
-    with (
-        nullcontext(file) if not isinstance(file, Path) else opened(file) as there,
-        np.load(there) as saved,
-    ):
-        columns = {name: saved[key] for name, key in COLLISIONS.items()}
-        collisions = Collisions(
-            **{name: frozen(column, column.dtype) for name, column in columns.items()}
-        )
-        t, position, velocity, angle, angular_velocity = (
-            frozen(saved[name]) for name in ("t", *STATE)
-        )
-        return Trajectory(t, position, velocity, angle, angular_velocity, collisions)
-
-
-def parts_of(state: State) -> list[np.ndarray]:
-    """The arrays of a state as bytes of a trail."""
-    return [np.ascontiguousarray(getattr(state, name), np.float64) for name in STATE]
-
-
-def from_trail(trail: bytes, scenario: Scenario) -> Trajectory | None:
-    """The samples whose `parts_of` a trail holds, without collisions; None if the trail lacks even
-    the start."""
-    n = scenario.scene.n
-    k = len(trail) // (6 * n * 8)
-    if not k:
-        return None
-    table = np.frombuffer(trail[: k * 6 * n * 8]).reshape(k, 6 * n)
-    position, velocity, angle, angular_velocity = np.split(table, [2 * n, 4 * n, 5 * n], axis=1)
-    return Trajectory(
-        t=scenario.times[:k],
-        position=frozen(position.reshape(k, n, 2)),
-        velocity=frozen(velocity.reshape(k, n, 2)),
-        angle=frozen(angle),
-        angular_velocity=frozen(angular_velocity),
-    )

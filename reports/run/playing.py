@@ -18,8 +18,8 @@ from adapters.conformance.probe import loaded, plain
 from adapters.engine_row import EngineRow
 from adapters.play import play_once, unwatched
 from adapters.run import Run
-from reports.run.archive import packed, parts_of
 from reports.run.cells import Cell, source_hash, versions
+from reports.run.trajectories import packed, parts_of
 from reports.run.worker_process import allow, leave
 from scenarios.model import Scenario, State
 

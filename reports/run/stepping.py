@@ -7,16 +7,23 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from time import perf_counter
+from typing import NamedTuple
 
 from adapters.advance import advance, thrust_steps
 from adapters.engine import Engine
-from reports.run.timing import Spent
 from scenarios.families.placing import lay_out
 from scenarios.model import Scenario, Scene
 
 Make = Callable[[], Engine]
 EMPTY_STEPS, CALLS, READS = 1000, 100, 20  # of one run
 EMPTY, CALL, READ = "empty step", "call", "read"
+
+
+class Spent(NamedTuple):
+    """Seconds inside `step`, and those of them spent on wrapping at the edges in Python."""
+
+    seconds: float
+    wrapping: float = 0.0
 
 
 @dataclass(frozen=True)

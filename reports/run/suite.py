@@ -17,7 +17,7 @@ from adapters.conformance.conform import no_answer
 from adapters.engine_row import EngineRow
 from adapters.engines import told_apart
 from adapters.run import Run
-from reports.run.archive import Archive, digest, from_trail, packed, stored_scene, trajectory_file
+from reports.run.archive import Archive, digest, stored_scene, trajectory_file
 from reports.run.cells import Cell, content_key, scene_hash
 from reports.run.folders import RUN
 from reports.run.journal import Journal, plain
@@ -29,6 +29,7 @@ from reports.run.runner import TIMEOUT, run_all
 from reports.run.scene_tables import SceneTasks
 from reports.run.scenes import open_scene, with_steps
 from reports.run.timing_pass import Pass, cells_to_time, is_timed
+from reports.run.trajectories import from_trail, packed
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes, put_text
 from reports.terminal.progress import Progress

@@ -9,20 +9,15 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
+
+from reports.run.stepping import Spent
+from scenarios.model import Array
 
 # s, least duration of a sample: some 10 000 ticks of the clock, so that reading it costs nothing
 LEAST = 1e-3
 MOST_RUNS = 20  # runs in one sample, because setting up takes time, too
 FEWEST_ROUNDS = 3  # rounds of a run so long that its time is used up earlier
 WARM_UP = -1  # the warm-up round, which is stored but not counted
-
-
-class Spent(NamedTuple):
-    """Seconds inside `step`, and those of them spent on wrapping at the edges in Python."""
-
-    seconds: float
-    wrapping: float = 0.0
 
 
 class Timed(NamedTuple):
@@ -67,7 +62,7 @@ class Noise(NamedTuple):
         return max(abs(self.low - 1), abs(self.high - 1)) if self.pairs else inf
 
 
-def noise_of(ratios: Sequence[float] | pd.Series) -> Noise:
+def noise_of(ratios: Sequence[float] | Array) -> Noise:
     """The noise of a measurement from the ratios of an engine's cost to that of its copy."""
     if not len(ratios):
         return Noise(0, *[np.nan] * 5)
@@ -123,21 +118,3 @@ def sampled(one: Timed, k: int, place: int) -> Sample:
         seconds, wrapping, runs = seconds + spent.seconds, wrapping + spent.wrapping, runs + 1
     per = runs * one.amount
     return Sample(one.key, k, place, (seconds - wrapping) / per, wrapping / per, runs)
-
-
-def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping,
-    rounds; no warm-up."""
-    counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
-    cost = counted["cost"]
-    table = pd.DataFrame(
-        {
-            "cost": cost.median(),
-            "low": cost.quantile(0.25),
-            "high": cost.quantile(0.75),
-            "best": cost.min(),
-            "wrapping": counted["wrapping"].median(),
-            "rounds": cost.size(),
-        }
-    )
-    return table.reset_index()

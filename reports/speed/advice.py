@@ -25,7 +25,6 @@ from reports.compare.pareto import kept_from
 from reports.compare.view import beside
 from reports.run.machine import busy_cores
 from reports.run.scenes import open_scene
-from reports.run.timing import summed_up
 from reports.run.worker_process import Failure
 from reports.speed import ladder
 from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
@@ -33,6 +32,7 @@ from reports.speed.effort import doublings
 from reports.speed.measure import done
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
+from reports.speed.tables import summed_up
 from reports.terminal.progress import Progress
 from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth

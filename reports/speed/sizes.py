@@ -9,7 +9,8 @@ import numpy as np
 
 from adapters.engine import Engine, Unsupported
 from reports.compare.order import line_interval
-from reports.run.timing import Sample, Spent, Timed, interleaved
+from reports.run.stepping import Spent
+from reports.run.timing import Sample, Timed, interleaved
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scene
 

@@ -3,7 +3,7 @@ noise floor."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE,
 from reports.compare.pooling import WHO, pooled
 from reports.run.scenes import open_scene
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
-from reports.run.timing import summed_up
+from reports.run.timing import WARM_UP
 from reports.speed.measure import SIZE, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.sizes import exponent
@@ -330,6 +330,24 @@ def options(measured: Measured) -> pd.DataFrame:
         both.error_radii_plain > 0
     )
     return both
+
+
+def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping,
+    rounds; no warm-up."""
+    counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
+    cost = counted["cost"]
+    table = pd.DataFrame(
+        {
+            "cost": cost.median(),
+            "low": cost.quantile(0.25),
+            "high": cost.quantile(0.75),
+            "best": cost.min(),
+            "wrapping": counted["wrapping"].median(),
+            "rounds": cost.size(),
+        }
+    )
+    return table.reset_index()
 
 
 def asks_of(scene: str) -> tuple[str, str]:

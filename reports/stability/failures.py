@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.page.replay import COLLISIONS
-from reports.run.archive import STATE, load_trajectory, packed
+from reports.run.trajectories import STATE, load_trajectory, packed
 from reports.stability.limits import Limit, Trial
 from reports.stability.search import Search
 from scenarios.model import Collisions, Scenario, Trajectory, frozen

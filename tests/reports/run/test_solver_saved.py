@@ -19,7 +19,8 @@ from adapters.run import Run
 from reports.check.command import make_page, scenes_of
 from reports.check.verdict import check_file
 from reports.run import suite
-from reports.run.archive import Archive, load_trajectory, trajectory_file
+from reports.run.archive import Archive, trajectory_file
+from reports.run.trajectories import load_trajectory
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT

@@ -12,8 +12,8 @@ from adapters.engines import ENGINES
 from reports.run import timing_pass
 from reports.run.archive import Archive
 from reports.run.journal import lines_of
-from reports.run.stepping import binding_of
-from reports.run.timing import WARM_UP, Spent, Timed, interleaved, noise_of
+from reports.run.stepping import Spent, binding_of
+from reports.run.timing import WARM_UP, Timed, interleaved, noise_of
 from reports.run.timing_pass import (
     BUSY,
     SCENES,

@@ -9,18 +9,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from reports.run.stepping import Spent
 from reports.run.timing import (
     FEWEST_ROUNDS,
     WARM_UP,
     Sample,
-    Spent,
     Timed,
     interleaved,
-    summed_up,
 )
 from reports.speed import ladder, sizes
 from reports.speed.effort import QUICK
 from reports.speed.estimate import READY, all_rounds
+from reports.speed.tables import summed_up
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
