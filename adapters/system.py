@@ -251,18 +251,18 @@ def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return
-    came: list[int] = []
+    received: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield  # no signal is handled in a thread
         return
-    handlers = {n: signal.signal(n, lambda came_in, _: came.append(came_in)) for n in numbers}
+    handlers = {n: signal.signal(n, lambda number, _: received.append(number)) for n in numbers}
     try:
         yield
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])
+        if received:
+            signal.raise_signal(received[0])
 
 
 class TimeIsUp(BaseException):

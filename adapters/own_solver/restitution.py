@@ -29,20 +29,21 @@ class OwnRestitution:
     Attributes:
         stated: the numbers from 0 to 1 that its text assigns to a name such as e or restitution;
             then 0.9, if that or 1.9 occurs in it.
-        came: separation over approach speed of two equal spheres that meet head-on; NaN if there
-            was no collision. occurs: whether `came` or 1 + `came` is a number in its text.
+        measured: separation over approach speed of two equal spheres that meet head-on; NaN if
+            there was no collision.
+        occurs: whether `measured` or 1 + `measured` is a number in its text.
     """
 
     stated: tuple[float, ...]
-    came: float
+    measured: float
     occurs: bool
 
     @property
     def own(self) -> float | None:
         """The restitution of the file: the stated number that equals the measured one, else the
         first stated; else the measured one, if it occurs in the text; else None."""
-        first = next(iter(self.stated), self.came if self.occurs else None)
-        return next((e for e in self.stated if same(e, self.came)), first)
+        first = next(iter(self.stated), self.measured if self.occurs else None)
+        return next((e for e in self.stated if same(e, self.measured)), first)
 
     def fits(self, wanted: float) -> bool:
         """Whether the file can play a scene with this restitution.
@@ -50,16 +51,20 @@ class OwnRestitution:
         It cannot if its text states another one. A file whose text states none is played, and so is
         one that states or has the wanted one: a fault can change the measured number.
         """
-        fitting = any(same(e, wanted) for e in (*self.stated, self.came))
+        fitting = any(same(e, wanted) for e in (*self.stated, self.measured))
         return fitting or self.own is None
 
     def __str__(self) -> str:
         """The text in a table of settings."""
-        has = f"its collisions have {self.came:.6g}" if self.came == self.came else "none came"
+        has = (
+            f"its collisions have {self.measured:.6g}"
+            if self.measured == self.measured
+            else "none came"
+        )
         if self.own is None:
             return f"none is found in the file; {has}"
         written = f"{self.own:g}, written into the file"
-        return written if same(self.own, self.came) else f"{written}; {has}"
+        return written if same(self.own, self.measured) else f"{written}; {has}"
 
 
 def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution:
@@ -72,10 +77,12 @@ def own_text(solver: SolverText) -> str:
     return "\n".join([solver.text, *(module for file, module in solver.beside if is_own(file))])
 
 
-def own_restitution(text: str, came: float) -> OwnRestitution:
-    """The restitution from a text, with the measured one, `came`."""
-    occurs = any(same(number, came) or same(number, 1 + came) for number in numbers_in(text))
-    return OwnRestitution(tuple(stated(text)), came, 0 <= came <= 1 and occurs)
+def own_restitution(text: str, measured: float) -> OwnRestitution:
+    """The restitution from a text, with the measured one, `measured`."""
+    occurs = any(
+        same(number, measured) or same(number, 1 + measured) for number in numbers_in(text)
+    )
+    return OwnRestitution(tuple(stated(text)), measured, 0 <= measured <= 1 and occurs)
 
 
 def is_own(file: str) -> bool:

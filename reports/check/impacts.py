@@ -285,10 +285,10 @@ def fitting(
     with np.errstate(all="ignore"):
         for impulse, update in pairs:
             law, row = MISTAKES[impulse], UPDATES[update]
-            right = [near(row.change(h, law(h, e), e), came, 0.1) for h, came in seen]
+            right = [near(row.change(h, law(h, e), e), changed, 0.1) for h, changed in seen]
             # A wrong law makes some pairs separate during the search for n; files that test for
             # approach then leave them unchanged.
-            ended = [impulse != "" and near(came, 0.0) for _, came in seen]
+            ended = [impulse != "" and near(changed, 0.0) for _, changed in seen]
             if any(right) and all(np.logical_or(right, ended)):
                 return Finding(impulse, update, row.task, e, law, row.change)
     return None
@@ -299,7 +299,7 @@ def without_masses(seen: Sequence[tuple[PairCollision, Array]], e: float) -> Fin
     both wrong."""
     change = UPDATES["the impulse is not divided by the masses"].change
     for mistake, law in MASSLESS.items():
-        if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
+        if all(near(change(h, law(h, e), e), changed, 0.1) for h, changed in seen):
             return Finding(mistake, "", "2d", e, law, change)
     return None
 
@@ -307,11 +307,11 @@ def without_masses(seen: Sequence[tuple[PairCollision, Array]], e: float) -> Fin
 def impulse_if_separating(answers: dict[str, Answer], e: float) -> bool:
     """Whether pairs that move apart get the impulse of the printed formula."""
     for name in SEPARATING:
-        h, came = (
+        h, changed = (
             collision_of(QUESTIONS[name].balls, answers[name].last),
             changes(QUESTIONS[name].balls, answers[name].last),
         )
-        if not near(UPDATES[""].change(h, IMPULSES[""](h, e), e), came, 0.1):
+        if not near(UPDATES[""].change(h, IMPULSES[""](h, e), e), changed, 0.1):
             return False
     return True
 

@@ -214,7 +214,7 @@ def energy_rows(case: CollisionCase, restitution: Restitution, task: str) -> lis
         ),
         replace(
             restitution.row(case.mistake),
-            task="2c" if near(restitution.came, case.e) else task,
+            task="2c" if near(restitution.measured, case.e) else task,
         ),
     ]
 
@@ -259,7 +259,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     }
     name = next(name for name in COLLISIONS if any(lost[name]))
     balls, after = QUESTIONS[name].balls, answers[name].last
-    collision, came = collision_of(balls, after), changes(balls, after)
+    collision, changed = collision_of(balls, after), changes(balls, after)
     P = IMPULSES[""](collision, e)
     a, b = (any(both) for both in zip(*lost.values()))
     why = "(a field that does not exist, a division by zero?)"
@@ -269,7 +269,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
                 "impulse",
                 "2c",
                 asked_of_impulse(collision),
-                f"{shown(collision.ma * came[0])} N s",
+                f"{shown(collision.ma * changed[0])} N s",
                 f"{shown(P)} N s",
                 False,
                 f"the impulse is not a number {why}",
@@ -314,9 +314,11 @@ def only_across(answers: dict[str, Answer], e: float) -> bool:
     """Whether the impulse along the normal is right in every collision, and momentum is kept."""
     for name, question in COLLISIONS.items():
         h = collision_of(question.balls, answers[name].last)
-        came = changes(question.balls, answers[name].last)
-        along = h.ma * came[0] @ h.n
-        if not (near(along, IMPULSES[""](h, e) @ h.n) and near(h.ma * came[0], -h.mb * came[1])):
+        changed = changes(question.balls, answers[name].last)
+        along = h.ma * changed[0] @ h.n
+        if not (
+            near(along, IMPULSES[""](h, e) @ h.n) and near(h.ma * changed[0], -h.mb * changed[1])
+        ):
             return False
     return True
 
@@ -334,10 +336,10 @@ def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
     return wrong
 
 
-def energy(collision: PairCollision, came: Array) -> float:
+def energy(collision: PairCollision, changed: Array) -> float:
     """J (joule), the kinetic energy that a collision adds."""
     before = collision.ma * collision.va @ collision.va + collision.mb * collision.vb @ collision.vb
-    va, vb = collision.va + came[0], collision.vb + came[1]
+    va, vb = collision.va + changed[0], collision.vb + changed[1]
     return float(collision.ma * va @ va + collision.mb * vb @ vb - before) / 2
 
 
@@ -357,10 +359,10 @@ def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> C
     def chosen(got: str, said: str) -> CheckRow:
         return CheckRow("separating", "2c", asked, got, expected, "free choice", said)
 
-    if all(near(came, 0.0) for _, came in seen):
+    if all(near(changed, 0.0) for _, changed in seen):
         return chosen("none", "only pairs that approach get an impulse")
     law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
-    if all(near(change(h, law(h, e), e), came, 0.1) for h, came in seen):
+    if all(near(change(h, law(h, e), e), changed, 0.1) for h, changed in seen):
         said = "as the formula is printed, pairs that move apart get an impulse, too"
         return chosen("that of the formula", said)
     got = f"A is changed by {shown(seen[0][1][0])} m/s"

@@ -35,8 +35,8 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
     if no_scene:
         return [no_scene]
     asked = worlds(len(start), has["wrap"])
-    came, _ = ask_in_two_orders(process, asked)
-    if failed := next((answer.failed for answer in came.values() if answer.failed), None):
+    answers, _ = ask_in_two_orders(process, asked)
+    if failed := next((answer.failed for answer in answers.values() if answer.failed), None):
         cause = FOLLOWS if faulty else f"performSimStep: {failed}"
         return [
             judged("step", "loop", "Does performSimStep return?", "it fails", "yes", False, cause)
@@ -44,10 +44,10 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
     rows = (
         [not_asked("all spheres", "loop", "the functions that the step calls have faults")]
         if faulty
-        else step_rows(asked, came)
+        else step_rows(asked, answers)
     )
     if has["wrap"]:
-        rows += edges(asked["edges"], came["edges"], start, process.surface == "exercise")
+        rows += edges(asked["edges"], answers["edges"], start, process.surface == "exercise")
     return rows
 
 
@@ -67,17 +67,19 @@ def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None
     return start, None
 
 
-def step_rows(asked: dict[str, Question], came: dict[str, Answer]) -> list[CheckRow]:
+def step_rows(asked: dict[str, Question], answers: dict[str, Answer]) -> list[CheckRow]:
     """The rows of a step whose functions are right."""
-    itself = against_itself(asked["free"], came)
+    itself = against_itself(asked["free"], answers)
     if itself and itself.verdict == "fault":
         return [itself, not_asked("all spheres", "loop", "a sphere collides with itself")]
-    met = pairs(asked, came)
-    rows = [integrated(asked["free"], came), met, *([itself] if itself else [])]
+    met = pairs(asked, answers)
+    rows = [integrated(asked["free"], answers), met, *([itself] if itself else [])]
     if met.verdict == "right":
-        rows.append(integration_first(asked, came))
-    if "edges in a step" in came:
-        rows.append(wrapping(asked["edges in a step"], came["edges in a step"], came["edges"]))
+        rows.append(integration_first(asked, answers))
+    if "edges in a step" in answers:
+        rows.append(
+            wrapping(asked["edges in a step"], answers["edges in a step"], answers["edges"])
+        )
     return rows
 
 
@@ -127,10 +129,10 @@ def parked(n: int) -> tuple[Ball, ...]:
     )
 
 
-def integrated(question: Question, came: dict[str, Answer]) -> CheckRow:
+def integrated(question: Question, answers: dict[str, Answer]) -> CheckRow:
     """The row on integration: every sphere moves as by one call of the file's own integrate."""
     asked = "Does a step integrate every sphere once?"
-    after, end = came["free"].last, came["alone"].last[0]
+    after, end = answers["free"].last, answers["alone"].last[0]
     moved = np.subtract(end.x, question.balls[0].x)
     wrong = [
         k
@@ -142,7 +144,7 @@ def integrated(question: Question, came: dict[str, Answer]) -> CheckRow:
     first = wrong[0]
     got = f"{name_of(first)} moves at {shown(after[first].v)} m/s"
     got += f" (wrong: {len(wrong)} of {len(after)} spheres)"
-    cause = integration_cause(first, question.balls[first], after[first], came["watched"])
+    cause = integration_cause(first, question.balls[first], after[first], answers["watched"])
     return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
 
 
@@ -158,19 +160,19 @@ def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str
     return "performSimStep integrates more than once, or not by dt"
 
 
-def against_itself(question: Question, came: dict[str, Answer]) -> CheckRow | None:
+def against_itself(question: Question, answers: dict[str, Answer]) -> CheckRow | None:
     """The row on a sphere that is passed to the collision function twice; None if none is.
 
     No two spheres are near each other here, so a sphere that changes has collided with itself.
     """
-    alone = [call[1] for call in came["watched"].calls if is_with_itself(call)]
+    alone = [call[1] for call in answers["watched"].calls if is_with_itself(call)]
     if not alone:
         return None
     who = name_of(alone[0])
     asked = "Which spheres does a step give to the collision function?"
     got = f"{who} and {who} again ({len(alone)} such calls)"
     expected = "two different spheres"
-    right = integrated(question, came).verdict == "right"
+    right = integrated(question, answers).verdict == "right"
     cause = "performSimStep lets a sphere collide with itself: j begins at i, not at i + 1"
     if right:
         cause = f"{who} is also tested against itself, which changes nothing"
@@ -183,14 +185,14 @@ def is_with_itself(call: tuple[Any, ...]) -> bool:
     return bool(call[0] == "collide" and call[1] == call[2] >= 0)
 
 
-def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
+def pairs(asked: dict[str, Question], answers: dict[str, Answer]) -> CheckRow:
     """The row on pairs: every overlapping pair collides, and no other sphere changes."""
     silent, others = [], []
     for name, question in asked.items():
         if not name.startswith("pair"):
             continue
         i, j = map(int, name.split()[1:])
-        struck = struck_in(question, came[name])
+        struck = struck_in(question, answers[name])
         if not {i, j} <= struck:
             silent.append(name_of(i, j))
         elif struck != {i, j}:
@@ -218,18 +220,18 @@ def pairs(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
     )
 
 
-def struck_in(question: Question, came: Answer) -> set[int]:
+def struck_in(question: Question, answer: Answer) -> set[int]:
     """The spheres whose velocities a step without forces changes."""
-    return {k for k, (b, a) in enumerate(zip(question.balls, came.last)) if not near(a.v, b.v)}
+    return {k for k, (b, a) in enumerate(zip(question.balls, answer.last)) if not near(a.v, b.v)}
 
 
-def integration_first(asked: dict[str, Question], came: dict[str, Answer]) -> CheckRow:
+def integration_first(asked: dict[str, Question], answers: dict[str, Answer]) -> CheckRow:
     """The row on order: a pair that touches only at the end of a step collides in it if all spheres
     are integrated first."""
     missed = [
         name_of(*map(int, name.split()[-2:]))
         for name, question in asked.items()
-        if name.startswith("about to meet") and not struck_in(question, came[name])
+        if name.startswith("about to meet") and not struck_in(question, answers[name])
     ]
     return judged(
         "integration first",
@@ -242,15 +244,15 @@ def integration_first(asked: dict[str, Question], came: dict[str, Answer]) -> Ch
     )
 
 
-def wrapping(question: Question, came: Answer, alone: Answer) -> CheckRow:
+def wrapping(question: Question, answer: Answer, alone: Answer) -> CheckRow:
     """The row on the edges in a step: a sphere beyond an edge ends where projectObjects puts it.
     All spheres are at rest, so that nothing else moves them."""
-    wrong = [k for k, (a, b) in enumerate(zip(came.last, alone.last)) if not near(a.x, b.x)]
-    got = f"{name_of(wrong[0])} is at {shown(came.last[wrong[0]].x)} m" if wrong else "yes"
+    wrong = [k for k, (a, b) in enumerate(zip(answer.last, alone.last)) if not near(a.x, b.x)]
+    got = f"{name_of(wrong[0])} is at {shown(answer.last[wrong[0]].x)} m" if wrong else "yes"
     expected = (
         f"at {shown(alone.last[wrong[0]].x)} m, where projectObjects puts it" if wrong else "yes"
     )
-    stayed = all(near(a.x, b.x) for b, a in zip(question.balls, came.last))
+    stayed = all(near(a.x, b.x) for b, a in zip(question.balls, answer.last))
     return judged(
         "edges in a step",
         "loop",
@@ -267,10 +269,12 @@ def name_of(*spheres: int) -> str:
     return " and ".join("the ufo" if k == 0 else f"asteroid {k - 1}" for k in spheres)
 
 
-def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool) -> list[CheckRow]:
+def edges(
+    question: Question, answer: Answer, start: list[list[float]], ufo: bool
+) -> list[CheckRow]:
     """The rows on projectObjects: an asteroid beyond an edge enters at the opposite one; a ufo that
     leaves is set back to its start."""
-    pairs = list(zip(question.balls, came.last))[1:]
+    pairs = list(zip(question.balls, answer.last))[1:]
     got, expected, cause = next(
         filter(None, map(wrong_at_edge, ONTO.items(), pairs)), ("yes", "yes", "")
     )
@@ -285,7 +289,7 @@ def edges(question: Question, came: Answer, start: list[list[float]], ufo: bool)
     asked = "Is an asteroid beyond an edge moved to the opposite edge?"
     rows = [judged("edges", "loop", asked, got, expected, not cause, cause)]
     if ufo:
-        home, place = start[0][:2], came.last[0].x
+        home, place = start[0][:2], answer.last[0].x
         asked = "Is a ufo that leaves the box moved back to its start?"
         cause = "projectObjects does not move it back"
         got, expected = f"it is at {shown(place)} m", f"at {shown(home)} m"

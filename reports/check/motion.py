@@ -193,28 +193,34 @@ def law_row(
     unit: str,
     laws: dict[str, Law],
     given: list[tuple[Any, ...]],
-    came: list[Any],
+    answers: list[Any],
     words: dict[str, str],
 ) -> CheckRow:
     """A row whose cause is the formula of the table that reproduces the answers."""
-    found = follows(laws, given, came)
+    found = follows(laws, given, answers)
     with np.errstate(all="ignore"):
         right = laws[""](*given[0])
     if found is None and name in ("velocity", "spin"):
-        found = damped(given, came)
-    if found is None and np.ndim(came[0]):
-        found = one_axis(laws, given, came)
+        found = damped(given, answers)
+    if found is None and np.ndim(answers[0]):
+        found = one_axis(laws, given, answers)
     cause = (found or "").format(**words)
     if name == "spin":
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
-    if not np.isfinite(np.asarray(came[0], float)).all():
+    if not np.isfinite(np.asarray(answers[0], float)).all():
         cause = "it is not a number (a field that does not exist, text, a division by zero?)"
     return judged(
-        name, "1", asked, f"{shown(came[0])} {unit}", f"{shown(right)} {unit}", found == "", cause
+        name,
+        "1",
+        asked,
+        f"{shown(answers[0])} {unit}",
+        f"{shown(right)} {unit}",
+        found == "",
+        cause,
     )
 
 
-def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
+def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:
     """The mistakes in x and y, if they differ or one is right."""
     axes = []
     for axis in range(2):
@@ -222,20 +228,20 @@ def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], came: list[Any]
             tuple(value[axis] if np.ndim(value) else value for value in question)
             for question in given
         ]
-        axes.append(follows(laws, asked, [np.asarray(value)[axis] for value in came]))
+        axes.append(follows(laws, asked, [np.asarray(value)[axis] for value in answers]))
     if None in axes:
         return None
     return "; ".join(f"of {name}: {mistake}" for name, mistake in zip("xy", axes) if mistake)
 
 
-def damped(given: list[tuple[Any, ...]], came: list[Any]) -> str | None:
+def damped(given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:
     """The constant, in words, if the velocity is also multiplied by one."""
     given = [question[:5] for question in given]
-    coasting_v, coasting_came = np.asarray(given[2][0]), np.asarray(came[2], float)
-    factor = float(np.mean(coasting_came / coasting_v))
+    coasting_v, coasting_after = np.asarray(given[2][0]), np.asarray(answers[2], float)
+    factor = float(np.mean(coasting_after / coasting_v))
     law: Law = lambda v, f, m, _o, dt: factor * (v + f / m * dt)  # noqa: E731
     late: Law = lambda v, f, m, _o, dt: factor * v + f / m * dt  # noqa: E731
-    if follows({"after": law, "before": late}, given, came):
+    if follows({"after": law, "before": late}, given, answers):
         return f"it is also multiplied by {factor:.4g} in every step: the exercise has no damping"
     return None
 
@@ -247,15 +253,15 @@ def turning(answers: dict[str, Answer]) -> CheckRow:
         (question.balls[0].alpha + after.w * question.calls[0][2], after.alpha)
         for question, after in seen
     ]
-    turns = [(came - right) / (2 * np.pi) for right, came in ways]
+    turns = [(answer - right) / (2 * np.pi) for right, answer in ways]
     whole = [near(turn, np.round(turn)) for turn in turns]
-    right, came = ways[whole.index(False) if False in whole else 0]
+    right, answer = ways[whole.index(False) if False in whole else 0]
     asked = "What is the angle of a sphere that has turned by more than half a turn?"
-    got, expected = f"{shown(came)} rad", f"{shown(right)} rad, or whole turns more or less"
+    got, expected = f"{shown(answer)} rad", f"{shown(right)} rad, or whole turns more or less"
     if all(whole) and not near(turns, 0.0):
         said = "it is reduced by whole turns, which does not change the direction"
         return CheckRow("turns", "1", asked, got, expected, "free choice", said)
-    cause = f"it is changed by {shown(abs(came - right))} rad, which is not a multiple of 2 pi"
+    cause = f"it is changed by {shown(abs(answer - right))} rad, which is not a multiple of 2 pi"
     return judged("turns", "1", asked, got, expected, all(whole), cause)
 
 

@@ -87,11 +87,11 @@ def components(
     combined effect; None if a component follows no formula of `COMPONENTS`."""
     found = {}
     for who, axis in product((0, 1), (0, 1)):
-        came = [change[who, axis] for _, change in seen]
+        changed = [change[who, axis] for _, change in seen]
         fits = (
             name
             for name in COMPONENTS
-            if near([component(name, h, right(h, e), who, axis, e) for h, _ in seen], came, 0.1)
+            if near([component(name, h, right(h, e), who, axis, e) for h, _ in seen], changed, 0.1)
         )
         found[who, axis] = next(fits, None)
     if None in found.values():

@@ -33,9 +33,9 @@ class Restitution:
     fast: float
 
     @property
-    def came(self) -> float:
+    def measured(self) -> float:
         """Separation over approach speed of two equal spheres that meet head-on at 2 m/s."""
-        return self.read.came
+        return self.read.measured
 
     @property
     def own(self) -> float:
@@ -47,27 +47,29 @@ class Restitution:
     def candidates(self) -> list[float]:
         """The values of e that may explain the collisions: the file's own, then the measured one,
         unless the file states another."""
-        free = 0 <= self.came <= 1 and not self.read.stated
-        return [self.own, self.came] if free and not near(self.came, self.own) else [self.own]
+        free = 0 <= self.measured <= 1 and not self.read.stated
+        return (
+            [self.own, self.measured] if free and not near(self.measured, self.own) else [self.own]
+        )
 
     @property
     def for_scenes(self) -> float | None:
         """The e for judging whole scenes: the measured one if that is right or a free choice, else
         the one that the file should have; None if none is from 0 to 1."""
-        came = [self.came] if self.as_stated else []
-        return next((e for e in (*came, self.own) if 0 <= e <= 1), None)
+        measured = [self.measured] if self.as_stated else []
+        return next((e for e in (*measured, self.own) if 0 <= e <= 1), None)
 
     @property
     def as_stated(self) -> bool:
         """Whether the file's collisions have the restitution that the file states."""
-        right = near(self.came, EXERCISE) or near(self.came, self.own)
+        right = near(self.measured, EXERCISE) or near(self.measured, self.own)
         return right or len(self.candidates) > 1
 
     @property
     def mistake(self) -> str:
         """What is wrong with the number in the file; "" if nothing is."""
         return (
-            f"e = {shown(self.came)} is written into the file; it must be from 0 to 1"
+            f"e = {shown(self.measured)} is written into the file; it must be from 0 to 1"
             if self.out_of_range
             else ""
         )
@@ -82,30 +84,43 @@ class Restitution:
             "Two spheres of 1 kg meet head-on at 2 m/s: what is the restitution e, their speed of"
             " separation over that of approach?"
         )
-        if near(self.came, EXERCISE):
-            return CheckRow("restitution", "2c", asked, shown(self.came), shown(EXERCISE), "right")
+        if near(self.measured, EXERCISE):
+            return CheckRow(
+                "restitution", "2c", asked, shown(self.measured), shown(EXERCISE), "right"
+            )
         if self.as_stated:
             note = (
-                f"the file has e = {shown(self.came)}, the exercise 0.9; all is judged with the"
+                f"the file has e = {shown(self.measured)}, the exercise 0.9; all is judged with the"
                 " file's"
             )
             return CheckRow(
-                "restitution", "2c", asked, shown(self.came), shown(EXERCISE), "free choice", note
+                "restitution",
+                "2c",
+                asked,
+                shown(self.measured),
+                shown(EXERCISE),
+                "free choice",
+                note,
             )
-        cause = mistake if np.isfinite(self.came) else "the velocities become NaN or infinite"
+        cause = mistake if np.isfinite(self.measured) else "the velocities become NaN or infinite"
         cause = cause or f"the file has e = {shown(self.own)}, but its collisions have another"
-        return judged("restitution", "2c", asked, shown(self.came), shown(self.own), False, cause)
+        return judged(
+            "restitution", "2c", asked, shown(self.measured), shown(self.own), False, cause
+        )
 
     def speeds(self, mistake: str) -> CheckRow:
         """The row on e at other speeds; `mistake` as above. A wrong e at every speed is the fault
         of the row before."""
-        right, alike = self.row(mistake).verdict != "fault", near([self.slow, self.fast], self.came)
+        right, alike = (
+            self.row(mistake).verdict != "fault",
+            near([self.slow, self.fast], self.measured),
+        )
         row = judged(
             "restitution at other speeds",
             "2c",
             "Do the same two spheres have the right restitution at 2 mm/s and at 200 m/s, too?",
             f"{shown(self.slow)} and {shown(self.fast)}",
-            shown(self.came if right else self.own),
+            shown(self.measured if right else self.own),
             right and alike,
             mistake or "the restitution depends on the speed",
         )
@@ -114,9 +129,11 @@ class Restitution:
 
 def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     """The `Restitution` from the file's text and its collisions."""
-    came, slow, fast = (restitution_in(answers[name], name) for name in ("even", "slow", "fast"))
-    out_of_range = not 0 <= came <= 1 and any(near(e, came) for e in named_in(text))
-    return Restitution(own_restitution(text, came), out_of_range, slow, fast)
+    measured, slow, fast = (
+        restitution_in(answers[name], name) for name in ("even", "slow", "fast")
+    )
+    out_of_range = not 0 <= measured <= 1 and any(near(e, measured) for e in named_in(text))
+    return Restitution(own_restitution(text, measured), out_of_range, slow, fast)
 
 
 def restitution_in(answer: Answer, name: str) -> float:

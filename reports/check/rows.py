@@ -129,12 +129,12 @@ Law = Callable[..., object]
 
 
 def follows(
-    laws: Mapping[str, Law], asked: Sequence[Sequence[object]], came: Sequence[object]
+    laws: Mapping[str, Law], asked: Sequence[Sequence[object]], answers: Sequence[object]
 ) -> str | None:
     """The first law that reproduces all answers; None if there is none."""
     with np.errstate(all="ignore"):
         for name, law in laws.items():
-            if all(near(answer, law(*question), 0.1) for question, answer in zip(asked, came)):
+            if all(near(answer, law(*question), 0.1) for question, answer in zip(asked, answers)):
                 return name
     return None
 

@@ -245,9 +245,9 @@ def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str
         return {lost: wrong}
     r, reach = a[:2] - b[:2], scene.radius[i] + scene.radius[j]
     d = float(np.hypot(*r))
-    came = np.array([a2[2:] - a[2:], b2[2:] - b[2:]])
+    changed = np.array([a2[2:] - a[2:], b2[2:] - b[2:]])
     touching = abs(d - reach) <= TOLERANCE * reach
-    if d == 0 or (touching and near(came, 0.0)):
+    if d == 0 or (touching and near(changed, 0.0)):
         return {}
     if d > reach and not touching:
         if near(states[1], states[0]):
@@ -257,19 +257,19 @@ def contact_faults(states: Array, scene: Scene, i: int, j: int) -> dict[str, str
     vn = float((a[2:] - b[2:]) @ n)
     J = -(1 + scene.restitution) * vn / (1 / scene.mass[i] + 1 / scene.mass[j])
     change = np.array([J / scene.mass[i] * n, -J / scene.mass[j] * n])
-    free = vn >= 0 and near(came, 0.0)
+    free = vn >= 0 and near(changed, 0.0)
     faults = {}
     if vn < 0 and not touching and near(states[1], states[0]):
         faults["2a"] = f"they overlap by {shown(reach - d)} m, and nothing is changed"
     if not (near(apart, reach) or (vn >= 0 and near(apart, d))):
         faults["2b"] = f"their centres are {shown(apart)} m apart after it, not {shown(reach)} m"
-    if not (free or near(came, change)):
-        k = 0 if not near(came[0], change[0]) else 1
+    if not (free or near(changed, change)):
+        k = 0 if not near(changed[0], change[0]) else 1
         faults["2c"] = (
             f"sphere {(i, j)[k]} has {shown(states[1, k, 2:])} m/s after it, not"
             f" {shown(states[0, k, 2:] + change[k])} m/s"
         )
-        impulse = came * scene.mass[[i, j], None]
+        impulse = changed * scene.mass[[i, j], None]
         wrong_both = not near(impulse[0], J * n) and not near(impulse[1], -J * n)
         if wrong_both and not near(impulse.sum(axis=0), 0.0):
             added = f"together they get {shown(impulse.sum(axis=0))} kg m/s"
