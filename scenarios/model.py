@@ -21,8 +21,9 @@ DEFAULT: Any = None  # stands for the default value in the comment of the field
 
 
 def frozen(value: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
-    """A read-only copy of `value` as an array of `dtype`."""
-    array = np.array(value, dtype=dtype)
+    """A read-only copy of `value` as an array of `dtype`, row after row: a kernel is compiled for
+    each order in memory."""
+    array = np.array(value, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
 

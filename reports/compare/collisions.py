@@ -133,8 +133,9 @@ def judge(played, played_limits, true, true_limits, dt, end):  # type: ignore[no
             chosen = closest_in_order(its, mine, SAME * dt)
             for m in range(b - a):
                 partner[p + chosen[m]] = a + m
-        lost[a:b] = (gap >= CROWDED * dt) & (its < end - WINDOW * dt)
-        judged += lost[a:b].sum()
+        for m in range(a, b):
+            lost[m] = gap[m - a] >= CROWDED * dt and true[m] < end - WINDOW * dt
+            judged += lost[m]
         for m in range(p, q):
             t, other = played[m], partner[m]
             if other >= 0 and abs(t - true[other]) > max(HALF * gap[other - a], FAR * dt):

@@ -148,18 +148,19 @@ def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-u
             for start in range(past, now + 1):
                 # undo past collisions, the latest first; add future ones, the next first
                 for way in (-1, 1):
-                    v = true[k, i].copy()
+                    vx, vy = true[k, i, 0], true[k, i, 1]
                     stop = first - 1 if way < 0 else last
                     for h in range(start - 1 if way < 0 else start, stop, way):
                         beside = h + way != stop and abs(when[h + way] - when[h]) < SAME * window
                         # of two at one instant: the second only, then also the first
                         for turn in range(1 - beside, 2):
-                            u = v + way * change[h + way if turn == 0 else h]
-                            off = np.hypot(u[0] - played[k, i, 0], u[1] - played[k, i, 1])
+                            new = h + way if turn == 0 else h
+                            ux, uy = vx + way * change[new, 0], vy + way * change[new, 1]
+                            off = np.hypot(ux - played[k, i, 0], uy - played[k, i, 1])
                             if off < least:
                                 least = off
-                                found[k, i] = u
-                        v = u
+                                found[k, i, 0], found[k, i, 1] = ux, uy
+                        vx, vy = ux, uy
     return found
 
 

@@ -146,9 +146,12 @@ def test_a_disk_moved_beyond_the_skin_in_mid_step_rebuilds_the_list_at_once():
 
 def test_a_disk_moves_by_less_than_half_the_skin_as_long_as_the_list_holds():
     """Under gravity and through collisions, from one list to the next; measured the slow way."""
-    scene = boxed_gas(100, 0.3)
+    scene = boxed_gas(100, 0.3)  # read-only walls would have the solver compiled once more
     disks = make_disks(scene.position, scene.velocity, scene.radius, scene.mass)
-    world, lasted = World(restitution=1.0, walls=scene.walls, gravity=np.array([0.0, -10.0])), []
+    world, lasted = (
+        World(restitution=1.0, walls=scene.walls.copy(), gravity=np.array([0.0, -10.0])),
+        [],
+    )
     kicks = neighbours.kicks_of(disks, world, DT / 4)
     for _ in range(20):
         near = listed(disks, world, LASTS, DT / 4)
@@ -173,7 +176,7 @@ def test_the_near_pairs_are_all_pairs_within_the_skin_in_the_order_of_the_double
     scene = boxed_gas(n, packing)
     position = scene.position - scene.position.mean(axis=0)
     disks = make_disks(position, scene.velocity, scene.radius, scene.mass)
-    near = listed(disks, World(walls=scene.walls))
+    near = listed(disks, World(walls=scene.walls.copy()))
     skin, pairs = near.length[HALF_SKIN] / 0.49, slice(near.found[PAIRS])
     apart = np.hypot(*(position[:, None] - position).transpose(2, 0, 1)) - 1.0
     wanted = np.argwhere(np.triu(apart < skin, 1))
@@ -223,7 +226,7 @@ def test_a_gas_plays_as_by_all_pairs_on_both_sides_of_where_the_cells_begin(n):
     first, other = (
         make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass) for _ in range(2)
     )
-    world = World(restitution=1.0, walls=scene.walls)
+    world = World(restitution=1.0, walls=scene.walls.copy())
     for count in (1, 7, 30):
         assert neighbours.advance(other, world, DT, count) == exercise.advance(
             first, world, DT, count
@@ -238,6 +241,6 @@ def test_a_gas_kept_in_float32_plays_as_by_all_pairs(n):
     scene = boxed_gas(n, 0.3)
     disks = make_disks(scene.position, 5 * scene.velocity, scene.radius, scene.mass)
     first, other = (type(disks)(*(a.astype(np.float32) for a in disks)) for _ in range(2))
-    world = World(restitution=1.0, walls=scene.walls)
+    world = World(restitution=1.0, walls=scene.walls.copy())
     assert neighbours.advance(other, world, DT, 60) == exercise.advance(first, world, DT, 60)
     assert same(first, other)
