@@ -1,8 +1,8 @@
 """The figures of the reference that are written down: they are as demanded, and some are measured
 again.
 
-`python -m tests.bench.reference` writes them; `uv run pytest -m slow
-tests/bench/test_reference_figures.py` measures again.
+`python -m tests.bench.reference` writes them; `.ci/long tests/bench/test_reference_figures.py`
+measures again, on an otherwise idle machine.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def test_every_figure_is_as_demanded():
         ), row
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_reference_is_still_several_times_as_fast_as_the_engines():
     """Ratios within one run, not times."""
     found = list(compared("gas", 1000, engines(boxed_gas(1000, 0.3), DT), LEAST))
