@@ -168,7 +168,7 @@ def deviation(comparison: Comparison) -> Drawing:
     ]
     if held is None:
         caption = (
-            "Largest distance of any disk from where it truly is, in radii of that disk. Lower is"
+            "Largest distance of any disk from its exact position, in radii of that disk. Lower is"
             " better."
         )
         return Drawing(

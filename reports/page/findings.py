@@ -147,42 +147,48 @@ def closest(off: pd.DataFrame) -> str:
             " are not ranked."
         )
     best, *others = (f"{name} ({number(value, 2)})" for name, value in medians.items())
-    # within 1 % counts as equal
-    wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     ranking = (
         f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "")
         if others
         else ""
     )
+    if len(off) == 1:
+        return (
+            f"Closest to the exact answer in {off.index[0]}, by the largest deviation in radii:"
+            f" {best}{ranking}."
+        )
+    # within 1 % counts as equal
+    wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     return (
-        f"Closest to the exact answers, by the largest deviation in radii,"
-        f" {over_scenes(len(off))}: {best}, unbeaten in {wins}{ranking}."
+        f"Closest to the exact answers, by the largest deviation in radii, median of"
+        f" {counted(len(off), 'scene')}: {best}, unbeaten in {wins}{ranking}."
     )
-
-
-def over_scenes(count: int) -> str:
-    """The scenes behind a number, in words: a median if there is more than one."""
-    return f"median of {counted(count, 'scene')}" if count != 1 else "in 1 scene"
 
 
 def worth_of_settings(off: pd.DataFrame) -> str:
     """How much matched settings reduce the deviation of an engine."""
     if off.empty:
         return "What settings are worth cannot be said without an exact answer."
-    parts = []
+    effects: dict[str, tuple[int, int]] = {}  # engine -> scenes in which it is closer, and farther
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"
         if shipped in off and matched in off:
             closer = int((off[matched] < 0.99 * off[shipped]).sum())
-            farther = int((off[matched] > 1.01 * off[shipped]).sum())
-            parts.append(f"{engine} closer in {closer} (farther in {farther})")
-    if not parts:
+            effects[engine] = closer, int((off[matched] > 1.01 * off[shipped]).sum())
+    if not effects:
         return (
             "No engine was played in both profiles, so the worth of settings is not known from this"
             " run."
         )
-    scenes = counted(len(off), "scene")
-    return f"Matching an engine to the scene brings {', '.join(parts)} of {scenes}."
+    if len(off) == 1:
+        words = {(1, 0): "closer", (0, 0): "as close", (0, 1): "farther off"}
+        said = ", ".join(f"{engine} {words[effect]}" for engine, effect in effects.items())
+        return f"Distance from the exact answer with matched instead of shipped settings: {said}."
+    said = ", ".join(
+        f"{engine} closer in {closer} (farther in {farther})"
+        for engine, (closer, farther) in effects.items()
+    )
+    return f"Matching an engine to the scene brings {said} of {counted(len(off), 'scene')}."
 
 
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
@@ -196,6 +202,9 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
             else cells[0].upper() + cells[1:]
         )
     counts = lost.sum().sort_values(ascending=False, kind="stable")
+    if len(off) == 1:
+        who = ", ".join(str(name) for name, count in counts.items() if count)
+        return f"More than a whole radius off, or without a result: {who}; {cells}"
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (

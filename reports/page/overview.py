@@ -16,6 +16,7 @@ from reports.compare.metrics import METRICS
 from reports.compare.view import NOT_JUDGED
 from reports.page import pooled, situations
 from reports.page.style import TRUTH, heat, number
+from reports.terminal.counts import counted
 
 OUTCOMES = {
     "unsupported": "refused",
@@ -80,7 +81,7 @@ class Failure(NamedTuple):
 
 SUMMARY: dict[str, Column] = {
     MAPPED: Column(
-        "Position", "radii", "largest distance of any disk from where it truly is", "radii"
+        "Position", "radii", "largest distance of any disk from its exact position", "radii"
     ),
     "momentum_error": Column(
         "Momentum", "of Σ m|v|", "largest difference from the expected momentum", "of Σ m|v|"
@@ -272,7 +273,8 @@ def pool(
     }
     left_out = sum(bool(each) for each in known) - len(totals)
     totals |= dict.fromkeys(lost, np.inf)
-    remark = f"in {len(totals)} scenarios" + (f", {NOT_JUDGED} in {left_out}" if left_out else "")
+    less = f", {NOT_JUDGED} in {left_out}" if left_out else ""
+    remark = f"in {counted(len(totals), 'scene')}{less}"
     if not totals:
         return OverviewCell(number(np.nan), remark)
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)

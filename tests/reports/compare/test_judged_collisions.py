@@ -120,7 +120,7 @@ def test_where_there_is_no_collision_none_is_missed_but_one_may_be_invented():
     for played, total in ((invents, "1"), (truth, "0")):
         each = compare(one, [replace(run, trajectory=played) for run in runs])
         cell = overview.summary([each], ["pymunk:matched"], set())["pymunk:matched"][column]
-        assert (cell.text, cell.remark) == (total, "in 1 scenarios")
+        assert (cell.text, cell.remark) == (total, "in 1 scene")
 
 
 def test_a_scene_in_which_too_few_collisions_are_judged_is_left_out_of_the_sum():
@@ -132,4 +132,4 @@ def test_a_scene_in_which_too_few_collisions_are_judged_is_left_out_of_the_sum()
         column
     ]
 
-    assert (cell.text, cell.remark) == ("–", f"in 0 scenarios, {NOT_JUDGED} in 1")
+    assert (cell.text, cell.remark) == ("–", f"in 0 scenes, {NOT_JUDGED} in 1")

@@ -119,6 +119,27 @@ def test_an_engine_stands_in_one_group_whatever_was_played():
     }
 
 
+def test_the_findings_of_one_scene_name_it_and_count_nothing():
+    """No median, and no "in 1 of 1 scene"."""
+    off = pd.DataFrame(
+        {"pymunk:shipped": [0.2], "pymunk:matched": [0.1], "box2d:shipped": [3.0]}, index=["fall"]
+    )
+    off["box2d:matched"] = off["box2d:shipped"]
+
+    assert findings.closest(off) == (
+        "Closest to the exact answer in fall, by the largest deviation in radii: pymunk:matched"
+        " (0.1), then pymunk:shipped (0.2), box2d:shipped (3), last box2d:matched (3)."
+    )
+    assert findings.worth_of_settings(off) == (
+        "Distance from the exact answer with matched instead of shipped settings: pymunk closer,"
+        " box2d as close."
+    )
+    assert findings.where_it_fails(off, ["ok"] * 4) == (
+        "More than a whole radius off, or without a result: box2d:shipped, box2d:matched; every"
+        " cell was played to its end."
+    )
+
+
 def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
     """Summary, situations and findings of a run without them are to the letter those of one with
     them; what they add stands behind."""
