@@ -37,9 +37,12 @@ def scatter(
     each equal disk blocks four times its area for the next centres, so a free place always remains
     up to a quarter of the box.
     """
-    centres: list[Array] = [] if first is None else [np.asarray(first, float)]
-    while len(centres) < len(radius):
-        centre, n = rng.uniform(low, high), len(centres)
-        if all(np.hypot(*(centre - other)) > r + radius[n] for other, r in zip(centres, radius)):
-            centres.append(centre)
-    return np.array(centres)
+    centres = np.empty((len(radius), 2))
+    n = 0  # are placed
+    if first is not None:
+        centres[0], n = first, 1
+    while n < len(radius):
+        centre = rng.uniform(low, high)
+        if (np.hypot(*(centre - centres[:n]).T) > radius[:n] + radius[n]).all():
+            centres[n], n = centre, n + 1
+    return centres
