@@ -152,7 +152,7 @@ _Rapier = partial(
     mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
     searched=partial(_javascript_searched, "rapier2d"),
 )
-_BULLETS = "continuous collision, what moves is a bullet"
+_BULLETS = "continuous collision, every moving disk a bullet"
 
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
@@ -209,7 +209,7 @@ ENGINES: dict[str, EngineRow] = {
             "hash, not tree": {"spatial_hash": (0.6, 1000)},
         },
         variants={
-            "fifty_iterations": Variant({"iterations": 50}, "50 iterations for 10"),
+            "fifty_iterations": Variant({"iterations": 50}, "50 iterations instead of 10"),
             "position_correction": Variant(
                 {"collision_bias": (1 - 0.1) ** 60}, "position correction as shipped"
             ),
@@ -263,7 +263,7 @@ ENGINES: dict[str, EngineRow] = {
         },
         variants={
             "bullets": Variant({"continuous": True}, _BULLETS, _what_moves_is_a_bullet),
-            "16_substeps": Variant({"substeps": 16}, "16 substeps for 4"),
+            "16_substeps": Variant({"substeps": 16}, "16 substeps instead of 4"),
         },
     ),
     "event_driven:float64": EngineRow(

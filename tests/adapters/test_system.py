@@ -213,9 +213,10 @@ def lives_on(
     (folder / "solver.py").write_text(
         "import os, pathlib, time\n"
         f"if os.fork() == 0:\n    {child_does}\n"
-        f"    pathlib.Path({str(file)!r}).write_text(str(os.getpid()))\n"
+        f"    pathlib.Path({str(file)!r} + '.part').write_text(str(os.getpid()))\n"
+        f"    os.replace({str(file)!r} + '.part', {str(file)!r})\n"
         "    time.sleep(300)\n    os._exit(0)\n"
-        f"time.sleep(0.3)\n{parent_does}\n"
+        f"while not os.path.exists({str(file)!r}):\n    time.sleep(0.01)\n{parent_does}\n"
     )
     subprocess.run(
         [CROSSCHECK, "check", "solver.py"],
