@@ -13,7 +13,7 @@ from zipfile import ZipFile
 import numpy as np
 
 from reports.run.archive import digest
-from reports.run.scenes import open_scene
+from reports.run.scenes import Records, open_scene, scenario_of
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes
 from scenarios.model import Scenario
@@ -75,6 +75,11 @@ def answer_of(scenario: Scenario) -> Answer:
     return Answer(
         scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None, OK, ""
     )
+
+
+def answer_here(folder: Path, records: Records) -> Answer:
+    """Compute the exact answer to a scene; called in a worker."""
+    return answer_of(scenario_of(folder, records))
 
 
 def no_answer(failure: Failure, timeout: float) -> Answer:

@@ -13,7 +13,6 @@ import io
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,13 +24,12 @@ from reports.compare.against import TRUTH
 from reports.compare.comparison import Comparison, compare
 from reports.compare.table import status_row, table_of
 from reports.compare.view import NOT_JUDGED
-from reports.run.answers import Answer, answer_of, no_answer, put_answer, read_answer
+from reports.run.answers import Answer, answer_here, no_answer, put_answer, read_answer
 from reports.run.archive import Archive, as_found, digest, run_of
 from reports.run.cells import Cell, versions
-from reports.run.scenes import must_fit, played_scenario
+from reports.run.scenes import Records, scenario_of
 from reports.run.worker_process import Failure, allow
 from reports.terminal.foreign_text import put_bytes
-from scenarios.model import Scenario
 from scenarios.regular import all_of
 
 # The source that decides the numbers of a scene table; the patterns reach into subfolders.
@@ -42,7 +40,6 @@ NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which an emp
 PATHS = "surrogateescape"  # keeps the path of a solver whose name is not UTF-8
 # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
 COMPARING = 300.0
-Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
 Task = tuple[Path, Callable[[], Any]]  # its result's file, and what a worker calls
 
 
@@ -163,11 +160,6 @@ class SceneTable(NamedTuple):
     damaged: bool
 
 
-def answer_here(folder: Path, records: Records) -> Answer:
-    """Compute the exact answer to a scene; called in a worker."""
-    return answer_of(scenario_of(folder, records))
-
-
 def scene_table_of(folder: Path, records: Records, answered: Path) -> SceneTable:
     """Compare a scene with its answer, kept in the file `answered`; called in a worker."""
     allow(COMPARING)
@@ -196,18 +188,6 @@ def rows_not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
     """A row with the reason `why` for each run that is "ok" but not compared with `versus`."""
     says = f"{NOT_JUDGED}: {why}"
     return table_of([status_row(run, says, versus) for run in runs if run.status == "ok"])
-
-
-def scenario_of(folder: Path, records: Records) -> Scenario:
-    """The scenario of a scene's cells, with the step sizes played; raises `Unusable` if the line of
-    a cell does not fit the present scene."""
-    [scenario] = [
-        played_scenario(folder, record)
-        for record in {one["scene_hash"]: one for one in records}.values()
-    ]
-    for record in records:
-        must_fit(folder, scenario, record)
-    return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
 
 
 def keep_scene_table(path: Path, csv: bytes) -> None:

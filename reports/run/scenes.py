@@ -17,6 +17,8 @@ from scenarios.files.scene_file import read_scene_file
 from scenarios.files.tables import MOST_STEPS
 from scenarios.model import Scenario
 
+Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
+
 
 def open_scene(scene: str, seed: int) -> Scenario:
     """A scenario by catalogue name or file path; raises `KeyError` or `SceneFileError`."""
@@ -50,6 +52,18 @@ def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
                 f" {record[name]!r}: must be {value!r}, that of {record['scene']} with"
                 f" {record['substeps']} substeps; delete that line"
             )
+
+
+def scenario_of(folder: Path, records: Records) -> Scenario:
+    """The scenario of a scene's cells, with the step sizes played; raises `Unusable` if the line of
+    a cell does not fit the present scene."""
+    [scenario] = [
+        played_scenario(folder, record)
+        for record in {one["scene_hash"]: one for one in records}.values()
+    ]
+    for record in records:
+        must_fit(folder, scenario, record)
+    return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
 
 
 def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:

@@ -24,7 +24,6 @@ from reports.run.runner import run_all
 from reports.run.scene_tables import (
     ANSWER,
     PATHS,
-    Records,
     SceneTasks,
     answer_file,
     csv_of,
@@ -33,9 +32,9 @@ from reports.run.scene_tables import (
     name_of,
     read_scene_table,
     rows_not_judged,
-    scenario_of,
     scene_table_file,
 )
+from reports.run.scenes import Records, scenario_of
 from reports.run.timing_pass import TABLE, timings
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say as warn

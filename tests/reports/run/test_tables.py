@@ -15,7 +15,7 @@ import pytest
 
 from adapters.engines import ENGINES
 from reports.run import cells, scene_tables, tables
-from reports.run.answers import answer_of, no_answer, put_answer, read_answer
+from reports.run.answers import answer_here, answer_of, no_answer, put_answer, read_answer
 from reports.run.archive import Archive
 from reports.run.cells import ROOT, Cell
 from reports.run.journal import JOURNAL, Journal
@@ -25,7 +25,6 @@ from reports.run.scene_tables import (
     SceneTable,
     SceneTasks,
     answer_file,
-    answer_here,
     compared,
     name_of,
     scene_table_of,
