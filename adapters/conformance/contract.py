@@ -15,6 +15,7 @@ from adapters.conformance.probe import (
     DT,
     Probe,
     ProbeReading,
+    act_on,
     first_difference,
     head_on,
     history,
@@ -24,7 +25,6 @@ from adapters.conformance.probe import (
     must_report,
     one_disk,
     plain,
-    pushed,
     reported,
     scene_of,
     simplified,
@@ -92,9 +92,9 @@ def load_forgets(row: EngineRow) -> ProbeReading:
     with loaded(row, *simplified(head_on(2.0))) as used:
         last = len(used.read().angle) - 1
         for _ in range(12):
-            pushed(used, last, (1.0, 2.0), 3.0)
+            act_on(used, last, (1.0, 2.0), 3.0)
             used.step()
-        pushed(used, last // 2, (5.0, 5.0), 5.0)
+        act_on(used, last // 2, (5.0, 5.0), 5.0)
         load_first(used, scenes, DT / 2)
         left = len(used.collisions())
         seen = history(used)
@@ -274,7 +274,7 @@ def static_stays(row: EngineRow) -> ProbeReading:
     with loaded(row, scene) as engine:
         before = engine.read()
         for _ in range(12):
-            pushed(engine, 1, (5.0, 5.0), 5.0)
+            act_on(engine, 1, (5.0, 5.0), 5.0)
             engine.step()
         after, collisions = engine.read(), reported(engine)
     moved = [

@@ -167,7 +167,7 @@ def must_report(engine: Engine) -> None:
         raise Unsupported("it reports no collisions")
 
 
-def pushed(engine: Engine, disk: int, force: tuple[float, float], torque: float) -> bool:
+def act_on(engine: Engine, disk: int, force: tuple[float, float], torque: float) -> bool:
     """Apply a force and a torque, or the force alone, or nothing, whichever the engine accepts
     first; returns whether the torque was applied."""
     for turning in (torque, 0.0):
@@ -181,7 +181,7 @@ def history(engine: Engine, steps: int = 60) -> list[tuple[str, bytes]]:
     """The next `steps` steps of an engine, with a force in the first: (array and time, its bytes)
     for every array at every 10th step, then the collisions."""
     seen: list[tuple[str, bytes]] = []
-    pushed(engine, 0, (3.0, 1.0), 0.5)
+    act_on(engine, 0, (3.0, 1.0), 0.5)
     for k in range(0, steps + 1, 10):
         if k:
             engine.step(10)

@@ -76,7 +76,7 @@ const crosscheck = (() => {
     return null;
   }
 
-  // `times` readings, each after `count` steps, or those before something is thrown, which is told; fewer if they take
+  // `times` readings, each after `count` steps, or those before something is thrown, which is reported; fewer if they take
   // too long.
   function ahead({ count, times, thrusts }) {
     const readings = [], began = Date.now(), acting = Map.groupBy(thrusts, ([when]) => when);
@@ -87,7 +87,7 @@ const crosscheck = (() => {
         readings.push(reading());
       }
     }
-    catch (error) { thrown = told(error); }
+    catch (error) { thrown = reportOf(error); }
     return { thrown, ...handed(readings) };
   }
 
@@ -129,7 +129,7 @@ const crosscheck = (() => {
     }
   }
 
-  function told(error) {
+  function reportOf(error) {
     if (error instanceof Refused) return { refused: error.message };
     return { failed: `${error && error.message !== undefined ? `${error.name}: ${error.message}` : error}` };
   }
@@ -139,7 +139,7 @@ const crosscheck = (() => {
     play: (given) => { engine = given; },
     do: (name, argument) => {
       try { return JSON.stringify({ done: commands[name](argument) }); }
-      catch (error) { return JSON.stringify(told(error)); }
+      catch (error) { return JSON.stringify(reportOf(error)); }
     },
     numbers: () => numbers,
     ready: () => engine !== undefined,

@@ -90,7 +90,7 @@ class JavaScriptEngine:
         answer = self.do(
             "load",
             {
-                "scene": told(scene, dt),
+                "scene": to_json(scene, dt),
                 "profile": self.profile,
                 "changed": self.changed,
                 "listening": self.listening,
@@ -200,7 +200,7 @@ class JavaScriptEngine:
             process.close()
 
 
-def told(scene: Scene, dt: float) -> dict[str, Any]:
+def to_json(scene: Scene, dt: float) -> dict[str, Any]:
     """A scene as the engines' files take it: plain lists in SI units, static disks with mass 1."""
     moving = ~scene.static
     return {

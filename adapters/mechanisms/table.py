@@ -334,14 +334,14 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
         "fattened": float(np.float32(0.04) * np.float32(unit)),
     }
     # normalized_max_corrective_velocity: 3 units of length in a second
-    push = {"push_speed": 3.0 * unit}
+    correction = {"push_speed": 3.0 * unit}
     swept = made(continuous_steps=0, **({"sleeping": False} if profile == "shipped" else {}))
     rubbed = _box2d_v3_friction(reported, None if scene.friction else made(friction=0.0))
     return [
         Mechanism(RESTITUTION, {"rebounds": False}, (IMPULSE,)),
         Mechanism(IMPULSE, impulse),
         Mechanism(RECYCLING, recycled, (IMPULSE,)),
-        Mechanism(POSITION_CORRECTION, push, (IMPULSE,)),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,)),
         *(rubbed if scene.friction or profile == "shipped" else []),
         Mechanism(SWEPT, without=swept),
     ]

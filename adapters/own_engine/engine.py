@@ -70,7 +70,7 @@ class OwnEngine(Student):
         self.models: Sequence[str] = self.process.functions["models"]
         must_model(scene, self.models, self.path.name)
         self.forget(scene)
-        what = {"scene": told(scene), "dt": dt, "listening": self.listening}
+        what = {"scene": to_json(scene), "dt": dt, "listening": self.listening}
         if refused := self.do("whole_load", what, CREATE_LIMIT):
             raise Unsupported(f"{self.path.name} refuses the scene: {printable(refused[:LONGEST])}")
 
@@ -109,7 +109,7 @@ class OwnEngine(Student):
         }
 
 
-def told(scene: Scene) -> dict[str, Any]:
+def to_json(scene: Scene) -> dict[str, Any]:
     """A scene in the form that an engine's file gets: plain lists, with None for infinite numbers
     (mass and inertia of a static disk)."""
 

@@ -2,7 +2,7 @@
 // Draws the field: stars, earth, asteroids and the ship of the solid engine, the ghosts as outlines in their colours.
 
 const looks = JSON.parse(document.getElementById("looks").textContent);
-const calm = matchMedia("(prefers-reduced-motion: reduce)");
+const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
 const SHIP = 0;
 
 // The same sky and the same rocks on every visit (a linear congruential generator; Numerical Recipes, 7.1).

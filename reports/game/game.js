@@ -9,7 +9,7 @@ class Game {
   constructor() {
     this.sky = new Field(by("sky"));
     this.rows = [...document.querySelectorAll("tr[data-engine]")];
-    Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: calm.matches, down: new Set(), stopped: new Set(), gone: new Set(), pace: [], drawn: [] });
+    Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: reducedMotion.matches, down: new Set(), stopped: new Set(), gone: new Set(), pace: [], drawn: [] });
     this.listen();
     this.connect();
     requestAnimationFrame((now) => this.tick(now));

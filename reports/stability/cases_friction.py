@@ -53,8 +53,8 @@ def rough_bounce(
     def truth(t: Array) -> Trajectory:
         start, v = start_of(scene)
         legs = bounce(start, v, scene.radius, np.array([SOLID]), e, mu, height)
-        hit = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
-        return turning_answer(scene, t, legs.at(t), [hit])
+        collision = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
+        return turning_answer(scene, t, legs.at(t), [collision])
 
     return stepped("rough-bounce", "Does friction brake and turn the disk?", scene, truth)
 
