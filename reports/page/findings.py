@@ -12,7 +12,7 @@ from reports.compare.comparison import Comparison
 from reports.page import pooled
 from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
 from reports.page.style import number
-from reports.terminal.counts import counted
+from reports.terminal.counts import counted, listed
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
@@ -110,11 +110,13 @@ def unranked_sentence(
     errors = off[name].dropna()
     far = errors[(errors > FAR_OFF) & np.isfinite(errors)].sort_values(ascending=False)
     lost = list(errors.index[np.isinf(errors)])
-    near = "radius" if within == 1 else "radii"
-    parts = [
-        f"{name.removesuffix(OWN_PROFILE)} is within {number(within)} {near} of the exact answer in"
-        f" {int((errors <= within).sum())} of {counted(len(errors), 'scene')}"
-    ]
+    bound = f"{number(within)} {'radius' if within == 1 else 'radii'} of the exact answer"
+    inside = int((errors <= within).sum())
+    if len(errors) == 1:
+        said = f"is {'' if inside else 'not '}within {bound}"
+    else:
+        said = f"is within {bound} in {inside} of {len(errors)} scenes"
+    parts = [f"{name.removesuffix(OWN_PROFILE)} {said}"]
     if len(far):
         parts.append(f"off by {number(far.iloc[0], 2)} radii in {far.index[0]}")
         if len(far) > 1:
@@ -154,14 +156,14 @@ def closest(off: pd.DataFrame) -> str:
     )
     if len(off) == 1:
         return (
-            f"Closest to the exact answer in {off.index[0]}, by the largest deviation in radii:"
+            f"Closest to the exact answer of {off.index[0]}, by the largest deviation in radii:"
             f" {best}{ranking}."
         )
     # within 1 % counts as equal
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     return (
-        f"Closest to the exact answers, by the largest deviation in radii, median of"
-        f" {counted(len(off), 'scene')}: {best}, unbeaten in {wins}{ranking}."
+        f"Closest to the exact answers, by the largest deviation in radii,"
+        f" median of {len(off)} scenes: {best}, unbeaten in {wins}{ranking}."
     )
 
 
@@ -169,26 +171,42 @@ def worth_of_settings(off: pd.DataFrame) -> str:
     """How much matched settings reduce the deviation of an engine."""
     if off.empty:
         return "What settings are worth cannot be said without an exact answer."
-    effects: dict[str, tuple[int, int]] = {}  # engine -> scenes in which it is closer, and farther
+    moved = {}  # engine -> the number of scenes in which it gets closer, and farther
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"
         if shipped in off and matched in off:
             closer = int((off[matched] < 0.99 * off[shipped]).sum())
-            effects[engine] = closer, int((off[matched] > 1.01 * off[shipped]).sum())
-    if not effects:
+            farther = int((off[matched] > 1.01 * off[shipped]).sum())
+            moved[engine] = closer, farther
+    if not moved:
         return (
             "No engine was played in both profiles, so the worth of settings is not known from this"
             " run."
         )
     if len(off) == 1:
-        words = {(1, 0): "closer", (0, 0): "as close", (0, 1): "farther off"}
-        said = ", ".join(f"{engine} {words[effect]}" for engine, effect in effects.items())
-        return f"Distance from the exact answer with matched instead of shipped settings: {said}."
-    said = ", ".join(
-        f"{engine} closer in {closer} (farther in {farther})"
-        for engine, (closer, farther) in effects.items()
-    )
-    return f"Matching an engine to the scene brings {said} of {counted(len(off), 'scene')}."
+        return worth_in_one_scene(str(off.index[0]), moved)
+    parts = [
+        f"{engine} closer in {near} (farther in {far})" for engine, (near, far) in moved.items()
+    ]
+    return f"Matching an engine to the scene brings {', '.join(parts)} of {len(off)} scenes."
+
+
+def worth_in_one_scene(scene: str, moved: Mapping[str, tuple[int, int]]) -> str:
+    """`worth_of_settings` where there is one scene; `moved`: engine -> (1, 0) if its matched
+    settings bring it closer, (0, 1) if farther, (0, 0) if neither by more than 1 %."""
+    says = {
+        (1, 0): "bring {} closer to the exact answer",
+        (0, 1): "take {} farther from it",
+        (0, 0): "make no difference of more than 1 % to {}",
+    }
+    parts = [
+        said.format(listed([engine for engine, way in moved.items() if way == asked]))
+        for asked, said in says.items()
+        if asked in moved.values()
+    ]
+    if (1, 0) not in moved.values():
+        parts[0] = parts[0].replace("from it", "from the exact answer")
+    return f"In {scene} the matched settings {listed(parts)}."
 
 
 def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
@@ -209,7 +227,7 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     defeated = lost.sum(axis=1)
     return (
         f"More than a whole radius off, or without a result: {who} of"
-        f" {counted(len(off), 'scene')}; the hardest is {defeated.idxmax()}, too much for"
+        f" {len(off)} scenes; the hardest is {defeated.idxmax()}, too much for"
         f" {defeated.max()} of {lost.shape[1]}; {cells}"
     )
 

@@ -32,6 +32,7 @@ from reports.stability.limits import Case, Limit
 from reports.stability.predicates import Reading, judge
 from reports.stability.search import Search
 from reports.stability.variants import Variant
+from reports.terminal.counts import listed
 from scenarios.model import Scenario
 
 END_OF_STEP = "end-of-step detection"  # the ablation without any mechanism
@@ -190,8 +191,3 @@ def reason_by_ablation(limit: Limit) -> tuple[str, str, str]:
         f"the reference with end-of-step detection and the engine's {listed(names)} has this limit"
     )
     return text, source, tested
-
-
-def listed(names: Sequence[str]) -> str:
-    """a, b and c."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

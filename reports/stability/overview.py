@@ -10,12 +10,11 @@ from typing import NamedTuple
 from adapters.engines import ENGINES
 from reports.page.situations import ENGINE, grouped
 from reports.page.style import number
-from reports.stability.ablations import listed
 from reports.stability.cases_friction import FRICTION
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
-from reports.terminal.counts import counted
+from reports.terminal.counts import counted, listed
 
 WITH_FRICTION = {case.name for case in FRICTION}
 EVERYWHERE = {"never": "everywhere"}  # the table shows where an engine fails, not where it works

@@ -119,27 +119,6 @@ def test_an_engine_stands_in_one_group_whatever_was_played():
     }
 
 
-def test_the_findings_of_one_scene_name_it_and_count_nothing():
-    """No median, and no "in 1 of 1 scene"."""
-    off = pd.DataFrame(
-        {"pymunk:shipped": [0.2], "pymunk:matched": [0.1], "box2d:shipped": [3.0]}, index=["fall"]
-    )
-    off["box2d:matched"] = off["box2d:shipped"]
-
-    assert findings.closest(off) == (
-        "Closest to the exact answer in fall, by the largest deviation in radii: pymunk:matched"
-        " (0.1), then pymunk:shipped (0.2), box2d:shipped (3), last box2d:matched (3)."
-    )
-    assert findings.worth_of_settings(off) == (
-        "Distance from the exact answer with matched instead of shipped settings: pymunk closer,"
-        " box2d as close."
-    )
-    assert findings.where_it_fails(off, ["ok"] * 4) == (
-        "More than a whole radius off, or without a result: box2d:shipped, box2d:matched; every"
-        " cell was played to its end."
-    )
-
-
 def test_scenes_with_friction_leave_every_other_median_as_it_is(with_friction):
     """Summary, situations and findings of a run without them are to the letter those of one with
     them; what they add stands behind."""
@@ -231,6 +210,44 @@ def test_findings_rank_engines_and_say_in_how_many_scenes_the_others_are_right()
     assert "mine.py is within 1 radius of the exact answer in 2 of 3 scenes, off by 2" in mine
     box2d = findings.unranked_sentence("box2d:matched", off, situations.FAR_OFF, {})
     assert "in 2 of 3 scenes, without a result in c." in box2d
+
+
+def test_one_scene_is_described_without_counts_of_scenes():
+    """Unbeaten in 1, and closer in 1 (farther in 0) of 1 scene: that says nothing. The scene, the
+    engines and the way they moved are named."""
+    errors = {
+        "reference:exercise": [0.1],
+        "reference:ordered": [1e-9],
+        "pymunk:shipped": [0.5],
+        "pymunk:matched": [0.2],
+        "box2d:shipped": [0.3],
+        "box2d:matched": [2.0],
+        "box2d_v3:shipped": [0.4],
+        "box2d_v3:matched": [0.4],
+    }
+    off = score(errors).pivot(index="scenario", columns="name", values="error")
+    engines = off.drop(columns="reference:ordered")
+
+    assert findings.closest(engines) == (
+        "Closest to the exact answer of a, by the largest deviation in radii:"
+        " reference:exercise (0.1), then pymunk:matched (0.2), box2d:shipped (0.3), last"
+        " box2d:matched (2)."
+    )
+    assert findings.worth_of_settings(engines) == (
+        "In a the matched settings bring pymunk closer to the exact answer, take box2d"
+        " farther from it and make no difference of more than 1 % to box2d_v3."
+    )
+    assert findings.worth_of_settings(engines[["box2d:shipped", "box2d:matched"]]) == (
+        "In a the matched settings take box2d farther from the exact answer."
+    )
+    assert findings.where_it_fails(engines, ["ok"]) == (
+        "More than a whole radius off, or without a result: box2d:matched; every cell was played"
+        " to its end."
+    )
+    assert findings.unranked_sentence("reference:ordered", off, situations.RIGHT, {}) == (
+        "reference:ordered is within 10⁻⁶ radii of the exact answer. It is not ranked among the"
+        " engines."
+    )
 
 
 def test_findings_and_summary_have_one_median(comparisons: list[Comparison]):
