@@ -26,6 +26,11 @@ ASKED = (
     "pair_momentum",
 )
 
+ZERO = "0 to rounding"
+# A reading adds up to 64 steps, each rounded, of numbers up to 10 (m, m/s): the largest measured is
+# 126 times the rounding, the distance of reference:ordered from the parabola.
+ROUNDINGS = 500
+
 
 @dataclass(frozen=True)
 class Convention:
@@ -48,7 +53,10 @@ def table(engines: Mapping[str, EngineRow]) -> list[Convention]:
         expected = (
             "0 if exact" if probe == "free_flight" else number(stated(list(answers.values())))
         )
-        got = {name: (reading(each), each.verdict) for name, each in answers.items()}
+        got = {
+            name: (reading(each, engines[name].rounding), each.verdict)
+            for name, each in answers.items()
+        }
         rows.append(Convention(PROBES[probe].asked, expected, got))
     return rows
 
@@ -59,9 +67,11 @@ def stated(answers: Sequence[Finding]) -> float | str:
     return next((each for each in expected if not isinstance(each, str)), expected[0])
 
 
-def reading(found: Finding) -> str:
+def reading(found: Finding, rounding: float) -> str:
     """What an engine gave, with as many digits as it takes to see that it departs from what is
-    expected."""
+    expected; what is not 0 only by the relative `rounding` of the engine's numbers is called so."""
+    if not isinstance(found.got, str) and 0 < abs(found.got) < ROUNDINGS * rounding:
+        return ZERO
     digits = range(3, 10) if found.verdict == "departs" else [3]
     return next(
         (text for d in digits if (text := number(found.got, d)) != number(found.expected, d)),

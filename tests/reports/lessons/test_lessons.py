@@ -20,7 +20,7 @@ from reports.commands.serve import application
 from reports.game.server import Game
 from reports.lessons import pages
 from reports.lessons.catalogue import LESSONS
-from reports.lessons.conventions import table
+from reports.lessons.conventions import ZERO, table
 from reports.lessons.lesson import Lesson, run_of
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.mechanisms.javascript_bounces import VERSIONS
@@ -138,6 +138,21 @@ def test_conventions_are_measured():
         ][1]
         == "keeps"
     )
+
+
+def test_rounding_is_not_shown_as_a_number():
+    """e of box2d:shipped at 0.1 m/s reads 9e-15: no bounce. What is small and no rounding stays."""
+    names = ("reference:exercise", "reference:ordered", "box2d:shipped")
+    rows = {row.asked: row.got for row in table({name: ENGINES[name] for name in names})}
+    slow = rows["What is e of a pair that closes at 0.1 m/s, where 0.5 is stated?"]
+    fall = rows["How far is a thrown disk from the parabola after 1 s? (m)"]
+    flight = rows["How fast is a free disk of 3.9 mm/s after 2 s? (m/s)"]
+
+    assert slow["box2d:shipped"] == (ZERO, "departs")
+    assert fall["reference:ordered"] == (ZERO, "keeps")
+    assert fall["reference:exercise"][0] == "−0.0192"
+    assert flight["reference:exercise"][0] == "0.00391"
+    assert not [got for row in rows.values() for got, _ in row.values() if "×10" in got]
 
 
 def test_the_conventions_of_friction_say_who_does_not_model_it():
