@@ -143,10 +143,10 @@ class Game {
   fill(row, flyer, solid) {
     const cell = (name) => row.querySelector(`[data-cell=${name}]`);
     const put = (name, text) => { if (cell(name).textContent !== text) cell(name).textContent = text; };
-    put("momentum", flyer ? flyer.momentum.map((p) => p.toFixed(2)).join(", ") : "");
-    put("energy", flyer ? flyer.energy.toFixed(3) : "");
-    put("ship_deviation", flyer && !solid ? short(flyer.ship_deviation) : "");
-    put("deviation", flyer && !solid ? short(flyer.deviation) : "");
+    put("momentum", flyer ? vector(flyer.momentum) : "");
+    put("energy", flyer ? figure(flyer.energy) : "");
+    put("ship_deviation", flyer && !solid ? figure(flyer.ship_deviation) : "");
+    put("deviation", flyer && !solid ? figure(flyer.deviation) : "");
     put("collisions", flyer ? String(flyer.collisions) : "");
     put("diverged", flyer ? this.story(flyer, row.dataset.engine) : "");
     cell("diverged").classList.toggle("gone", Boolean(flyer?.left));
@@ -158,7 +158,7 @@ class Game {
     const { t, i, j, shared, solid_only: mine } = flyer.diverged;
     const only = shortName(mine ? this.field.engines[this.now.solid] : name);
     if (i === undefined) return `${t.toFixed(2)} s: the ship leaves the field in ${only} only`;
-    return `${t.toFixed(2)} s, ${pairOf(i, j)}: ${shared ? "both collide, and diverge" : `a collision in ${only} only`}`;
+    return `after ${pairOf(i, j)} collide at ${t.toFixed(2)} s, in ${shared ? "both engines" : `${only} only`}`;
   }
 
   // Over the last second; the flight is slowed where the engines, the way to the server or the screen are too slow.
@@ -266,10 +266,30 @@ class Game {
 
 const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
 const farewell = ({ left, left_at: at }) => at ? `left at ${at.toFixed(2)} s: ${left}` : `does not fly: ${left}`;
-const pairOf = (i, j) => `${i === SHIP ? "ship" : i} × ${j < 0 ? `wall ${-1 - j}` : j === SHIP ? "ship" : j}`;
+const bodyOf = (k) => k === SHIP ? "the ship" : k < 0 ? `wall ${-1 - k}` : `disk ${k}`;
+const pairOf = (i, j) => i === SHIP || j !== SHIP ? `${bodyOf(i)} and ${bodyOf(j)}` : pairOf(j, i);
 const raised = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
-const short = (metres) => metres === 0 ? "0" : metres >= 1e-3 ? metres.toFixed(3)
-  : metres.toExponential(0).replace(/e-(\d+)/, (_, digits) => `×10⁻${raised(digits)}`);
+
+// Every number of the table has so many significant digits: more would only flicker. Below a millionth of a unit one is enough.
+const DIGITS = 4;
+const decimals = (value) => Math.max(0, DIGITS - 1 - Math.floor(Math.log10(Math.abs(value)) + 1e-9));
+const rounded = (value) => Number(value.toPrecision(DIGITS));
+const figure = (value) => {
+  if (value === 0) return "0";
+  if (Math.abs(value) >= 1e6 || Math.abs(value) < 1e-3) return power(value);
+  return rounded(value).toFixed(decimals(rounded(value)));
+};
+const power = (value) => {
+  const [digits, exponent] = value.toExponential(Math.abs(value) < 1e-6 ? 0 : DIGITS - 1).split("e");
+  return `${digits}×10${exponent < 0 ? "⁻" : ""}${raised(exponent.replace(/[+-]/, ""))}`;
+};
+// As many decimals as the larger component has: what is left of the smaller one is no better known.
+const vector = (pair) => {
+  const largest = Math.max(...pair.map(Math.abs));
+  if (largest < 1e-3 || largest >= 1e6) return pair.map(figure).join(", ");
+  const place = decimals(rounded(largest));
+  return pair.map((part) => (Number(part.toFixed(place)) || 0).toFixed(place)).join(", ");  // || 0: no -0
+};
 const labels = Object.fromEntries([...document.querySelectorAll("tr[data-engine]")].map(({ dataset }) => [dataset.engine, dataset.label]));
 const shortName = (name) => labels[name];
 const mean = (rows) => rows.reduce((sum, row) => sum + row[1], 0) / rows.length;

@@ -131,11 +131,52 @@ def test_a_scripted_flight_wins(page: Page):
     assert page.locator("#banner.won").inner_text() == "You won"
 
 
+def test_every_number_of_the_table_has_four_digits(first_frame: Page):
+    """However large it is; a component of momentum has no more decimals than the larger one, and
+    what is rounding has one digit."""
+    values = [9.8765432109, 12345.678901, 0.0123456, 0.99999, 4.2e-5, 3.1e-16, 7654321.0, 0]
+    shown = [first_frame.evaluate("(value) => figure(value)", value) for value in values]
+    vectors = [
+        first_frame.evaluate("(pair) => vector(pair)", pair)
+        for pair in ([1.23456, -0.00012], [-250.55, 3.21], [0.0, 0.0])
+    ]
+    energies = first_frame.locator("[data-cell=energy]").all_inner_texts()
+
+    assert shown == [
+        "9.877",
+        "12350",
+        "0.01235",
+        "1.000",
+        "4.200×10⁻⁵",
+        "3×10⁻¹⁶",
+        "7.654×10⁶",
+        "0",
+    ]
+    assert vectors == ["1.235, 0.000", "-250.6, 3.2", "0, 0"]
+    assert all(len(re.sub(r"\D", "", text)) <= 5 for text in energies if text)
+
+
+def test_the_last_collision_before_a_divergence_is_named(first_frame: Page):
+    """Its bodies, its time, and in which engine it is."""
+    story = "(diverged) => game.story({ diverged }, 'pymunk:shipped')"
+    hit = {"t": 2.351, "shared": False, "solid_only": True}
+    said = [
+        first_frame.evaluate(story, hit | pair)
+        for pair in ({"i": 3, "j": SHIP}, {"i": SHIP, "j": -3}, {"i": 2, "j": 5, "shared": True})
+    ]
+
+    assert said == [
+        "after the ship and disk 3 collide at 2.35 s, in reference:exercise only",
+        "after the ship and wall 2 collide at 2.35 s, in reference:exercise only",
+        "after disk 2 and disk 5 collide at 2.35 s, in both engines",
+    ]
+
+
 @pytest.mark.slow
 def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     page: Page, tmp_path: Path
 ):
-    """pymunk as shipped makes e2 of e: it contributions at the first collision, whose pair and
+    """pymunk as shipped makes e2 of e: it diverges at the first collision, whose pair and
     instant the exact answer reports."""
     fly(page, 16)
     together = [flyer["deviation"] for flyer in page.evaluate("game.now.flyers")]
@@ -152,7 +193,8 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     assert max(together) < 0.71 * FRAME / 16
     assert {diverged["i"], diverged["j"]} == {collisions.i[0], collisions.j[0]}
     assert 0 <= diverged["t"] - collisions.t[0] <= 2 * FRAME
-    assert f"{diverged['i']} × {diverged['j']}: both collide, and diverge" in story
+    pair = f"disk {diverged['i']} and disk {diverged['j']}".replace(f"disk {SHIP} ", "the ship ")
+    assert story == f"after {pair} collide at {diverged['t']:.2f} s, in both engines"
     assert marks[0]["name"] == "pymunk:shipped"
     assert page.evaluate("game.now.flyers[1].deviation") > 1e-3
 
