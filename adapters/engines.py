@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from adapters.engine import Engine
-from adapters.engine_row import FLOAT32, FLOAT64, EngineRow, Mark, Variant, Work
+from adapters.engine_row import FLOAT32, FLOAT64, AccuracyParameter, EngineRow, Mark, Variant
 from adapters.library_versions import BOX2D
 from adapters.matched import Searched
 from scenarios.model import Scene
@@ -118,21 +118,21 @@ _Pymunk = partial(
     distributions=("pymunk",),
     mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
     searched=_pymunk_searched,
-    work=Work("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
+    work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
 )
 _Box2D = partial(
     EngineRow,
     distributions=(BOX2D,),
     mark=Mark("#00876c", "#5be0b5", "square"),
     searched=_box2d_searched,
-    work=Work("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
+    work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
 )
 _Box2DV3 = partial(
     EngineRow,
     distributions=("pyb2d3",),
     mark=Mark("#b84fb0", "#c46bd8", "diamond"),
     searched=_box2d_v3_searched,
-    work=Work("substeps", "substeps", (1, 2, 4, 8, 16)),
+    work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
 )
 _Planck = partial(
     EngineRow,
@@ -152,7 +152,7 @@ _Rapier = partial(
     mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
     searched=partial(_javascript_searched, "rapier2d"),
 )
-_BULLETS = "continuous collision, every moving disk a bullet"
+_BULLETS = "continuous collision, moving disks are bullets"
 
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
