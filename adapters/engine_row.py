@@ -28,7 +28,7 @@ class Mark(NamedTuple):
     shape: str
 
 
-class Work(NamedTuple):
+class AccuracyParameter(NamedTuple):
     """A parameter with which an engine spends time on accuracy instead of smaller steps.
 
     Attributes:
@@ -71,7 +71,7 @@ class EngineRow:
         distributions: the installed packages, by their names in pip, whose versions affect its
             numbers.
         mark: how it is drawn; None: a colour and a shape are chosen that no other engine has.
-        work: its `Work`; None if it has none.
+        work: its `AccuracyParameter`; None if it has none.
         options: a change of one feature, in a few words -> parameters of `make`; `crosscheck speed`
             measures what it costs and breaks.
         variants: name, used after a "+" -> a changed engine with which `crosscheck stability` tests
@@ -101,7 +101,7 @@ class EngineRow:
     leaves_state: bool = False
     distributions: tuple[str, ...] = ()
     mark: Mark | None = None
-    work: Work | None = None
+    work: AccuracyParameter | None = None
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)
     searched: Callable[[], Searched] | None = None

@@ -1,7 +1,8 @@
 """Imports point down only, in every folder and the folders inside it; the judge shares no code with
-an engine."""
+an engine; a class has a name of its own."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -160,3 +161,16 @@ def test_only_the_engine_table_names_engines():
         "adapters/box2d.py": {"Box2D"},
         "adapters/box2d_v3.py": {"pyb2d3"},
     }
+
+
+def test_no_two_classes_have_one_name():
+    """One name stands for one idea, wherever it is imported."""
+    names = Counter(
+        node.name
+        for path in FILES
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.ClassDef)
+    )
+
+    assert len(names) > 200
+    assert [name for name, count in names.items() if count > 1] == []

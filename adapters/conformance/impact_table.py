@@ -115,7 +115,7 @@ def reading(probe: str) -> Callable[[EngineRow], float]:
     return read
 
 
-class Column(NamedTuple):
+class ImpactColumn(NamedTuple):
     """A column of the table: its heading in README, and how it is read; NaN if an engine refuses
     the scene."""
 
@@ -123,18 +123,18 @@ class Column(NamedTuple):
     read: Callable[[EngineRow], float]
 
 
-COLUMNS: dict[str, Column] = {
-    "threshold": Column("bounces from m/s", threshold),
-    "e_slow": Column("e at 0.1 m/s", reading("restitution_0.1")),
-    "e_2": Column("e at 2 m/s", reading("restitution_2")),
-    "e_wall": Column("e on a wall", reading("restitution_wall")),
-    "e_small": Column("e of 5 mm disks", partial(scaled, scale=0.01)),
-    "energy": Column(f"height gained in {BOUNCES} bounces, e = 1", elastic_energy),
-    "friction_unasked": Column("friction, none stated", reading("friction")),
-    "friction_0": Column("friction at e = 0", reading("friction_0")),
-    "friction_1": Column("friction at e = 1", reading("friction_1")),
-    "lever": Column("lever arm of friction", lever),
-    "spin": Column("300 rad/s after 4 steps", reading("fast_spin")),
+COLUMNS: dict[str, ImpactColumn] = {
+    "threshold": ImpactColumn("bounces from m/s", threshold),
+    "e_slow": ImpactColumn("e at 0.1 m/s", reading("restitution_0.1")),
+    "e_2": ImpactColumn("e at 2 m/s", reading("restitution_2")),
+    "e_wall": ImpactColumn("e on a wall", reading("restitution_wall")),
+    "e_small": ImpactColumn("e of 5 mm disks", partial(scaled, scale=0.01)),
+    "energy": ImpactColumn(f"height gained in {BOUNCES} bounces, e = 1", elastic_energy),
+    "friction_unasked": ImpactColumn("friction, none stated", reading("friction")),
+    "friction_0": ImpactColumn("friction at e = 0", reading("friction_0")),
+    "friction_1": ImpactColumn("friction at e = 1", reading("friction_1")),
+    "lever": ImpactColumn("lever arm of friction", lever),
+    "spin": ImpactColumn("300 rad/s after 4 steps", reading("fast_spin")),
 }
 
 SHORT = ("threshold", "energy", "friction_unasked", "friction_1", "spin", "e_small")

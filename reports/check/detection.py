@@ -9,7 +9,7 @@ import numpy as np
 
 from adapters.own_solver.restitution import code_of
 from reports.check.functions import failed_calls
-from reports.check.questions import QUESTIONS, Answer, Ball, Question, named
+from reports.check.questions import QUESTIONS, Ball, Question, SolverAnswer, named
 from reports.check.rows import CheckRow, judged, near, shown
 
 Rule = Callable[[float, float, float, float], bool | None]
@@ -104,13 +104,13 @@ def acts(question: tuple[Ball, ...], after: list[Ball]) -> bool:
     return any(not (near(b.x, a.x) and near(b.v, a.v)) for a, b in zip(question, after))
 
 
-def reacted(question: Question, answer: Answer) -> bool:
+def reacted(question: Question, answer: SolverAnswer) -> bool:
     """Whether a pair collides according to the solver: it changes, or the call fails after the
     comparison."""
     return bool(answer.failed) or acts(question.balls, answer.last)
 
 
-def detection_rows(answers: dict[str, Answer], text: str) -> list[CheckRow]:
+def detection_rows(answers: dict[str, SolverAnswer], text: str) -> list[CheckRow]:
     """The rows of (a); `text`: of the file."""
     return [
         reach(answers, (XOR if "^" in code_of(text) else {}) | RULES),
@@ -119,7 +119,7 @@ def detection_rows(answers: dict[str, Answer], text: str) -> list[CheckRow]:
     ]
 
 
-def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
+def reach(answers: dict[str, SolverAnswer], rules: Mapping[str, Rule]) -> CheckRow:
     """The row on which of many pairs react; its cause is the first of the rules that gives this
     pattern."""
     seen = []
@@ -160,13 +160,13 @@ def reach(answers: dict[str, Answer], rules: Mapping[str, Rule]) -> CheckRow:
 ASKED = "Which pairs collide, according to the file?"
 
 
-def no_number(answers: dict[str, Answer]) -> bool:
+def no_number(answers: dict[str, SolverAnswer]) -> bool:
     """Whether the positions of all pairs, near or far, become NaN or infinite."""
     reached = [answer.last for _, answer in named(answers, "reach/") if answer.balls]
     return bool(reached) and not np.isfinite([[b.x for b in balls] for balls in reached]).any()
 
 
-def mixed_up(answers: dict[str, Answer]) -> bool:
+def mixed_up(answers: dict[str, SolverAnswer]) -> bool:
     """Whether the sum of the positions decides, as in a misprint of the lesson."""
     for question, answer in named(answers, "reach/"):
         a, b = question.balls
@@ -176,7 +176,7 @@ def mixed_up(answers: dict[str, Answer]) -> bool:
     return True
 
 
-def touch(answer: Answer) -> CheckRow:
+def touch(answer: SolverAnswer) -> CheckRow:
     """Whether spheres that just touch collide: a free choice."""
     reacts = reacted(QUESTIONS["touch"], answer)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
@@ -186,7 +186,7 @@ def touch(answer: Answer) -> CheckRow:
     return CheckRow("just touching", "2a", asked, got, "yes or no", "free choice", said)
 
 
-def same_centre(answer: Answer, others_fail: bool) -> CheckRow:
+def same_centre(answer: SolverAnswer, others_fail: bool) -> CheckRow:
     """Two spheres at one place have no normal, and the exercise does not define the result; but the
     call must return. `others_fail`: it fails for other pairs, too."""
     asked = "What happens to two spheres whose centres coincide?"

@@ -16,7 +16,7 @@ from reports.check.lines import SHOWN, Source
 from reports.check.questions import (
     LIMIT,
     QUESTIONS,
-    Answer,
+    SolverAnswer,
     answered,
     ball,
     fresh_world,
@@ -30,7 +30,7 @@ FAR = "reach/25"  # two spheres four times as far apart, in x and in y, as when 
 
 
 def rows_until_failure(
-    process: SolverProcess, answers: dict[str, Answer], source: Source
+    process: SolverProcess, answers: dict[str, SolverAnswer], source: Source
 ) -> list[CheckRow]:
     """The fault in the part that fails, and the rows of the parts before it, as far as they can be
     judged.
@@ -65,7 +65,7 @@ def rows_until_failure(
     return sorted(rows, key=lambda row: row.task)
 
 
-def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[str, Answer]:
+def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[str, SolverAnswer]:
     """The answers to these questions in a fresh world; for a call that fails, with the spheres as
     it left them, if they still have all their numbers.
 
@@ -73,7 +73,7 @@ def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[
     none after a call that it had to stop.
     """
     process.request(fresh_world(process))
-    found: dict[str, Answer] = {}
+    found: dict[str, SolverAnswer] = {}
     for name in names:
         reply, spheres = process.request(
             [("ask", QUESTIONS[name].request, limit), ("left", None, LIMIT)]
@@ -84,7 +84,7 @@ def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[
     return found
 
 
-def needed(answers: dict[str, Answer]) -> list[str]:
+def needed(answers: dict[str, SolverAnswer]) -> list[str]:
     """The questions that judge (a) and (b); if every call runs into its time limit, only one in
     four of the pairs that judge (a)."""
     pairs = [name for name in answers if name.startswith("reach/")]
@@ -96,13 +96,13 @@ def needed(answers: dict[str, Answer]) -> list[str]:
     ]
 
 
-def fails_at_once(left: dict[str, Answer]) -> bool:
+def fails_at_once(left: dict[str, SolverAnswer]) -> bool:
     """Whether the call fails for two distant spheres just as for two that overlap, before it moves
     any: it fails before it compares distances."""
     return all(bool(left[name].failed) and not moved(left, name) for name in (FAR, SHOWN["2"]))
 
 
-def doubtful(left: dict[str, Answer]) -> list[str]:
+def doubtful(left: dict[str, SolverAnswer]) -> list[str]:
     """The questions to repeat with more time: those whose call failed before it moved a sphere,
     except overlapping pairs that only judge (a).
 
@@ -118,13 +118,13 @@ def apart(name: str) -> bool:
     return bool(np.hypot(*np.subtract(a.x, b.x)) > a.r + b.r)
 
 
-def moved(left: dict[str, Answer], name: str) -> bool:
+def moved(left: dict[str, SolverAnswer], name: str) -> bool:
     """Whether the call of a question has changed a position."""
     before, after = QUESTIONS[name].balls, left[name].balls
     return bool(after) and not np.array_equal([b.x for b in before], [b.x for b in after[-1]])
 
 
-def beyond_detection(part: str, detection: list[CheckRow], left: dict[str, Answer]) -> str:
+def beyond_detection(part: str, detection: list[CheckRow], left: dict[str, SolverAnswer]) -> str:
     """The part that fails; a part that gives right results does not, whatever was read before the
     failure."""
     if part != "2a" or any(row.verdict == "fault" for row in detection):

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
-from reports.check.questions import QUESTIONS, Answer, Ball
+from reports.check.questions import QUESTIONS, Ball, SolverAnswer
 from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
@@ -15,7 +15,7 @@ MAY_FAIL = ("same centre",)  # judged by its own row
 
 
 def implemented(
-    task: str, there: bool, answers: dict[str, Answer], text: str
+    task: str, there: bool, answers: dict[str, SolverAnswer], text: str
 ) -> tuple[list[CheckRow], bool]:
     """The rows on the function of a task and its arguments, and whether further checks are
     possible."""
@@ -37,14 +37,14 @@ def implemented(
     return [arguments(task, function, answers.values())], True
 
 
-def failed_calls(answers: dict[str, Answer]) -> dict[str, Answer]:
+def failed_calls(answers: dict[str, SolverAnswer]) -> dict[str, SolverAnswer]:
     """The answers of failed calls, among those from which a right function returns."""
     return {
         name: answer for name, answer in answers.items() if answer.failed and name not in MAY_FAIL
     }
 
 
-def failure(task: str, part: str, answers: dict[str, Answer]) -> CheckRow:
+def failure(task: str, part: str, answers: dict[str, SolverAnswer]) -> CheckRow:
     """The fault of a function that fails in a part of its task."""
     failed = failed_calls(answers)
     got = f"it fails in {len(failed)} of {len(answers)} calls"
@@ -61,7 +61,7 @@ def not_implemented(task: str, got: str, cause: str) -> CheckRow:
 
 
 def same_again(
-    function: str, answers: dict[str, Answer], others: dict[str, Answer]
+    function: str, answers: dict[str, SolverAnswer], others: dict[str, SolverAnswer]
 ) -> list[CheckRow]:
     """A fault if answers depend on earlier questions, in the part of the task that they affect;
     else nothing. `others`: the answers that differ."""
@@ -90,10 +90,10 @@ def keeps_state(rows: Iterable[CheckRow]) -> bool:
     return any(row.name == SAME_AGAIN and row.verdict == "fault" for row in rows)
 
 
-def changed_part(answers: dict[str, Answer], others: dict[str, Answer]) -> str:
+def changed_part(answers: dict[str, SolverAnswer], others: dict[str, SolverAnswer]) -> str:
     """The part of task 2 whose outcome depends on earlier calls."""
 
-    def differs(read: Callable[[Answer], object]) -> bool:
+    def differs(read: Callable[[SolverAnswer], object]) -> bool:
         return any(
             not near(read(answers[name]), read(other))
             for name, other in others.items()
@@ -115,7 +115,7 @@ def similar_name(function: str, text: str) -> str:
     return f", but {meant}" if meant else ""
 
 
-def why_unchanged(function: str, answers: Iterable[Answer]) -> str:
+def why_unchanged(function: str, answers: Iterable[SolverAnswer]) -> str:
     """A likely reason why nothing changed."""
     answers = list(answers)
     if any(answer.returned for answer in answers):
@@ -128,7 +128,7 @@ def why_unchanged(function: str, answers: Iterable[Answer]) -> str:
     return f"not implemented: {function} does nothing"
 
 
-def arguments(task: str, function: str, answers: Iterable[Answer]) -> CheckRow:
+def arguments(task: str, function: str, answers: Iterable[SolverAnswer]) -> CheckRow:
     """Whether only the given spheres are changed, and only fields that they have."""
     answers = list(answers)
     strange = sorted({name for answer in answers for name in answer.strange})

@@ -16,7 +16,7 @@ import numpy as np
 
 from reports.check.collisions import Impulse, PairCollision, changes, collision_of
 from reports.check.parts import Change, components, scalar_products
-from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
+from reports.check.questions import COLLISIONS, QUESTIONS, SolverAnswer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import near
 from scenarios.model import Array
@@ -231,7 +231,7 @@ MASSLESS: dict[str, Impulse] = {
 
 
 @dataclass(frozen=True)
-class Finding:
+class CollisionExplanation:
     """The explanation of a file's collisions.
 
     Attributes:
@@ -254,7 +254,9 @@ class Finding:
         return self.impulse or self.update
 
 
-def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | None:
+def explain(
+    answers: dict[str, SolverAnswer], restitution: Restitution
+) -> CollisionExplanation | None:
     """The impulse and the update that reproduce every collision, with the fewest mistakes; None if
     none do."""
     seen = [
@@ -270,7 +272,7 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
         if (found := fitting(one, seen, e)) is None and (
             slips := components(seen, IMPULSES[""], e)
         ) is not None:
-            found = Finding("", slips[0], "2d", e, IMPULSES[""], slips[1])
+            found = CollisionExplanation("", slips[0], "2d", e, IMPULSES[""], slips[1])
         found = found or without_masses(seen, e)
         if found := found or fitting(product(impulses, UPDATES), seen, e):
             wrong_way = found.impulse == NEVER and impulse_if_separating(answers, e)
@@ -280,7 +282,7 @@ def explain(answers: dict[str, Answer], restitution: Restitution) -> Finding | N
 
 def fitting(
     pairs: Iterable[tuple[str, str]], seen: Sequence[tuple[PairCollision, Array]], e: float
-) -> Finding | None:
+) -> CollisionExplanation | None:
     """The first impulse and update of `pairs` that reproduce every collision."""
     with np.errstate(all="ignore"):
         for impulse, update in pairs:
@@ -290,21 +292,23 @@ def fitting(
             # approach then leave them unchanged.
             ended = [impulse != "" and near(changed, 0.0) for _, changed in seen]
             if any(right) and all(np.logical_or(right, ended)):
-                return Finding(impulse, update, row.task, e, law, row.change)
+                return CollisionExplanation(impulse, update, row.task, e, law, row.change)
     return None
 
 
-def without_masses(seen: Sequence[tuple[PairCollision, Array]], e: float) -> Finding | None:
+def without_masses(
+    seen: Sequence[tuple[PairCollision, Array]], e: float
+) -> CollisionExplanation | None:
     """The mistake of `MASSLESS` that reproduces every collision: one, though J and the update are
     both wrong."""
     change = UPDATES["the impulse is not divided by the masses"].change
     for mistake, law in MASSLESS.items():
         if all(near(change(h, law(h, e), e), changed, 0.1) for h, changed in seen):
-            return Finding(mistake, "", "2d", e, law, change)
+            return CollisionExplanation(mistake, "", "2d", e, law, change)
     return None
 
 
-def impulse_if_separating(answers: dict[str, Answer], e: float) -> bool:
+def impulse_if_separating(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether pairs that move apart get the impulse of the printed formula."""
     for name in SEPARATING:
         h, changed = (

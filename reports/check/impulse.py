@@ -9,8 +9,15 @@ import numpy as np
 
 from adapters.own_solver.restitution import EXERCISE
 from reports.check.collisions import PairCollision, changes, collision_of
-from reports.check.impacts import IMPULSES, MASSLESS, SEPARATING, UPDATES, Finding, tangent
-from reports.check.questions import COLLISIONS, QUESTIONS, Answer, finite
+from reports.check.impacts import (
+    IMPULSES,
+    MASSLESS,
+    SEPARATING,
+    UPDATES,
+    CollisionExplanation,
+    tangent,
+)
+from reports.check.questions import COLLISIONS, QUESTIONS, SolverAnswer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -32,7 +39,7 @@ class CollisionCase:
 
     pair: PairCollision
     after: Array
-    found: Finding | None
+    found: CollisionExplanation | None
     e: float
     impulse: str
     update: str
@@ -86,7 +93,7 @@ class CollisionCase:
 
 
 def impulse_rows(
-    answers: dict[str, Answer], restitution: Restitution, found: Finding | None
+    answers: dict[str, SolverAnswer], restitution: Restitution, found: CollisionExplanation | None
 ) -> list[CheckRow]:
     """The rows of (c) and (d)."""
     if not finite(answers, "v"):
@@ -110,7 +117,7 @@ def impulse_rows(
     ]
 
 
-def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
+def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     """The row of (c) if the function fails in (d). J is right if in every collision one of the
     spheres got it before the failure; restitution and energy then need no rows. Otherwise J is not
     known: no row."""
@@ -138,7 +145,7 @@ def asked_of_impulse(pair: PairCollision) -> str:
 
 
 def case_to_show(
-    answers: dict[str, Answer], restitution: Restitution, found: Finding | None
+    answers: dict[str, SolverAnswer], restitution: Restitution, found: CollisionExplanation | None
 ) -> CollisionCase:
     """The collision to show, with the mistakes in it."""
     e = found.e if found else restitution.own
@@ -156,7 +163,7 @@ def case_to_show(
     )
 
 
-def opposite_impulses(answers: dict[str, Answer]) -> bool:
+def opposite_impulses(answers: dict[str, SolverAnswer]) -> bool:
     """Whether every pair keeps its momentum, whichever sphere is called A."""
     for name in (*COLLISIONS, *map(swapped, COLLISIONS)):
         balls, (a, b) = QUESTIONS[name].balls, changes(QUESTIONS[name].balls, answers[name].last)
@@ -249,7 +256,7 @@ def momentum(case: CollisionCase) -> CheckRow:
     )
 
 
-def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
+def no_number(answers: dict[str, SolverAnswer], e: float) -> list[CheckRow]:
     """The only row if velocities are not numbers: nothing else can be judged."""
     if not finite(answers, "x"):
         why = "the positions become NaN or infinite before it"
@@ -293,7 +300,7 @@ def no_number(answers: dict[str, Answer], e: float) -> list[CheckRow]:
     ]
 
 
-def partly(answers: dict[str, Answer], e: float) -> str:
+def partly(answers: dict[str, SolverAnswer], e: float) -> str:
     """A cause if no single mistake explains all collisions: the order of A and B matters, only the
     tangential part is wrong, or some collisions are right; else ""."""
     if not alike_if_swapped(answers):
@@ -310,7 +317,7 @@ def partly(answers: dict[str, Answer], e: float) -> str:
 FRICTION = "the velocities along the tangent are changed, too: the exercise has no friction"
 
 
-def only_across(answers: dict[str, Answer], e: float) -> bool:
+def only_across(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether the impulse along the normal is right in every collision, and momentum is kept."""
     for name, question in COLLISIONS.items():
         h = collision_of(question.balls, answers[name].last)
@@ -323,7 +330,7 @@ def only_across(answers: dict[str, Answer], e: float) -> bool:
     return True
 
 
-def wrong_collisions(answers: dict[str, Answer], e: float) -> list[str]:
+def wrong_collisions(answers: dict[str, SolverAnswer], e: float) -> list[str]:
     """The questions of `COLLISIONS` whose velocities differ from the formula."""
     wrong = []
     for name, question in COLLISIONS.items():
@@ -343,7 +350,9 @@ def energy(collision: PairCollision, changed: Array) -> float:
     return float(collision.ma * va @ va + collision.mb * vb @ vb - before) / 2
 
 
-def separating(answers: dict[str, Answer], found: Finding | None, e: float) -> CheckRow:
+def separating(
+    answers: dict[str, SolverAnswer], found: CollisionExplanation | None, e: float
+) -> CheckRow:
     """The row on pairs that move apart: no impulse, or that of the printed formula; the choice is
     free."""
     asked = "Which impulse acts on a pair that overlaps and moves apart?"
@@ -376,7 +385,9 @@ UNALIKE = "the result depends on which sphere is A: the two are not treated alik
 FIRST = next(iter(COLLISIONS))
 
 
-def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(COLLISIONS)) -> bool:
+def alike_if_swapped(
+    answers: dict[str, SolverAnswer], asked: Iterable[str] = tuple(COLLISIONS)
+) -> bool:
     """Whether the velocities after each of these collisions do not depend on which sphere is A."""
     return all(
         near([b.v for b in answers[name].last], [b.v for b in answers[swapped(name)].last])
@@ -384,7 +395,7 @@ def alike_if_swapped(answers: dict[str, Answer], asked: Iterable[str] = tuple(CO
     )
 
 
-def symmetry(answers: dict[str, Answer], case: CollisionCase) -> CheckRow:
+def symmetry(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRow:
     """The velocities must not depend on which sphere is A. If both get opposite impulses, (d) is
     right, and the impulse depends on it."""
     first = next((name for name in COLLISIONS if not alike_if_swapped(answers, [name])), FIRST)
@@ -400,7 +411,7 @@ def symmetry(answers: dict[str, Answer], case: CollisionCase) -> CheckRow:
     )
 
 
-def quantities_kept(answers: dict[str, Answer]) -> CheckRow:
+def quantities_kept(answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on force, angle, spin, mass and size, which a collision without friction does not
     change."""
     words = {

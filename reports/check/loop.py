@@ -9,7 +9,14 @@ import numpy as np
 
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import SolverProcess
-from reports.check.questions import LIMIT, Answer, Ball, Question, ask_in_two_orders, fresh_world
+from reports.check.questions import (
+    LIMIT,
+    Ball,
+    Question,
+    SolverAnswer,
+    ask_in_two_orders,
+    fresh_world,
+)
 from reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
@@ -67,7 +74,7 @@ def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None
     return start, None
 
 
-def step_rows(asked: dict[str, Question], answers: dict[str, Answer]) -> list[CheckRow]:
+def step_rows(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     """The rows of a step whose functions are right."""
     itself = against_itself(asked["free"], answers)
     if itself and itself.verdict == "fault":
@@ -129,7 +136,7 @@ def parked(n: int) -> tuple[Ball, ...]:
     )
 
 
-def integrated(question: Question, answers: dict[str, Answer]) -> CheckRow:
+def integrated(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on integration: every sphere moves as by one call of the file's own integrate."""
     asked = "Does a step integrate every sphere once?"
     after, end = answers["free"].last, answers["alone"].last[0]
@@ -148,7 +155,7 @@ def integrated(question: Question, answers: dict[str, Answer]) -> CheckRow:
     return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
 
 
-def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str:
+def integration_cause(k: int, before: Ball, after: Ball, watched: SolverAnswer) -> str:
     """The likely cause if a step does not integrate sphere `k` exactly once."""
     steps = [call[2] for call in watched.calls if call[:2] == ("integrate", k)]
     if near(after.v, before.v):
@@ -160,7 +167,7 @@ def integration_cause(k: int, before: Ball, after: Ball, watched: Answer) -> str
     return "performSimStep integrates more than once, or not by dt"
 
 
-def against_itself(question: Question, answers: dict[str, Answer]) -> CheckRow | None:
+def against_itself(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow | None:
     """The row on a sphere that is passed to the collision function twice; None if none is.
 
     No two spheres are near each other here, so a sphere that changes has collided with itself.
@@ -185,7 +192,7 @@ def is_with_itself(call: tuple[Any, ...]) -> bool:
     return bool(call[0] == "collide" and call[1] == call[2] >= 0)
 
 
-def pairs(asked: dict[str, Question], answers: dict[str, Answer]) -> CheckRow:
+def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on pairs: every overlapping pair collides, and no other sphere changes."""
     silent, others = [], []
     for name, question in asked.items():
@@ -220,12 +227,12 @@ def pairs(asked: dict[str, Question], answers: dict[str, Answer]) -> CheckRow:
     )
 
 
-def struck_in(question: Question, answer: Answer) -> set[int]:
+def struck_in(question: Question, answer: SolverAnswer) -> set[int]:
     """The spheres whose velocities a step without forces changes."""
     return {k for k, (b, a) in enumerate(zip(question.balls, answer.last)) if not near(a.v, b.v)}
 
 
-def integration_first(asked: dict[str, Question], answers: dict[str, Answer]) -> CheckRow:
+def integration_first(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on order: a pair that touches only at the end of a step collides in it if all spheres
     are integrated first."""
     missed = [
@@ -244,7 +251,7 @@ def integration_first(asked: dict[str, Question], answers: dict[str, Answer]) ->
     )
 
 
-def wrapping(question: Question, answer: Answer, alone: Answer) -> CheckRow:
+def wrapping(question: Question, answer: SolverAnswer, alone: SolverAnswer) -> CheckRow:
     """The row on the edges in a step: a sphere beyond an edge ends where projectObjects puts it.
     All spheres are at rest, so that nothing else moves them."""
     wrong = [k for k, (a, b) in enumerate(zip(answer.last, alone.last)) if not near(a.x, b.x)]
@@ -270,7 +277,7 @@ def name_of(*spheres: int) -> str:
 
 
 def edges(
-    question: Question, answer: Answer, start: list[list[float]], ufo: bool
+    question: Question, answer: SolverAnswer, start: list[list[float]], ufo: bool
 ) -> list[CheckRow]:
     """The rows on projectObjects: an asteroid beyond an edge enters at the opposite one; a ufo that
     leaves is set back to its start."""

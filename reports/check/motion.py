@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.check.questions import QUESTIONS, Answer, Ball
+from reports.check.questions import QUESTIONS, Ball, SolverAnswer
 from reports.check.rows import CheckRow, Law, follows, judged, near, shown
 from scenarios.model import Array
 
@@ -124,7 +124,7 @@ MOVED: dict[str, Law] = {
 }
 
 
-def motion_rows(answers: dict[str, Answer]) -> list[CheckRow]:
+def motion_rows(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     """The rows of task 1, for a function whose calls do not fail."""
     seen = [
         (QUESTIONS[name].balls[0], QUESTIONS[name].calls[0][2], answers[name].last[0])
@@ -246,7 +246,7 @@ def damped(given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:
     return None
 
 
-def turning(answers: dict[str, Answer]) -> CheckRow:
+def turning(answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on an angle beyond half a turn: it may be reduced by whole turns, a free choice."""
     seen = [(QUESTIONS[name], answers[name].last[0]) for name in TURNED]
     ways = [
@@ -279,7 +279,7 @@ def coasting(before: Ball, after: Ball, mistake: str) -> CheckRow:
     )
 
 
-def lasting(answer: Answer) -> CheckRow:
+def lasting(answer: SolverAnswer) -> CheckRow:
     """The row on force and torque, which stay until the keys change them."""
     before, after = QUESTIONS["force twice"].balls[0], answer.last[0]
     right = near(after.F, before.F) and near(after.torque, before.torque)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.own_solver.restitution import EXERCISE
-from reports.check.impacts import BACKWARDS, HALF_TURNED, Finding
-from reports.check.questions import COLLISIONS, QUESTIONS, Answer, Ball, direction, finite
+from reports.check.impacts import BACKWARDS, HALF_TURNED, CollisionExplanation
+from reports.check.questions import COLLISIONS, QUESTIONS, Ball, SolverAnswer, direction, finite
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
 
@@ -72,7 +72,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 }
 
 
-def moved_together(answers: dict[str, Answer]) -> bool:
+def moved_together(answers: dict[str, SolverAnswer]) -> bool:
     """Whether colliding pairs are moved into each other."""
     shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
@@ -92,7 +92,7 @@ DISPLACED = ("at rest to each other", "separate", *COLLISIONS)  # the questions 
 TAKEN_TO_BE_APART = "the file takes the overlapping pairs of these questions not to collide"
 
 
-def reacts(answers: dict[str, Answer]) -> bool:
+def reacts(answers: dict[str, SolverAnswer]) -> bool:
     """Whether the function reacts to every colliding pair; a failure is a reaction."""
     return all(
         answers[name].failed
@@ -103,7 +103,7 @@ def reacts(answers: dict[str, Answer]) -> bool:
     )
 
 
-def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
+def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     """The rows of (b) if the function fails later, from the positions at the failure."""
     if not reacts(answers):
         return [not_asked("one point", "2b", TAKEN_TO_BE_APART)]
@@ -115,7 +115,7 @@ def rows_before_failure(answers: dict[str, Answer]) -> list[CheckRow]:
     return projection_rows(answers, None)
 
 
-def displaced(before: tuple[Ball, ...], answer: Answer) -> bool:
+def displaced(before: tuple[Ball, ...], answer: SolverAnswer) -> bool:
     """Whether a failed call had finished the displacement of a pair: the pair is in the right
     place, or all four coordinates changed. Otherwise the failure may have come in between."""
     if not answer.failed:
@@ -130,7 +130,9 @@ def in_one_point(shift: Shift) -> bool:
     return near(shift.a + shift.b, shift.overlap, 0.1) and near(shift.across, 0.0, 0.1)
 
 
-def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[CheckRow]:
+def projection_rows(
+    answers: dict[str, SolverAnswer], found: CollisionExplanation | None
+) -> list[CheckRow]:
     """The rows of (b); `found`: the explanation of the velocities."""
     seen = [
         (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
@@ -170,7 +172,7 @@ def projection_rows(answers: dict[str, Answer], found: Finding | None) -> list[C
     return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
 
 
-def at_rest(answers: dict[str, Answer], explained: bool) -> list[CheckRow]:
+def at_rest(answers: dict[str, SolverAnswer], explained: bool) -> list[CheckRow]:
     """The row on a pair at relative rest, whose displacement must not change a velocity. None if a
     mistake in the impulse explains the change, or velocities are not numbers."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
@@ -341,7 +343,7 @@ ONE = (
 )
 
 
-def separation(answer: Answer) -> CheckRow:
+def separation(answer: SolverAnswer) -> CheckRow:
     """The row on a pair that overlaps and moves apart: whether to displace it is a free choice."""
     shift = shift_of(QUESTIONS["separate"].balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9

@@ -79,7 +79,7 @@ class Question(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Answer:
+class SolverAnswer:
     """The answer to a question.
 
     Attributes:
@@ -206,11 +206,11 @@ QUESTIONS = questions()
 
 def ask(
     process: SolverProcess, asked: dict[str, Question], afresh: bool = False
-) -> dict[str, Answer]:
+) -> dict[str, SolverAnswer]:
     """The answers by name; `afresh`: ask each question in a fresh world, else all in the present
     one. Raises `SolverFailed` if the process is lost."""
     before = fresh_world(process) if afresh else []
-    answers: dict[str, Answer] = {}
+    answers: dict[str, SolverAnswer] = {}
     # One request for all: the worker does not repeat a call that did not return.
     for names in batched(asked, TOGETHER if afresh else len(asked)):
         requests: list[Request] = []
@@ -236,7 +236,7 @@ def fresh_world(process: SolverProcess) -> list[Request]:
 
 def ask_in_two_orders(
     process: SolverProcess, asked: dict[str, Question]
-) -> tuple[dict[str, Answer], dict[str, Answer]]:
+) -> tuple[dict[str, SolverAnswer], dict[str, SolverAnswer]]:
     """The answer to each question in a fresh world, and the answers that differ after other
     questions.
 
@@ -266,7 +266,7 @@ def ask_in_two_orders(
 BY_CHANCE = ("same centre",)  # without a normal a solver may choose one at random
 
 
-def alike(one: Answer, other: Answer) -> bool:
+def alike(one: SolverAnswer, other: SolverAnswer) -> bool:
     """Whether two answers agree about the spheres."""
     if bool(one.failed) != bool(other.failed) or len(one.balls) != len(other.balls):
         return False
@@ -276,20 +276,20 @@ def alike(one: Answer, other: Answer) -> bool:
     return np.allclose(first, second, rtol=TOLERANCE, atol=TOLERANCE, equal_nan=True)
 
 
-def was_stopped(answers: dict[str, Answer]) -> bool:
+def was_stopped(answers: dict[str, SolverAnswer]) -> bool:
     """Whether a call had to be stopped; it would have to be stopped again."""
     return any(
         answer.failed and answer.failed.kind in ("timeout", "memory") for answer in answers.values()
     )
 
 
-def answered(reply: dict[str, Any] | SolverFailed) -> Answer:
+def answered(reply: dict[str, Any] | SolverFailed) -> SolverAnswer:
     """The answer from a reply of the worker."""
     if isinstance(reply, SolverFailed):
-        return Answer([], failed=reply)
+        return SolverAnswer([], failed=reply)
     failed = None if reply["error"] is None else SolverFailed(**reply["error"])
     balls = [[ball(numbers) for numbers in state] for state in reply["states"]]
-    return Answer(
+    return SolverAnswer(
         balls,
         reply["returned"],
         reply["strayed"],
@@ -307,13 +307,13 @@ def direction(a: Ball, b: Ball) -> tuple[Array, float]:
     return r / distance, distance
 
 
-def finite(answers: dict[str, Answer], part: str) -> bool:
+def finite(answers: dict[str, SolverAnswer], part: str) -> bool:
     """Whether "x" or "v" of both spheres is a number after every collision."""
     return bool(
         np.isfinite([getattr(b, part) for name in COLLISIONS for b in answers[name].last]).all()
     )
 
 
-def named(answers: dict[str, Answer], prefix: str) -> Iterator[tuple[Question, Answer]]:
+def named(answers: dict[str, SolverAnswer], prefix: str) -> Iterator[tuple[Question, SolverAnswer]]:
     """The questions whose names start with `prefix`, with their answers."""
     return ((QUESTIONS[name], answers[name]) for name in answers if name.startswith(prefix))

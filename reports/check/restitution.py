@@ -13,7 +13,7 @@ from adapters.own_solver.restitution import (
     own_restitution,
     separation,
 )
-from reports.check.questions import QUESTIONS, Answer
+from reports.check.questions import QUESTIONS, SolverAnswer
 from reports.check.rows import FOLLOWS, CheckRow, judged, near, shown
 
 
@@ -127,7 +127,7 @@ class Restitution:
         return replace(row, verdict="follows", cause=FOLLOWS) if alike and not right else row
 
 
-def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
+def restitution_of(text: str, answers: dict[str, SolverAnswer]) -> Restitution:
     """The `Restitution` from the file's text and its collisions."""
     measured, slow, fast = (
         restitution_in(answers[name], name) for name in ("even", "slow", "fast")
@@ -136,7 +136,7 @@ def restitution_of(text: str, answers: dict[str, Answer]) -> Restitution:
     return Restitution(own_restitution(text, measured), out_of_range, slow, fast)
 
 
-def restitution_in(answer: Answer, name: str) -> float:
+def restitution_in(answer: SolverAnswer, name: str) -> float:
     """The e of the head-on pair of a question; NaN if the call failed."""
     if answer.failed or not answer.balls:
         return float("nan")

@@ -13,7 +13,7 @@ from reports.terminal.exits import refuse, say
 KINDS = Path(__file__).parent / "autograder"
 
 
-class Kind(NamedTuple):
+class ScaffoldKind(NamedTuple):
     """A kind of scaffold: the remaining steps by hand, and the path of the points in the folder."""
 
     next: str
@@ -21,16 +21,16 @@ class Kind(NamedTuple):
 
 
 SCAFFOLDS = {
-    "gradescope": Kind(
+    "gradescope": ScaffoldKind(
         "Now, where the project is: uv build --wheel --out-dir {folder}; then zip what is in"
         " {folder}, and upload the zip to Gradescope."
     ),
-    "classroom": Kind(
+    "classroom": ScaffoldKind(
         "Now, where the project is: uv build --wheel --out-dir {folder}/.grading; then copy"
         " {folder}/.github and {folder}/.grading into the template repository of the assignment.",
         ".grading/tasks.toml",
     ),
-    "prairielearn": Kind(
+    "prairielearn": ScaffoldKind(
         "Now, where the project is: uv build --wheel --out-dir {folder}/image; then docker build"
         " --platform linux/amd64 -t YOUR/IMAGE {folder}/image, push it, write its name into"
         " {folder}/question/info.json, and copy {folder}/question into the questions of the"

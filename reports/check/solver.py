@@ -24,7 +24,7 @@ from reports.check.projection import (
     projection_rows,
     reacts,
 )
-from reports.check.questions import QUESTIONS, Answer, ask_in_two_orders, was_stopped
+from reports.check.questions import QUESTIONS, SolverAnswer, ask_in_two_orders, was_stopped
 from reports.check.restitution import Restitution, restitution_of
 from reports.check.rows import CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
@@ -141,7 +141,10 @@ def loads(process: SolverProcess) -> CheckRow:
 
 
 def task_1(
-    process: SolverProcess, answers: dict[str, Answer], others: dict[str, Answer], text: str
+    process: SolverProcess,
+    answers: dict[str, SolverAnswer],
+    others: dict[str, SolverAnswer],
+    text: str,
 ) -> list[CheckRow]:
     """The rows of integrate; `others`: the answers that differ after other questions."""
     mine = {name: answer for name, answer in answers.items() if name in MOTION}
@@ -153,8 +156,8 @@ def task_1(
 
 def task_2(
     process: SolverProcess,
-    answers: dict[str, Answer],
-    others: dict[str, Answer],
+    answers: dict[str, SolverAnswer],
+    others: dict[str, SolverAnswer],
     source: Source,
     with_beside: str,
 ) -> tuple[list[CheckRow], Restitution | None]:

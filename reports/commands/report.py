@@ -97,7 +97,7 @@ def medians(
     return ["engine", *map(heading, columns)], rows, without
 
 
-def heading(column: overview.Column) -> str:
+def heading(column: overview.SummaryColumn) -> str:
     """The title of a column above its unit, in lines short enough for 80 columns."""
     title = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
     return f"{title}\n{column.short}"

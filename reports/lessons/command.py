@@ -17,7 +17,7 @@ from reports.lessons.lesson import Lesson
 from reports.lessons.pages import ALONE, FILES, Links, answer_json, index_page, offline
 from reports.run.arguments import unknown
 from reports.run.folders import made_anew, place_of
-from reports.run.made import Kind, may_overwrite, sealed, writing
+from reports.run.made import FolderKind, may_overwrite, sealed, writing
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
 from reports.terminal.exits import FAILED, FolderTaken, refuse, say
@@ -26,7 +26,7 @@ from reports.terminal.progress import Progress
 
 # What a page of ours begins with, and nothing else does: it may be written over.
 MARK = b'<meta name="generator" content="crosscheck lesson">'
-ALL = Kind("crosscheck lesson")  # the folder of all of them
+ALL = FolderKind("crosscheck lesson")  # the folder of all of them
 
 # s that one setting of the sliders may take: the slowest needs some 5, once its engines are
 # compiled

@@ -28,7 +28,7 @@ from reports.stability.cases import CASES
 from reports.stability.explain import explained, with_replays
 from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
 from reports.stability.overview import bracket, why
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import VARIANTS
 from scenarios.model import Array, Scenario, Trajectory
 
@@ -89,14 +89,14 @@ def limits_of(name: str) -> list[Limit]:
     """The limits of a case on every engine, searched now, with their reasons, which engines with
     one change test."""
     case = CASES[name]
-    searches = [Search(case, engine, QUICK) for engine in engines_of(case)]
+    searches = [LimitSearch(case, engine, QUICK) for engine in engines_of(case)]
     return explained([with_replays(search, search.limit()) for search in searches])
 
 
 def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]:
     """All runs of an engine at a value, and of them the first that fails, or the first, which has
     the worst phase."""
-    search = Search(case, engine, QUICK)
+    search = LimitSearch(case, engine, QUICK)
     trial = search.trial(value, to_the_end=True)
     return trial, *(search.seen.get(value) or case.play(VARIANTS[engine], case.scene(value, 0)))
 

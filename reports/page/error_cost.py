@@ -28,7 +28,7 @@ MARGIN = 1 + BUSY  # costs closer than the accepted noise count as equal
 GOOD = "#1d8a63"  # the best corner, on a light and on a dark page
 
 
-class Clock(NamedTuple):
+class RunTimes(NamedTuple):
     """The times of a run.
 
     Attributes:
@@ -56,7 +56,7 @@ class Clock(NamedTuple):
         return ""
 
 
-NO_CLOCK = Clock(pd.DataFrame(columns=COLUMNS), noise_of([]), 0.0)
+NO_CLOCK = RunTimes(pd.DataFrame(columns=COLUMNS), noise_of([]), 0.0)
 
 
 class ErrorCost(NamedTuple):
@@ -77,7 +77,7 @@ class ErrorCost(NamedTuple):
     costs: Sequence[Mapping[str, Any]]
 
 
-def error_cost(scores: pd.DataFrame, clock: Clock, untrusted: Set[str]) -> ErrorCost | None:
+def error_cost(scores: pd.DataFrame, clock: RunTimes, untrusted: Set[str]) -> ErrorCost | None:
     """Error against cost from the scores of a run (columns `pooled.SCORES`) and its times, without
     the engines in `untrusted`; None if no scene has an exact answer."""
     trusted = scores[~scores.name.isin(untrusted)]
@@ -116,7 +116,7 @@ def title_of(scene: str, scenes: int) -> str:
     return f"all {scenes} scenes" if scene == POOLED else scene
 
 
-def caption(scenes: int, clock: Clock) -> str:
+def caption(scenes: int, clock: RunTimes) -> str:
     """The caption."""
     said = "A point is an engine at one step size"
     if scenes > 1:
@@ -142,7 +142,7 @@ def caption(scenes: int, clock: Clock) -> str:
     )
 
 
-def points(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
+def points(scores: pd.DataFrame, clock: RunTimes) -> pd.DataFrame:
     """A row for each scenario, engine and step size that was timed, or without times for each that
     was played: error in radii, and the columns of `with_times`; without times the cost is the
     number of steps per simulated second.
@@ -155,7 +155,7 @@ def points(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
     return timed.assign(idle=timed.idle.where(timed.cost.notna(), 0.0))
 
 
-def with_times(scores: pd.DataFrame, clock: Clock) -> pd.DataFrame:
+def with_times(scores: pd.DataFrame, clock: RunTimes) -> pd.DataFrame:
     """The rows of `scores` with engine, profile, cost and idle (what of it is the binding's), in µs
     per simulated second, and read, µs of a read-out: nan where that was not timed, or where no time
     is shown."""

@@ -52,8 +52,8 @@ class FirstScreen:
     error_cost_charts: Pictures
     no_times: str
     timed: Sequence[str]
-    answers: Sequence[situations.Answer]
-    whole: situations.Answer | None
+    answers: Sequence[situations.Recommendation]
+    whole: situations.Recommendation | None
     far_off: float
     pooled: Pictures
     charted: Sequence[str]
@@ -63,7 +63,7 @@ class FirstScreen:
 def first_screen(
     comparisons: Sequence[Comparison],
     untrusted: Set[str],
-    clock: error_cost.Clock,
+    clock: error_cost.RunTimes,
     findings: Sequence[str],
     said: Mapping[str, Sequence[str]],
 ) -> FirstScreen:

@@ -43,7 +43,7 @@ class OverviewCell(NamedTuple):
     worst_in: str = ""
 
 
-class Measured(NamedTuple):
+class TableNumber(NamedTuple):
     """A number of the tables: value, remark, and whether it is judged; if not, the remark says
     why."""
 
@@ -57,10 +57,10 @@ class Measured(NamedTuple):
         return number(self.value) if self.judged else NOT_JUDGED
 
 
-Found = dict[tuple[str, str], Measured]  # (`engine:profile`, metric) -> its number
+Found = dict[tuple[str, str], TableNumber]  # (`engine:profile`, metric) -> its number
 
 
-class Column(NamedTuple):
+class SummaryColumn(NamedTuple):
     """A column of the summary, lower is better: heading, unit, what it means in a line, and the
     unit in nine letters for a terminal."""
 
@@ -70,7 +70,7 @@ class Column(NamedTuple):
     short: str
 
 
-class Failure(NamedTuple):
+class FailedRuns(NamedTuple):
     """The runs of one engine that did not play a scenario to its end, for one reason."""
 
     name: str
@@ -79,32 +79,34 @@ class Failure(NamedTuple):
     steps: str
 
 
-SUMMARY: dict[str, Column] = {
-    MAPPED: Column(
+SUMMARY: dict[str, SummaryColumn] = {
+    MAPPED: SummaryColumn(
         "Position", "radii", "largest distance of any disk from its exact position", "radii"
     ),
-    "momentum_error": Column(
+    "momentum_error": SummaryColumn(
         "Momentum", "of Σ m|v|", "largest difference from the expected momentum", "of Σ m|v|"
     ),
-    "energy_error": Column(
+    "energy_error": SummaryColumn(
         "Energy",
         "of the energy at hand",
         "largest difference from the expected energy",
         "of energy",
     ),
-    "restitution_error": Column(
+    "restitution_error": SummaryColumn(
         "Restitution",
         "no unit",
         "largest |e measured − e of the scene| of any collision",
         "in e",
     ),
-    "wrong_collisions": Column(
+    "wrong_collisions": SummaryColumn(
         "Wrong collisions",
         "number",
         "missed and spurious collisions of a scene together",
         "number",
     ),
-    "failed": Column("Not played", "scenes", "refused, crashed, diverged or timed out", "scenes"),
+    "failed": SummaryColumn(
+        "Not played", "scenes", "refused, crashed, diverged or timed out", "scenes"
+    ),
 }
 
 
@@ -129,13 +131,13 @@ def values(comparison: Comparison) -> Found:
             when = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
             remark = ", ".join(filter(None, (where, when, str(row["note"]))))
             judged = not str(row["note"]).startswith(NOT_JUDGED)
-            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = Measured(
+            found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = TableNumber(
                 row["value"], remark, judged
             )
     return found
 
 
-def failures(comparison: Comparison) -> list[Failure]:
+def failures(comparison: Comparison) -> list[FailedRuns]:
     """Every run that is not "ok", those of one engine and reason together."""
     steps: dict[tuple[str, str, str], list[str]] = {}
     for run in comparison.runs:
@@ -143,7 +145,7 @@ def failures(comparison: Comparison) -> list[Failure]:
             outcome = OUTCOMES.get(run.status, run.status), run.reason
             key = (run.name, NO_FRICTION if not_modelled(outcome) else outcome[0], run.reason)
             steps.setdefault(key, []).append(number(run.dt))
-    return [Failure(*key, ", ".join(dts)) for key, dts in steps.items()]
+    return [FailedRuns(*key, ", ".join(dts)) for key, dts in steps.items()]
 
 
 def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
@@ -200,7 +202,7 @@ def summary(
 
 def with_numbers(
     rows: Mapping[str, list[OverviewCell]],
-) -> tuple[list[Column], dict[str, list[OverviewCell]]]:
+) -> tuple[list[SummaryColumn], dict[str, list[OverviewCell]]]:
     """The columns of `SUMMARY`, and the rows of `summary`, without those in which no engine has a
     number."""
     kept = [

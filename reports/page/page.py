@@ -34,7 +34,7 @@ def write_page(
     known_answers: pd.DataFrame,
     about: Mapping[str, Any],
     lessons: Mapping[str, Any],
-    clock: error_cost.Clock = error_cost.NO_CLOCK,
+    clock: error_cost.RunTimes = error_cost.NO_CLOCK,
     said: Mapping[str, Sequence[str]] = MappingProxyType({}),
     on_paper: Sequence[str] = (),
 ) -> None:

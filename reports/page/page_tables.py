@@ -37,7 +37,7 @@ class PageTables:
         metrics: name -> metric.
     """
 
-    columns: Mapping[str, overview.Column]
+    columns: Mapping[str, overview.SummaryColumn]
     summaries: Sequence[Summary]
     heat_map: Mapping[str, Sequence[overview.OverviewCell]]
     heat_bounds: Sequence[float]
@@ -82,7 +82,7 @@ class Summary(NamedTuple):
 
     title: str
     scenes: int
-    columns: Sequence[overview.Column]
+    columns: Sequence[overview.SummaryColumn]
     rows: Mapping[str, list[overview.OverviewCell]]
     groups: Mapping[str, list[str]]
 

@@ -16,7 +16,7 @@ from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.compare.laws import deviation
 from reports.page.documents import deflated
-from reports.page.error_cost import Clock
+from reports.page.error_cost import RunTimes
 from reports.page.overview import NO_FRICTION, OverviewCell
 from reports.page.replay import played
 from reports.page.sections import OWN
@@ -77,7 +77,7 @@ def panels(
     comparisons: Sequence[Comparison],
     names: Sequence[str],
     errors: Mapping[str, Sequence[OverviewCell]],
-    clock: Clock,
+    clock: RunTimes,
 ) -> Panels | None:
     """The panels of all scenes that any engine played; None if there is none, or a single engine.
 
@@ -130,7 +130,7 @@ def priority(
     return exact, played_by, timed, min(off, played_by - off)
 
 
-def costs_of(clock: Clock) -> dict[str, dict[tuple[str, float], float]]:
+def costs_of(clock: RunTimes) -> dict[str, dict[tuple[str, float], float]]:
     """scene -> (`engine:profile`, dt in s) -> µs of engine time per simulated second."""
     found: dict[str, dict[tuple[str, float], float]] = {}
     for row in [] if clock.fault else clock.table.to_dict("records"):

@@ -51,7 +51,7 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
 
 
 def drawings(
-    found: pd.DataFrame, answers: Sequence[situations.Answer], untrusted: Set[str]
+    found: pd.DataFrame, answers: Sequence[situations.Recommendation], untrusted: Set[str]
 ) -> dict[str, Drawing]:
     """The chart of `scores` without the engines in `untrusted`; {} if there is nothing to draw."""
     trusted = found[~found.name.isin(untrusted)]
@@ -64,7 +64,7 @@ def with_marks(drawings: Mapping[str, Drawing]) -> list[str]:
     return [t.name for t in traces if any(y is not None and np.isfinite(y) for y in t.y)]
 
 
-def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> Drawing:
+def by_situation(found: pd.DataFrame, answers: Sequence[situations.Recommendation]) -> Drawing:
     """A column for each situation, with a mark for each engine at the median of its errors."""
     names = list(dict.fromkeys(found.name))
     middle = found[found.middle]
@@ -98,7 +98,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Answer]) -> D
     )
 
 
-def column_of(answer: situations.Answer) -> str:
+def column_of(answer: situations.Recommendation) -> str:
     """The column of `SCORES` with the errors of a situation."""
     return "angle" if answer.unit == "rad" else "error"
 

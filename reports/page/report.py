@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from reports.compare.comparison import Comparison
-from reports.page.error_cost import Clock
+from reports.page.error_cost import RunTimes
 from reports.page.findings import findings, not_counted
 from reports.page.page import write_page
 from reports.run.archive import Archive
@@ -107,7 +107,7 @@ def made_report(
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds},
-        clock=Clock(tables.timed, noise_floor(archive), header["timings"]),
+        clock=RunTimes(tables.timed, noise_floor(archive), header["timings"]),
         lessons=lessons,
         said=said,
         on_paper=on_paper,

@@ -47,7 +47,7 @@ class ScenarioSection:
     dt: float
     off_grid: str
     fast: str
-    failures: list[overview.Failure]
+    failures: list[overview.FailedRuns]
     layers: list[tuple[str, Run | None]]
     replay: str
     frames: int

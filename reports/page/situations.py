@@ -115,7 +115,7 @@ class Ranked(NamedTuple):
     cost: float
 
 
-class Answer(NamedTuple):
+class Recommendation(NamedTuple):
     """A row of the table: the best engine for a situation, and the other engines.
 
     Attributes:
@@ -162,7 +162,7 @@ def grouped(names: Iterable[str]) -> dict[str, list[str]]:
 
 def answers(
     scores: pd.DataFrame, situations: Mapping[str, Sequence[str]], untrusted: Set[str]
-) -> list[Answer]:
+) -> list[Recommendation]:
     """A row for each situation that has a scene with an exact answer, and one for all scenes
     without friction if there are more.
 
@@ -172,7 +172,7 @@ def answers(
     """
     scores = scores[~scores.name.isin(untrusted)]
     rough = scores.scenario.map(lambda scene: FRICTION in situations[scene]).astype(bool)
-    rows: list[Answer] = []
+    rows: list[Recommendation] = []
     for title, meaning in SITUATIONS.items():
         of_kind = scores[rough if title == FRICTION else ~rough]
         members = [s for s in dict.fromkeys(of_kind.scenario) if title in [*situations[s], ALL]]
@@ -189,7 +189,7 @@ def answers(
     return rows
 
 
-def whole(rows: Sequence[Answer]) -> Answer | None:
+def whole(rows: Sequence[Recommendation]) -> Recommendation | None:
     """The row of `answers` for all scenes without friction, or the last row."""
     smooth = [row for row in rows if row.title != FRICTION]
     return next(reversed(smooth or rows), None)
@@ -202,7 +202,7 @@ def answer(
     here: pd.DataFrame,
     groups: Mapping[str, Sequence[str]],
     ranked: Sequence[str],
-) -> Answer:
+) -> Recommendation:
     """The row of one situation, from the scores of its scenes."""
 
     def in_order(names: Iterable[str]) -> list[Ranked]:
@@ -216,7 +216,7 @@ def answer(
         if engine != best.name.split(":")[0]:
             others.setdefault(engine, one)
     own = in_order(groups.get(OWN, []))
-    return Answer(
+    return Recommendation(
         title,
         meaning,
         unit,

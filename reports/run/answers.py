@@ -21,16 +21,16 @@ from scenarios.no_truth import NoTruth, answered
 from scenarios.regular import opened
 from scenarios.truth.cache import UNREADABLE, packed, unpacked
 from scenarios.truth.exact import CLOSED_FORM, OracleTruth
-from scenarios.truth.oracle.work import Clock
+from scenarios.truth.oracle.work import TimeLimit
 from scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"
 # share of the time limit; computing the horizon takes up to three quarters as long as the events
 FOR_EVENTS = 0.5
-SAID = "answer.json"  # the member of an .npz file that holds the rest of the `Answer`
+SAID = "answer.json"  # the member of an .npz file that holds the rest of the `ExactAnswer`
 
 
-class Answer(NamedTuple):
+class ExactAnswer(NamedTuple):
     """What is known about the exact answer to a scene.
 
     Attributes:
@@ -67,35 +67,35 @@ class Answer(NamedTuple):
         )
 
 
-def answer_of(scenario: Scenario) -> Answer:
+def answer_of(scenario: Scenario) -> ExactAnswer:
     """Compute the answer to a scenario; called in a worker."""
     scenario, truth = answered(scenario)
     if truth is None:
-        return Answer(None, NONE, scenario.without_truth)
-    return Answer(
+        return ExactAnswer(None, NONE, scenario.without_truth)
+    return ExactAnswer(
         scenario.truth.record() if isinstance(scenario.truth, OracleTruth) else None, OK, ""
     )
 
 
-def answer_here(folder: Path, records: Records) -> Answer:
+def answer_here(folder: Path, records: Records) -> ExactAnswer:
     """Compute the exact answer to a scene; called in a worker."""
     return answer_of(scenario_of(folder, records))
 
 
-def no_answer(failure: Failure, timeout: float) -> Answer:
+def no_answer(failure: Failure, timeout: float) -> ExactAnswer:
     """The answer of a worker that failed, or took longer than `timeout` s."""
     if failure.status == "timeout":
-        return Answer(
+        return ExactAnswer(
             None,
             failure.status,
             f"the exact answer took longer than {timeout:g} s (--timeout)",
             timeout,
         )
     reason = f"the exact answer could not be computed: {failure.status}: {failure.reason}"
-    return Answer(None, failure.status, reason, timeout)
+    return ExactAnswer(None, failure.status, reason, timeout)
 
 
-def put_answer(path: Path, answer: Answer) -> None:
+def put_answer(path: Path, answer: ExactAnswer) -> None:
     """Write an answer atomically."""
     whole = io.BytesIO(b"" if answer.record is None else packed(vars(answer.record)))
     with ZipFile(whole, "a") as file:
@@ -111,7 +111,7 @@ def digest_of(file: ZipFile, name: str, said: list[Any]) -> str:
     return digest(b"\0".join([json.dumps([name, said, inside]).encode(), *map(file.read, inside)]))
 
 
-def read_answer(path: Path) -> Answer | None:
+def read_answer(path: Path) -> ExactAnswer | None:
     """What `put_answer` wrote; None if the file is missing or its digest differs."""
     try:
         with opened(path) as there, ZipFile(there) as file:
@@ -123,7 +123,7 @@ def read_answer(path: Path) -> Answer | None:
         return (
             None
             if whole and fields is None
-            else Answer(TruthRecord(**fields) if fields else None, *said)
+            else ExactAnswer(TruthRecord(**fields) if fields else None, *said)
         )
     except UNREADABLE:
         return None
@@ -137,12 +137,12 @@ def record_here(scene: str, seed: int, timeout: float) -> TruthRecord | str:
     """
     reason = f"the limit of {timeout:g} s was reached (a longer --timeout gives more)"
     try:
-        return record_of(open_scene(scene, seed), Clock(FOR_EVENTS * timeout, reason))
+        return record_of(open_scene(scene, seed), TimeLimit(FOR_EVENTS * timeout, reason))
     except NoTruth as refusal:
         return str(refusal)
 
 
-def record_of(scenario: Scenario, clock: Clock | None = None) -> TruthRecord:
+def record_of(scenario: Scenario, clock: TimeLimit | None = None) -> TruthRecord:
     """The oracle's record until the `clock` stops it, or the collisions of a closed form as a
     record. Raises `NoTruth`."""
     if isinstance(scenario.truth, OracleTruth):

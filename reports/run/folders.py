@@ -13,7 +13,7 @@ from reports.run.archive import Archive
 from reports.run.journal import JOURNAL, Busy, Journal
 from reports.run.made import (
     MADE,
-    Kind,
+    FolderKind,
     Made,
     foreign_file_in,
     may_replace,
@@ -24,7 +24,7 @@ from reports.run.made import (
 from reports.terminal.counts import counted
 from reports.terminal.exits import FolderTaken, deferring_signals
 
-RUN = Kind(
+RUN = FolderKind(
     "crosscheck run",
     r"journal\.jsonl|trajectories/[0-9a-f]{16}\.npz|compared/([a-z0-9_-]+-[0-9a-f]{16}\.(npz|csv)|deviations\.digest)",
     ("trajectories", "scenes", "compared"),
@@ -50,7 +50,7 @@ def place_of(out: Path, option: str = "--out") -> Path:
     return place
 
 
-def open_part(out: Path, kind: Kind) -> Journal:
+def open_part(out: Path, kind: FolderKind) -> Journal:
     """Open the journal of `out` in its OUT.part; raises as `may_replace`, or `OSError`."""
     part = part_of(out)
     may_replace(out, kind)
@@ -62,7 +62,7 @@ def open_part(out: Path, kind: Kind) -> Journal:
     return journal
 
 
-def may_be_part(part: Path, out: Path, kind: Kind, option: str = "--out") -> None:
+def may_be_part(part: Path, out: Path, kind: FolderKind, option: str = "--out") -> None:
     """Raise as `may_write`, and also if `part` holds a finished result."""
     may_write(part, kind, option)
     if not is_interrupted(part, out):
@@ -82,7 +82,7 @@ def is_interrupted(part: Path, out: Path) -> bool:
     return made is None or not made.finished or made.out == out.name
 
 
-def begun(part: Path, kind: Kind, out: Path) -> None:
+def begun(part: Path, kind: FolderKind, out: Path) -> None:
     """Record in `part` which command makes it, that it will replace `out`, and that it is not
     finished. Other records stay."""
     made = read_made(part) or Made(kind.command, False, {})
@@ -203,7 +203,7 @@ def found(out: Path) -> Path:
     raise FolderTaken(f"{out}: has no {JOURNAL}, so it is not the folder of a run")
 
 
-def replace_folder(made: Path, target: Path, kind: Kind) -> None:
+def replace_folder(made: Path, target: Path, kind: FolderKind) -> None:
     """Replace `target` by the finished folder `made`; the old `target` is kept until that is done.
 
     Raises:
@@ -235,7 +235,7 @@ def replace_folder(made: Path, target: Path, kind: Kind) -> None:
 
 
 @contextmanager
-def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
+def made_anew(target: Path, kind: FolderKind, option: str) -> Iterator[Path]:
     """Context that makes a folder beside `target`. The folder replaces `target` at the end of the
     block, or is deleted if the block fails.
 
@@ -258,7 +258,7 @@ def made_anew(target: Path, kind: Kind, option: str) -> Iterator[Path]:
         raise FolderTaken(f"{fault}; what was made is in {part}") from None
 
 
-def discard(part: Path, kind: Kind) -> None:
+def discard(part: Path, kind: FolderKind) -> None:
     """Delete an unneeded folder, unless it holds files of another origin."""
     if not foreign_file_in(part, kind):
         shutil.rmtree(part)

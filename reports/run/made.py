@@ -26,7 +26,7 @@ MADE = "made.json"
 HEAD = 4096  # bytes at the start of a file in which its mark is searched
 
 
-class Kind(NamedTuple):
+class FolderKind(NamedTuple):
     """A kind of result folder.
 
     Attributes:
@@ -85,7 +85,7 @@ def put_made(folder: Path, made: Made) -> None:
     put_text(folder / MADE, json.dumps(made._asdict(), indent=1) + "\n")
 
 
-def foreign_file_in(folder: Path, kind: Kind) -> str:
+def foreign_file_in(folder: Path, kind: FolderKind) -> str:
     """What in a folder the command did not make, as the rest of a sentence; "" if there is nothing
     foreign.
 
@@ -179,7 +179,7 @@ def writing(folder: Path, names: Sequence[str]) -> Iterator[None]:
 MOVE_IT = "move it to another folder, or delete it"
 
 
-def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
+def may_write(target: Path, kind: FolderKind, option: str = "--out") -> None:
     """Raise `FolderTaken` unless `target`, the value of `option`, is absent, empty, or made by the
     same command alone.
 
@@ -206,7 +206,7 @@ def may_write(target: Path, kind: Kind, option: str = "--out") -> None:
         )
 
 
-def may_replace(target: Path, kind: Kind, option: str = "--out") -> None:
+def may_replace(target: Path, kind: FolderKind, option: str = "--out") -> None:
     """Raise as `may_write`, and also if `target` holds an interrupted result, so that no finished
     part is lost."""
     may_write(target, kind, option)

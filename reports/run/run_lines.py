@@ -31,7 +31,7 @@ from reports.run.stepping import CALL, EMPTY, READ
 LONGEST_PASS = 3600.0  # s, of timings
 
 
-class Header(Line):
+class RunHeader(Line):
     """The request, and the versions that played it."""
 
     command: Words
@@ -160,7 +160,7 @@ class BesideLine(Line):
     cost: Costs
 
 
-class Footer(Line):
+class RunFooter(Line):
     """Totals of the run."""
 
     tasks: Count
@@ -168,28 +168,28 @@ class Footer(Line):
     seconds: Seconds
 
 
-class HeaderLine(Line):
+class RunHeaderLine(Line):
     """The first line."""
 
-    header: Header
+    header: RunHeader
 
 
-class FooterLine(Line):
+class RunFooterLine(Line):
     """The last line."""
 
-    footer: Footer
+    footer: RunFooter
 
 
 KINDS = Kinds(
     {
-        "header": HeaderLine,
+        "header": RunHeaderLine,
         "cell": CellLine,
         "conformance": ConformanceLine,
         "known_answer": KnownAnswerLine,
         "checked": CheckedLine,
         "timing": TimingLine,
         "beside": BesideLine,
-        "footer": FooterLine,
+        "footer": RunFooterLine,
     },
     "delete that line, and run --resume plays what it was of",
     "without it the request is not known: play it again into another --out",

@@ -24,7 +24,7 @@ from reports.compare.against import TRUTH
 from reports.compare.comparison import Comparison, compare
 from reports.compare.table import status_row, table_of
 from reports.compare.view import NOT_JUDGED
-from reports.run.answers import Answer, answer_here, no_answer, put_answer, read_answer
+from reports.run.answers import ExactAnswer, answer_here, no_answer, put_answer, read_answer
 from reports.run.archive import Archive, as_found, digest, run_of
 from reports.run.cells import Cell, versions
 from reports.run.scenes import Records, scenario_of
@@ -178,7 +178,7 @@ def csv_of(table: pd.DataFrame, header: bool = True) -> bytes:
     return table.to_csv(index=False, header=header).encode(errors=PATHS)
 
 
-def compared(folder: Path, records: Records, answer: Answer) -> Comparison:
+def compared(folder: Path, records: Records, answer: ExactAnswer) -> Comparison:
     """The runs of a scene's cells, compared with its answer and with each other."""
     scenario = answer.put_into(scenario_of(folder, records))
     return compare(scenario, [run_of(folder, record) for record in records])
@@ -224,7 +224,7 @@ def answer_file(folder: Path, records: Records) -> Path:
     return named_by(folder, records, (records[0]["scene_hash"], judge_hash()), ANSWER)
 
 
-def scene_table_file(folder: Path, records: Records, answer: Answer) -> Path:
+def scene_table_file(folder: Path, records: Records, answer: ExactAnswer) -> Path:
     """The file of a scene table; its name depends on all that decides the table: runs, answer,
     judge."""
     found = [as_found(folder, record) for record in records]

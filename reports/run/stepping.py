@@ -67,7 +67,7 @@ class EmptySteps:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadOuts:
     """`READS` read-outs of a scene after its first step, each after one more step: some engines
     cache what they have read."""
 
@@ -88,14 +88,14 @@ class Reading:
         return Spent(seconds)
 
 
-def overheads(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | Reading, int]]:
+def overheads(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | ReadOuts, int]]:
     """(what, how to run it, count in a run) for everything that is timed beside the steps of an
     engine in a scenario."""
     dt = scenario.dt(scenario.substeps[-1])
     return [
         (EMPTY, EmptySteps(make, dt, singly=False), EMPTY_STEPS),
         (CALL, EmptySteps(make, dt, singly=True), CALLS),
-        (READ, Reading(make, scenario), READS),
+        (READ, ReadOuts(make, scenario), READS),
     ]
 
 

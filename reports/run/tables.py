@@ -16,7 +16,7 @@ import pandas as pd
 
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
-from reports.run.answers import Answer, read_answer
+from reports.run.answers import ExactAnswer, read_answer
 from reports.run.archive import Archive, digest, run_of
 from reports.run.folders import RUN
 from reports.run.journal import JOURNAL
@@ -62,7 +62,7 @@ class Tables(NamedTuple):
 
     runs: pd.DataFrame
     timed: pd.DataFrame
-    answers: dict[str, Answer]
+    answers: dict[str, ExactAnswer]
     scene_tables: dict[str, Path]
     unkept: dict[str, Comparison]
     unjudged: dict[str, str]
@@ -148,7 +148,7 @@ def not_compared(failure: Failure) -> str:
 
 
 def unkept_comparison(
-    folder: Path, records: Records, answer: Answer, scene_table: bytes | Failure
+    folder: Path, records: Records, answer: ExactAnswer, scene_table: bytes | Failure
 ) -> Comparison:
     """What can be shown of a scene without a scene table; if its comparison failed, it is compared
     with no answer."""

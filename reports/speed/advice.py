@@ -92,7 +92,7 @@ class Attempt:
         return self.error <= bound
 
 
-class Change(NamedTuple):
+class ChangedOption(NamedTuple):
     """An engine with one option changed, and the engine without the change, at the same step
     size."""
 
@@ -139,7 +139,7 @@ class Advice:
     step_sizes: Sequence[float]
     keeping: Sequence[Attempt]
     short: Sequence[OutOfReach]
-    changes: Sequence[Change]
+    changes: Sequence[ChangedOption]
     noise: float
     busy: float
 
@@ -189,7 +189,7 @@ def advise(
         [scenario.dt(k) for k in step_sizes],
         sorted(plain.values(), key=lambda one: one.cost),
         reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
-        [Change(plain[one.name], one) for one in priced if one.change != PLAIN],
+        [ChangedOption(plain[one.name], one) for one in priced if one.change != PLAIN],
         float(np.percentile([*apart.values()], 75)) if apart else nan,
         busy,
     )

@@ -19,7 +19,7 @@ from reports.run.arguments import checked_engines, checked_scenes, opening
 from reports.run.folders import discard, given_back, open_part, place_of, replace_folder
 from reports.run.journal import Journal
 from reports.run.machine import about
-from reports.run.made import Kind, digest_of, writing
+from reports.run.made import FolderKind, digest_of, writing
 from reports.run.scenes import open_scene
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
@@ -38,7 +38,7 @@ from reports.terminal.tables import print_list, print_table, print_texts
 
 NEVER, NOT_REACHED = "never", "–"
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
-SPEED = Kind("crosscheck speed", r"journal\.jsonl")
+SPEED = FolderKind("crosscheck speed", r"journal\.jsonl")
 
 
 def run_speed(

@@ -47,7 +47,7 @@ Cost = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]  # s: no task 
 Substeps = Annotated[int, Field(ge=1, le=10**7)]
 
 
-class Header(Line):
+class SpeedHeader(Line):
     """The measurement that was asked for; only exactly the same one can be resumed."""
 
     scenes: list[File]
@@ -60,10 +60,10 @@ class Header(Line):
     machine: Machine
 
 
-class HeaderLine(Line):
+class SpeedHeaderLine(Line):
     """The first line."""
 
-    header: Header
+    header: SpeedHeader
 
 
 class Row(Line):
@@ -133,7 +133,7 @@ class Errors(Line):
     result: Annotated[list[ErrorRow], Field(min_length=1)]
 
 
-class Budget(Line):
+class BudgetResult(Line):
     """The contributions to an error."""
 
     result: Annotated[list[BudgetRow], Field(min_length=1)]
@@ -216,7 +216,7 @@ RESULTS: dict[tuple[str, ...], type[Line]] = {
     ("error", "scene"): Errors,
     ("error", "option"): Errors,
     ("error", "sweep"): Errors,
-    ("budget",): Budget,
+    ("budget",): BudgetResult,
     ("time", "scene"): Samples,
     ("time", "option"): Samples,
     ("time", "sweep"): Samples,
@@ -225,17 +225,17 @@ RESULTS: dict[tuple[str, ...], type[Line]] = {
 }
 """How a task begins -> what it gives."""
 # of its task, from and to
-PARTS = {Errors: (7, 64), Budget: (3, 3), Samples: (3, 3), Sizes: (2, 2), Truth: (3, 3)}
+PARTS = {Errors: (7, 64), BudgetResult: (3, 3), Samples: (3, 3), Sizes: (2, 2), Truth: (3, 3)}
 
 
-class TaskLine(Line):
+class SpeedTaskLine(Line):
     """What a task gave."""
 
     task: Annotated[list[Words | Count], Field(min_length=2, max_length=64)]
     result: Any
 
     @model_validator(mode="after")
-    def of_its_task(self) -> TaskLine:
+    def of_its_task(self) -> SpeedTaskLine:
         """The result is of that kind, and its rows are of what the task names."""
         task = self.task
         begins = tuple(map(str, task[:2]))
@@ -269,7 +269,7 @@ class TaskLine(Line):
 
 
 KINDS = Kinds(
-    {"header": HeaderLine, "task": TaskLine},
+    {"header": SpeedHeaderLine, "task": SpeedTaskLine},
     "delete that line, and --resume measures again what it was of",
     "without it the request is not known: delete the folder, or name another --out",
 )

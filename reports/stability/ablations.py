@@ -30,8 +30,8 @@ from adapters.mechanisms.table import (
 )
 from reports.stability.limits import Case, Limit
 from reports.stability.predicates import Reading, judge
-from reports.stability.search import Search
-from reports.stability.variants import Variant
+from reports.stability.search import LimitSearch
+from reports.stability.variants import DrivenEngine
 from reports.terminal.counts import listed
 from scenarios.model import Scenario
 
@@ -80,7 +80,7 @@ SENTENCES = (
 """Mechanism, engines, what it does, and the source."""
 
 
-def sufficient_mechanisms(search: Search, limit: Limit) -> str:
+def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> str:
     """The smallest set of mechanisms with which the reference has the limit, as text;
     `END_OF_STEP` if it needs none, "" if no set has the limit or no ablation can be played.
 
@@ -115,7 +115,7 @@ class Ablations:
     reading: Reading
 
     @staticmethod
-    def of(search: Search, limit: Limit) -> Ablations | None:
+    def of(search: LimitSearch, limit: Limit) -> Ablations | None:
         """None if nothing failed, nothing was played, or the engine has no known mechanisms."""
         seen, failing, (name, *changed) = (
             search.failure(limit),
@@ -169,7 +169,7 @@ class Ablations:
 
     def read(self, scenario: Scenario, mechanisms: Sequence[Mechanism]) -> Reading:
         """The readings of the predicate in the ablation's run or runs."""
-        ablation = Variant("reference:ablation", partial(with_mechanisms, mechanisms))
+        ablation = DrivenEngine("reference:ablation", partial(with_mechanisms, mechanisms))
         return judge(self.case.predicate, *self.case.play(ablation, scenario))
 
 

@@ -20,7 +20,7 @@ from reports.stability.predicates import (
     SPRING_GROWS,
     STRAYS,
 )
-from reports.stability.variants import Variant, with_variant
+from reports.stability.variants import DrivenEngine, with_variant
 from scenarios.families.placing import lay_out
 from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
 from scenarios.truth.closed_forms import Collision, answer, bouncing, flight, pair
@@ -152,7 +152,7 @@ def oscillator(x: float, _run: int) -> Scenario:
     )
 
 
-def on_spring(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
+def on_spring(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """Play a disk with the force -x N, read from its position before every step, as a user of an
     engine would write it."""
     states: list[State] = []

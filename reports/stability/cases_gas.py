@@ -17,7 +17,7 @@ from reports.stability.predicates_gas import (
     TEMPERATURES_PART,
     WRONG_GAS,
 )
-from reports.stability.variants import Variant, played, with_variant
+from reports.stability.variants import DrivenEngine, played, with_variant
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 
@@ -137,7 +137,7 @@ def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
     return replace(scenario, truth=lambda _: beside), run
 
 
-def reversed_order(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
+def reversed_order(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """The same gas with its disks inserted in the opposite order, compared with the gas in its
     own order."""
     scene = scenario.scene
@@ -168,7 +168,7 @@ def renumbered(played: Trajectory, n: int) -> Trajectory:
     )
 
 
-def restarted(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
+def restarted(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """The gas stopped half-way, read and loaded into a new engine, compared with the gas played
     without a stop."""
     whole = played(variant, scenario)

@@ -17,7 +17,7 @@ from reports.page.style import number
 from reports.run.arguments import checked_engines, opening, unknown
 from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
 from reports.run.journal import Journal
-from reports.run.made import Kind, writing
+from reports.run.made import FolderKind, writing
 from reports.run.runner import affordable
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
@@ -59,7 +59,7 @@ MARKS = {
 """Mark in the table of limits -> its meaning."""
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
 PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in [*ENGINES, *FETCHED])
-STABILITY = Kind(
+STABILITY = FolderKind(
     "crosscheck stability",
     rf"journal\.jsonl|trajectories/.+(\.({PLAYED_BY})|-own)[^/.]*\.npz",
     ("trajectories",),

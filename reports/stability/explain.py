@@ -15,14 +15,14 @@ from reports.stability.cases import CASES
 from reports.stability.interventions import SAYS_SO, intervention_of, reason_by_intervention
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.reasons import Reason, reason_of
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 
 # the factor by which a prediction may be off: the width of the quick form's bracket; and collisions
 # are not all lost at one value
 NEAR = 1.05
 
 
-def with_replays(search: Search, limit: Limit) -> Limit:
+def with_replays(search: LimitSearch, limit: Limit) -> Limit:
     """The limit with what was found by playing its failing run again: the mechanisms that are
     enough to produce it, or an intervention that removes it.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from reports.page.replay import COLLISIONS
 from reports.run.trajectories import STATE, load_trajectory, packed
 from reports.stability.limits import Limit, Trial
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
 from scenarios.no_truth import NoTruth
 from scenarios.truth.cache import UNREADABLE
@@ -21,7 +21,7 @@ from scenarios.truth.cache import UNREADABLE
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
 
-def keep_failure(search: Search, limit: Limit, folder: Path) -> None:
+def keep_failure(search: LimitSearch, limit: Limit, folder: Path) -> None:
     """Save the first failing run of a search, and the trajectory that is shown with it, if there is
     one."""
     failing, seen = limit.failing, search.failure(limit)

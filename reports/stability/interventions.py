@@ -15,7 +15,7 @@ from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.predicates import judge
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import play_as
 from reports.stability.vary import at_offset, at_scale, at_tempo
 from scenarios.model import Scenario
@@ -170,7 +170,7 @@ Where the step itself is varied, a finer one is not tried.
 """
 
 
-def intervention_of(search: Search, limit: Limit) -> str:
+def intervention_of(search: LimitSearch, limit: Limit) -> str:
     """The first change with which the run that failed at the limit works; "" if none does, or if
     nothing failed.
 

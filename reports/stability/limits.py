@@ -11,7 +11,7 @@ from math import nan, sqrt
 from adapters.engines import DISTINCT
 from adapters.run import Run
 from reports.stability.predicates import Predicate
-from reports.stability.variants import VARIANTS, WITH_FRICTION_ONLY, Variant, played
+from reports.stability.variants import VARIANTS, WITH_FRICTION_ONLY, DrivenEngine, played
 from scenarios.model import Scenario
 
 EXACT, NOT_KNOWN = "the exact answer", "not known"
@@ -51,7 +51,7 @@ FULL = Form("full", few=ALL, ratio=1.01, whole=True)
 FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
-def once(variant: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
+def once(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """One run, judged by the scenario's own truth or by the laws of physics."""
     return scenario, played(variant, scenario)
 
@@ -96,7 +96,7 @@ class Case:
     runs: int = 1
     whole: bool = False
     also: tuple[str, ...] = ()
-    play: Callable[[Variant, Scenario], tuple[Scenario, Run]] = once
+    play: Callable[[DrivenEngine, Scenario], tuple[Scenario, Run]] = once
     quick_values: tuple[float, ...] = ()
     refines: bool = True
     ratio: float = 1.0

@@ -47,7 +47,7 @@ Sha256 = Annotated[str, Field(pattern=r"\A[0-9a-f]{64}\z")]
 Some = Annotated[int, Field(ge=0, le=MOST)]
 
 
-class Header(Line):
+class StabilityHeader(Line):
     """What was asked for, and the versions that played it."""
 
     command: Words
@@ -59,23 +59,23 @@ class Header(Line):
     files: dict[File, Sha256]
 
 
-class HeaderLine(Line):
+class StabilityHeaderLine(Line):
     """The first line, and another for each time the run was resumed."""
 
-    header: Header
+    header: StabilityHeader
 
 
-class Footer(Line):
+class StabilityFooter(Line):
     """How much was done."""
 
     tasks: Count
     seconds: Seconds
 
 
-class FooterLine(Line):
+class StabilityFooterLine(Line):
     """The last line."""
 
-    footer: Footer
+    footer: StabilityFooter
 
 
 class TaskOf(Line):
@@ -189,7 +189,7 @@ def number_like(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= 1e308
 
 
-class TaskLine(Line):
+class StabilityTaskLine(Line):
     """What a task gave: one of the three, under the name of its kind."""
 
     task: TaskOf
@@ -198,7 +198,7 @@ class TaskLine(Line):
     law: LawRow | None = None
 
     @model_validator(mode="after")
-    def of_its_task(self) -> TaskLine:
+    def of_its_task(self) -> StabilityTaskLine:
         """Whether a result has the kind, the name and the engine of its task."""
         given = {"limit": self.limit, "map": self.map, "law": self.law}
         one = given.pop(self.task.kind)
@@ -213,7 +213,7 @@ class TaskLine(Line):
 
 
 KINDS = Kinds(
-    {"header": HeaderLine, "task": TaskLine, "footer": FooterLine},
+    {"header": StabilityHeaderLine, "task": StabilityTaskLine, "footer": StabilityFooterLine},
     "delete that line, and --resume plays again what it was of",
     "without it the request is not known: delete the folder, or name another --out",
 )

@@ -31,7 +31,7 @@ from reports.stability.failures import keep_failure
 from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, engines_of
 from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from reports.stability.vary import case_of_file
@@ -133,7 +133,7 @@ def case_named(name: str) -> Any:
 def found_limit(task: Task, folder: Path) -> Limit:
     """Search, and save the first failing run next to the limit."""
     started = process_time()
-    search = Search(case_named(task.name), task.engine, FORMS[task.form])
+    search = LimitSearch(case_named(task.name), task.engine, FORMS[task.form])
     limit = with_replays(search, replace(search.limit(), case=task.name))
     keep_failure(search, limit, folder)
     return replace(limit, seconds=process_time() - started)

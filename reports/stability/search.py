@@ -25,7 +25,7 @@ from scenarios.model import Scenario
 
 
 @dataclass
-class Search:
+class LimitSearch:
     """The search for the limit of one case on one engine; keeps the readings at each value, and the
     first failing run there."""
 

@@ -16,7 +16,7 @@ from adapters.run import Run
 from scenarios.model import Scenario, Scene
 
 
-class Variant(NamedTuple):
+class DrivenEngine(NamedTuple):
     """A name, engine:profile; a function that makes the engine; and what is changed in it, ""
     for a row of `ENGINES`."""
 
@@ -55,14 +55,14 @@ def with_variant(variant: str) -> tuple[str, ...]:
 WITH_FRICTION_ONLY = tuple(name for name, row in ENGINES.items() if row.adds_friction)
 
 CHANGED = tuple(
-    Variant(f"{name}+{variant}", partial(varied, name, variant), what)
+    DrivenEngine(f"{name}+{variant}", partial(varied, name, variant), what)
     for name, row in ENGINES.items()
     for variant, (_, what, _) in row.variants.items()
 )
-VARIANTS: dict[str, Variant] = {
+VARIANTS: dict[str, DrivenEngine] = {
     variant.name: variant
     for variant in (
-        *(Variant(name, row.make) for name, row in ENGINES.items()),
+        *(DrivenEngine(name, row.make) for name, row in ENGINES.items()),
         *CHANGED,
     )
 }
@@ -73,7 +73,7 @@ def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
     """In this context engines' own files, `PATH:own`, and rows of `FETCHED` are tested in this
     process like the rows of `ENGINES`."""
     ENGINES.update(rows)
-    VARIANTS.update({name: Variant(name, row.make) for name, row in rows.items()})
+    VARIANTS.update({name: DrivenEngine(name, row.make) for name, row in rows.items()})
     try:
         yield
     finally:
@@ -81,11 +81,11 @@ def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
             del ENGINES[name], VARIANTS[name]
 
 
-def played(variant: Variant, scenario: Scenario) -> Run:
+def played(variant: DrivenEngine, scenario: Scenario) -> Run:
     """Play a scenario at its only step size."""
     return play_once(variant.make, variant.name, scenario, scenario.dt(scenario.substeps[0]))
 
 
 def play_as(engine: str, scenario: Scenario) -> Run:
     """`played`, by a key of `VARIANTS`, or a row that does not take part."""
-    return played(VARIANTS.get(engine) or Variant(engine, row_of(engine).make), scenario)
+    return played(VARIANTS.get(engine) or DrivenEngine(engine, row_of(engine).make), scenario)

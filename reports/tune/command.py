@@ -12,16 +12,16 @@ import pandas as pd
 
 from reports.run.arguments import opening, unknown
 from reports.run.folders import made_anew, place_of
-from reports.run.made import Kind, may_replace, writing
+from reports.run.made import FolderKind, may_replace, writing
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, broken_off, refuse
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table
-from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, UNASKED, Search
+from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, UNASKED, SettingsSearch
 
 NAME = "matched.csv"
-TUNE = Kind("crosscheck tune")
+TUNE = FolderKind("crosscheck tune")
 
 
 def tune(engines: Sequence[str], out: Path) -> NoReturn:
@@ -52,7 +52,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
     ):
         for engine in dict.fromkeys(engines or UNASKED):
             bar.say(f"{engine}: the exact answers, and the present settings")
-            search = Search(engine, say=bar.note)
+            search = SettingsSearch(engine, say=bar.note)
             bar.say(f"{engine}: setting by setting")
             found = pd.concat([*tables, search.run()])
             with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):

@@ -57,7 +57,7 @@ def searched_of(engine: str) -> Searched:
     return searched()
 
 
-class Trial(NamedTuple):
+class SettingsTrial(NamedTuple):
     """One change of the chosen settings: what it is against them at equal cost, on both halves of
     the seeds."""
 
@@ -81,7 +81,7 @@ class Trial(NamedTuple):
 
 
 @dataclass
-class Search:
+class SettingsSearch:
     """The search for one engine; `say` is called with every trial."""
 
     engine: str
@@ -117,14 +117,14 @@ class Search:
             self.known[key] = first, again
         return self.known[key]
 
-    def trial(self, change: dict[str, Any]) -> Trial:
+    def trial(self, change: dict[str, Any]) -> SettingsTrial:
         """The chosen settings with a change, against them without it."""
         settings, before = self.chosen | change, self.played(self.chosen)
         now = self.played(settings)
         one_a_family = self.scenes[0][:: len(self.seeds[0])]
         cost = cost_of(self.make(settings), self.make(self.chosen), one_a_family)
         first, again = (against(*each) for each in zip(now, before, (cost, cost), self.scenes))
-        trial = Trial(change, cost, first, again, sorted(self.kept - self.keeps(settings)))
+        trial = SettingsTrial(change, cost, first, again, sorted(self.kept - self.keeps(settings)))
         what = ", ".join(f"{name} {value:g}" for name, value in change.items())
         self.say(
             f"{self.engine} {what}: {trial.first.equal_cost:.3f}, {trial.again.equal_cost:.3f}:"
@@ -142,7 +142,7 @@ class Search:
                 each for each in changes if all(each[name] != self.chosen[name] for name in each)
             ]
 
-    def sweep(self) -> tuple[list[Trial], bool]:
+    def sweep(self) -> tuple[list[SettingsTrial], bool]:
         """All trials, taking the best of each setting at once; and whether anything was taken."""
         trials, taken = [], False
         for changes in self.groups():
@@ -167,7 +167,7 @@ class Search:
 
 
 def table(
-    engine: str, searched: Searched, chosen: dict[str, Any], trials: Sequence[Trial]
+    engine: str, searched: Searched, chosen: dict[str, Any], trials: Sequence[SettingsTrial]
 ) -> pd.DataFrame:
     """Columns `COLUMNS`: what is chosen of each setting, every change tried, and what was not
     searched and why.
@@ -213,7 +213,7 @@ def with_reasons(made: pd.DataFrame) -> pd.DataFrame:
     return made
 
 
-def row_of(trial: Trial) -> dict[str, Any]:
+def row_of(trial: SettingsTrial) -> dict[str, Any]:
     """A row of the table."""
     first, again = trial.first, trial.again
     return {

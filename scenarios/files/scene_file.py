@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from scenarios.families.placing import box
-from scenarios.files.tables import TABLES, SceneTable
+from scenarios.files.tables import TABLES, SceneToml
 from scenarios.model import Array, Scenario, Scene, Thrust
 from scenarios.regular import opened
 from scenarios.truth.exact import with_oracle
@@ -124,11 +124,11 @@ def _parsed(path: Path) -> dict[str, Any]:
         ) from None
 
 
-def _checked(table: dict[str, Any]) -> SceneTable:
+def _checked(table: dict[str, Any]) -> SceneToml:
     disks = table.get("disk")
     try:
         context = {"disks": len(disks) if isinstance(disks, list) else math.inf}
-        return SceneTable.model_validate(table, context=context)
+        return SceneToml.model_validate(table, context=context)
     except ValidationError as error:
         raise SceneFileError(
             _sentence(fault) for fault in error.errors(include_url=False)
@@ -140,7 +140,7 @@ def _sentence(fault: ErrorDetails) -> str:
     where, value, kind = fault["loc"], fault["input"], fault["type"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{_bare(part)}" for part in where)[1:]
     words = [part for part in where if isinstance(part, str)]
-    fields = (TABLES[words[0]] if len(words) > 1 else SceneTable).model_fields
+    fields = (TABLES[words[0]] if len(words) > 1 else SceneToml).model_fields
     if kind == "missing":
         return f"{key}: missing; must be {fields[words[-1]].description}"
     said = f"{key} = {_shortened(value)}: "
@@ -186,7 +186,7 @@ def _toml(value: object) -> str:
     return "{...}" if isinstance(value, dict) else str(value)
 
 
-def _scenario(file: SceneTable, source: str) -> Scenario:
+def _scenario(file: SceneToml, source: str) -> Scenario:
     disks = file.disk
     columns = {
         key: np.array([getattr(disk, key) for disk in disks])
@@ -220,7 +220,7 @@ def _scenario(file: SceneTable, source: str) -> Scenario:
     return with_oracle(question)
 
 
-def _outside_wrap(file: SceneTable) -> Iterator[str]:
+def _outside_wrap(file: SceneToml) -> Iterator[str]:
     if not file.wrap:
         return
     low, high = file.wrap.low, file.wrap.high

@@ -169,7 +169,7 @@ class ThrustTable(_Table):
         return stop
 
 
-class SceneTable(_Table):
+class SceneToml(_Table):
     """The whole file."""
 
     name: str = Field(

@@ -16,7 +16,7 @@ from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.truth.oracle.path import Path
-from scenarios.truth.oracle.work import Clock, Work
+from scenarios.truth.oracle.work import TimeLimit, WorkLimit
 from scenarios.truth.record import TruthRecord, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # the tie is 2^-(bits / 2), below the eps of float64
@@ -62,7 +62,7 @@ class OracleTruth:
             raise NoTruth(record.reason)
         return record.sampled(one.scene, one.thrusts, t)
 
-    def record(self, clock: Clock | None = None) -> TruthRecord:
+    def record(self, clock: TimeLimit | None = None) -> TruthRecord:
         """The record, from the cache or computed. A computed one is cached unless the time of
         `clock` ran out. Raises `NoTruth`."""
         if self.known is not None:
@@ -70,7 +70,7 @@ class OracleTruth:
         key = key_of(self.scenario, has_balls())
         found = look_up(key)
         if found is None:
-            clock = clock or Clock()
+            clock = clock or TimeLimit()
             found = vars(computed(self.scenario, None, clock))
             if not clock.expired:
                 keep(key, found)
@@ -95,7 +95,7 @@ def with_oracle(scenario: Scenario) -> Scenario:
 
 
 def computed(
-    scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: Clock | None = None
+    scenario: Scenario, kind: Callable[[int], Numbers] | None = None, clock: TimeLimit | None = None
 ) -> TruthRecord:
     """The record of a scenario: proven by interval arithmetic where that is installed and decides
     every comparison, else computed at two precisions that agree.
@@ -120,12 +120,12 @@ def computed(
         )
     # Without friction a torque does not affect the motion.
     forced = [p for p in thrusts if p.force.any() or (scene.friction and p.torque)]
-    clock = clock or Clock()
+    clock = clock or TimeLimit()
     record = certified(scenario, forced, clock) if kind is None and has_balls() else None
     return record or two_precisions(scenario, forced, kind or digits, clock)
 
 
-def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> TruthRecord | None:
+def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) -> TruthRecord | None:
     """The record by interval arithmetic, which proves every comparison; None where a comparison
     stays undecided at every precision.
 
@@ -137,7 +137,7 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: Clock) -> Tru
     while bits <= MOST_BITS:
         try:
             path = trace(
-                scenario.scene, forced, until, balls(bits), Work(allowed_steps(bits), clock)
+                scenario.scene, forced, until, balls(bits), WorkLimit(allowed_steps(bits), clock)
             )
             error, reached = spread(path, until), until
             if error < accuracy and not clock.expired:
@@ -160,7 +160,9 @@ def allowed_steps(bits: int) -> int:
     return int(WORK / (1 + bits / HEAVY))
 
 
-def farthest(scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: Clock) -> TruthRecord:
+def farthest(
+    scenario: Scenario, attempts: Sequence[tuple[Path, int]], clock: TimeLimit
+) -> TruthRecord:
     """The record of the attempt that got farthest, up to where it is exact; an attempt is a path
     and its bits."""
     found = [
@@ -224,15 +226,19 @@ def widest(table: Array, until: float) -> float:
 
 
 def two_precisions(
-    scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: Clock
+    scenario: Scenario, forced: Sequence[Thrust], kind: Callable[[int], Numbers], clock: TimeLimit
 ) -> TruthRecord:
     """The record in numbers of one kind, up to where a computation with twice as many bits agrees,
     or until the time of `clock` runs out."""
     scene, until, bits = scenario.scene, scenario.duration, FEWEST_BITS
     attempts: list[tuple[Path, float, int]] = []
     while True:
-        coarse = trace(scene, forced, until, kind(bits), Work(allowed_steps(bits), clock, COARSE))
-        fine = trace(scene, forced, until, kind(2 * bits), Work(allowed_steps(2 * bits), clock))
+        coarse = trace(
+            scene, forced, until, kind(bits), WorkLimit(allowed_steps(bits), clock, COARSE)
+        )
+        fine = trace(
+            scene, forced, until, kind(2 * bits), WorkLimit(allowed_steps(2 * bits), clock)
+        )
         diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.expired and coarse.end < fine.end:

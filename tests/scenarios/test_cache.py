@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports.run.answers import Answer, put_answer, read_answer
+from reports.run.answers import ExactAnswer, put_answer, read_answer
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario
 from scenarios.truth import cache as truth_cache
@@ -146,7 +146,7 @@ def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Pat
     """Nothing but the answer is ever read, and no bit ends in an error: its sums tell, or its
     header cannot be read."""
     path = tmp_path / "answer.npz"
-    put_answer(path, Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
+    put_answer(path, ExactAnswer(record_of(scenario("slow_collision")), "ok", "", 60.0))
     whole, data = read_answer(path), path.read_bytes()
     assert whole is not None
     found_out = 0
@@ -161,7 +161,7 @@ def test_an_answer_with_any_bit_turned_is_what_was_written_or_none(tmp_path: Pat
     assert found_out > 4 * len(data)  # the rest: dates and attributes, which nobody reads
 
 
-def same(one: Answer, other: Answer) -> bool:
+def same(one: ExactAnswer, other: ExactAnswer) -> bool:
     """To the bit."""
     if one.record is None or other.record is None:
         return False

@@ -21,7 +21,7 @@ from scenarios.truth.exact import computed, with_oracle
 from scenarios.truth.oracle import work as oracle_work
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
-from scenarios.truth.oracle.work import Clock
+from scenarios.truth.oracle.work import TimeLimit
 from scenarios.truth.record import TruthRecord
 from tests.reports.terminal.command_line import crosscheck
 
@@ -79,7 +79,7 @@ def begins_as(short: TruthRecord, whole: TruthRecord) -> bool:
 def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callable):
     """To the bit, in the numbers that prove and in those of two precisions; it says what ended it,
     and when."""
-    clock = Clock(CUT, REASON)
+    clock = TimeLimit(CUT, REASON)
     short, whole = computed(boxed(), kind, clock), computed(boxed(), kind)
 
     assert clock.expired
@@ -94,7 +94,7 @@ def test_an_answer_that_time_ends_is_the_beginning_of_the_whole_one(kind: Callab
 @pytest.mark.usefixtures("ticking")
 def test_a_last_place_in_the_start_is_another_beginning():
     """The control: what was compared above is compared to the bit."""
-    short = computed(boxed(float(np.nextafter(1.1, 2))), digits, Clock(CUT, REASON))
+    short = computed(boxed(float(np.nextafter(1.1, 2))), digits, TimeLimit(CUT, REASON))
 
     assert not begins_as(short, computed(boxed(), digits))
 
@@ -106,7 +106,7 @@ def test_what_is_given_of_a_chaotic_motion_is_exact(kind: Callable, seconds: flo
     """Whichever attempt in how many bits the time ended: it is within the error bounds of the whole
     answer."""
     one = scenario("line_gas")
-    short, whole = computed(one, kind, Clock(seconds, REASON)), computed(one, kind)
+    short, whole = computed(one, kind, TimeLimit(seconds, REASON)), computed(one, kind)
     until = min(short.horizon, whole.horizon, one.duration)
     t = np.linspace(0.0, max(until - 1e-9, 0.0), 200)
     here, there = (record.sampled(one.scene, one.thrusts, t) for record in (short, whole))
@@ -123,7 +123,7 @@ def test_more_time_never_gives_less():
     """Of several attempts the one that got farthest counts, not the one that was under way."""
     one = scenario("line_gas")
     reached = [
-        min(computed(one, None, Clock(float(s), REASON)).horizon, one.duration)
+        min(computed(one, None, TimeLimit(float(s), REASON)).horizon, one.duration)
         for s in range(20, 380, 60)
     ]
 
@@ -151,13 +151,13 @@ def test_what_depends_on_the_machine_is_not_kept(tmp_path: Path, monkeypatch: py
     """The next one computes it anew, and what has no limit of time is kept as ever."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     one = boxed()
-    record_of(one, Clock(CUT, REASON))
+    record_of(one, TimeLimit(CUT, REASON))
     assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is None
 
     whole = record_of(one)
     assert whole.reason == ""
     assert truth_cache.look_up(truth_cache.key_of(one, has_balls())) is not None
-    assert record_of(one, Clock(0.0, REASON)).horizon == whole.horizon  # it is there already
+    assert record_of(one, TimeLimit(0.0, REASON)).horizon == whole.horizon  # it is there already
 
 
 @pytest.mark.usefixtures("ticking")
@@ -167,7 +167,7 @@ def test_where_time_ends_before_the_first_sample_there_is_no_answer(
     """And that is said."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
     with pytest.raises(NoTruth, match=REASON):
-        record_of(replace(boxed(), sample_interval=0.5), Clock(0.0, REASON))
+        record_of(replace(boxed(), sample_interval=0.5), TimeLimit(0.0, REASON))
 
 
 @pytest.mark.slow

@@ -19,8 +19,8 @@ from scenarios.truth.oracle.contacts import Pressed
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import Event, MotionEnds, Path, RecentCollisions, Record, ambiguous
 from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
-from scenarios.truth.oracle.ties import Collision, Contact, Outcome, Touch, Velocities
-from scenarios.truth.oracle.work import Work
+from scenarios.truth.oracle.ties import Collision, Contact, TieOutcome, Touch, Velocities
+from scenarios.truth.oracle.work import WorkLimit
 
 MOST_IDLE = 100  # contacts in a row without a collision: the digits no longer decide
 
@@ -30,7 +30,7 @@ class Motion:
     only within `k.precise()`."""
 
     def __init__(
-        self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work
+        self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: WorkLimit
     ) -> None:
         self.k, self.until, self.scene, self.work = k, until, scene, work
         self.bodies = Bodies(scene, k)
@@ -233,13 +233,13 @@ class Motion:
                 reason = f"disk {contact.i} {what} while it touches another"
                 raise MotionEnds(float(self.now), reason, [contact.i])
 
-    def after_one(self, touch: Touch, v: Velocities) -> Outcome:
+    def after_one(self, touch: Touch, v: Velocities) -> TieOutcome:
         """The outcome of a single contact."""
         law = self.bodies.law
         after, collision = law.collide(touch, v)
-        return Outcome(after, [collision], frozenset([touch.contact] if law.sticks else ()))
+        return TieOutcome(after, [collision], frozenset([touch.contact] if law.sticks else ()))
 
-    def after_all(self, touches: Sequence[Touch], v: Velocities) -> Outcome:
+    def after_all(self, touches: Sequence[Touch], v: Velocities) -> TieOutcome:
         """The outcome of contacts at one instant, if it is the same in every order."""
         bodies = self.bodies
         resting = frozenset(contact for held in bodies.held for contact in held)
@@ -262,7 +262,7 @@ class Motion:
             reason = f"numbers of {self.k.bits} bits have used up their digits"
             raise MotionEnds(float(self.now), reason)
 
-    def go_on(self, outcome: Outcome, touches: Sequence[Touch], touched: set[int]) -> None:
+    def go_on(self, outcome: TieOutcome, touches: Sequence[Touch], touched: set[int]) -> None:
         """Begin new legs after the collisions of one instant; after a bounce off a wall, check
         whether the bounces die out without another contact."""
         bodies = self.bodies
@@ -391,9 +391,9 @@ class Motion:
 
 
 def trace(
-    scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: Work | None = None
+    scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: WorkLimit | None = None
 ) -> Path:
     """The motion of `scene` under `thrusts` up to `until` s, within the limits of `work`. Raises as
     `Bodies`."""
     with k.precise():
-        return Motion(scene, thrusts, until, k, work or Work()).run()
+        return Motion(scene, thrusts, until, k, work or WorkLimit()).run()

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.numbers import Number
-from scenarios.truth.oracle.ties import Contact, Outcome
+from scenarios.truth.oracle.ties import Contact, TieOutcome
 
 ACCUMULATED = 64  # collisions of one disk ...
 INSTANT = 1e-9  # ... within this many s accumulate
@@ -25,7 +25,7 @@ class MotionEnds(Exception):
     """
 
     def __init__(
-        self, t: float, reason: str, disks: Sequence[int] = (), outcomes: Sequence[Outcome] = ()
+        self, t: float, reason: str, disks: Sequence[int] = (), outcomes: Sequence[TieOutcome] = ()
     ) -> None:
         self.t, self.disks, self.outcomes = t, list(disks), list(outcomes)
         super().__init__(f"{reason} at t = {t:.9g} s")
@@ -70,7 +70,7 @@ class Path:
     end: float = np.inf
     reason: str = ""
     disks: list[int] = field(default_factory=list)
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[TieOutcome] = field(default_factory=list)
     named: list[list[tuple[int, int]]] = field(default_factory=list)
 
 
@@ -98,7 +98,7 @@ class RecentCollisions:
         )
 
 
-def ambiguous(disks: str, ends: Sequence[Outcome]) -> str:
+def ambiguous(disks: str, ends: Sequence[TieOutcome]) -> str:
     """The reason why simultaneous contacts have no exact answer."""
     if not ends[-1].velocities:
         return f"disks {disks} touch at once and their collisions do not end"

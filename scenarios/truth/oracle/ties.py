@@ -58,7 +58,7 @@ Velocities = dict[int, Velocity]
 """Body -> its velocity: vx, vy m/s, and rad/s, which is 0 where there is no friction."""
 
 
-class Outcome(NamedTuple):
+class TieOutcome(NamedTuple):
     """A possible outcome of simultaneous contacts: velocities, the collisions in one order, and the
     contacts with exactly no speed along their normal (`still`)."""
 
@@ -160,7 +160,7 @@ class CollisionLaw:
         v: Velocities,
         still: frozenset[Contact] = frozenset(),
         stays_still: Callable[[Contact, Contact], bool] = lambda _one, _other: False,
-    ) -> tuple[list[Outcome], int]:
+    ) -> tuple[list[TieOutcome], int]:
         """Every distinct outcome of resolving the approaching contacts, over all orders, each with
         one of its orders; and the number of collisions that were tried.
 
@@ -168,8 +168,8 @@ class CollisionLaw:
         on one contact keeps another one `still`. If some order does not end, the last outcome has
         no velocities.
         """
-        sign, ends = self.numbers.sign, list[Outcome]()
-        waiting = [Outcome(v, [], still)]
+        sign, ends = self.numbers.sign, list[TieOutcome]()
+        waiting = [TieOutcome(v, [], still)]
         for tried in range(MOST_ORDERS):
             if not waiting:
                 return ends, tried
@@ -197,10 +197,10 @@ class CollisionLaw:
                     if not c.disks & touch.contact.disks or stays_still(c, touch.contact)
                 }
                 kept |= {touch.contact} if self.sticks else set()
-                waiting.append(Outcome(after, [*collisions, collision], frozenset(kept)))
+                waiting.append(TieOutcome(after, [*collisions, collision], frozenset(kept)))
             if not closing and not any(self._same(now, end.velocities) for end in ends):
-                ends.append(Outcome(now, collisions, still))
-        return [*ends, Outcome({}, [], frozenset())], MOST_ORDERS
+                ends.append(TieOutcome(now, collisions, still))
+        return [*ends, TieOutcome({}, [], frozenset())], MOST_ORDERS
 
     def _same(self, one: Mapping[int, Velocity], other: Mapping[int, Velocity]) -> bool:
         return all(self.numbers.sign(a - b) == 0 for i in one for a, b in zip(one[i], other[i]))

@@ -12,7 +12,7 @@ from scenarios.truth.oracle.path import MotionEnds
 MOST_STEPS = 60_000
 
 
-class Clock:
+class TimeLimit:
     """A time limit for all attempts at an answer, from the creation of the object on.
 
     An answer that it cuts short depends on the machine, and is never cached.
@@ -27,13 +27,13 @@ class Clock:
         self.end, self.reason, self.expired = monotonic() + seconds, reason, False
 
 
-class Work:
+class WorkLimit:
     """The limits of one attempt: `left` steps, and a share of the time that its clock has left."""
 
     def __init__(
-        self, left: int = MOST_STEPS, clock: Clock | None = None, share: float = 1.0
+        self, left: int = MOST_STEPS, clock: TimeLimit | None = None, share: float = 1.0
     ) -> None:
-        self.left, self.clock, now = left, clock or Clock(), monotonic()
+        self.left, self.clock, now = left, clock or TimeLimit(), monotonic()
         self.stop = now + share * (self.clock.end - now)
 
     def step(self, t: float, bits: int) -> None:

@@ -10,7 +10,7 @@ import pytest
 from adapters.own_solver.file import SolverFailed
 from reports.check.failing import FAR, doubtful
 from reports.check.page import write_page
-from reports.check.questions import QUESTIONS, Answer
+from reports.check.questions import QUESTIONS, SolverAnswer
 from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT
@@ -210,12 +210,12 @@ def test_a_call_that_was_stopped_before_it_did_anything_is_asked_again():
     still = {name: list(QUESTIONS[name].balls) for name in names}
     a, b = still["collision/upwards"]
     moved = [[a._replace(x=(9.0, 9.0)), b]]
-    left = {name: Answer([balls], failed=stopped) for name, balls in still.items()}
-    left["collision/upwards"] = Answer(moved, failed=stopped)
-    left["separate"] = Answer([still["separate"]])
+    left = {name: SolverAnswer([balls], failed=stopped) for name, balls in still.items()}
+    left["collision/upwards"] = SolverAnswer(moved, failed=stopped)
+    left["separate"] = SolverAnswer([still["separate"]])
 
     assert doubtful(left) == ["collision/shallow", FAR]
-    assert doubtful(left | {FAR: Answer([], failed=stopped)}) == ["collision/shallow", FAR]
+    assert doubtful(left | {FAR: SolverAnswer([], failed=stopped)}) == ["collision/shallow", FAR]
 
 
 OVERLAPPING = "reach/0"

@@ -16,7 +16,7 @@ from reports.lessons.limits import HARSHNESS, SEEN, limits_of
 from reports.page.style import TRUTH
 from reports.stability import variants
 from reports.stability.cases import CASES
-from reports.stability.variants import Variant, play_as
+from reports.stability.variants import DrivenEngine, play_as
 from tests.reports.stability.kept_limits import agrees, kept
 
 LESSON = LESSONS["limits"]
@@ -58,7 +58,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
         patch.setitem(
             variants.VARIANTS,
             "box2d:shipped",
-            Variant("box2d:shipped", ENGINES["box2d:matched"].make),
+            DrivenEngine("box2d:shipped", ENGINES["box2d:matched"].make),
         )
         without = dict(LESSON.at(place).facts)["box2d:shipped"]
 

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from reports.compare.comparison import Comparison
-from reports.page.error_cost import Clock, ErrorCost, error_cost, surely_less
+from reports.page.error_cost import ErrorCost, RunTimes, error_cost, surely_less
 from reports.page.pooled import SCORES, scores
 from reports.run.timing import noise_of
 from reports.run.timing_pass import COLUMNS
@@ -47,7 +47,7 @@ def shown(
                 cost = costs[name][k]
                 time = [scene, engine, profile, dt, 1.0, 5, cost, cost, cost, binding[name], 2.0]
                 times.append((*time, 0.0, np.nan))
-    clock = Clock(pd.DataFrame(times, columns=COLUMNS), noise, asked)
+    clock = RunTimes(pd.DataFrame(times, columns=COLUMNS), noise, asked)
     found = error_cost(pd.DataFrame(rows, columns=SCORES), clock, set())
     assert found is not None
     return found
@@ -170,7 +170,7 @@ def timed(comparisons: list[Comparison], tmp_path_factory: pytest.TempPathFactor
         cost = 1.0 / row["dt_s"]
         times = [row["scenario"], engine, profile, row["dt_s"], 1.0, 5, cost, cost, cost]
         rows.append((*times, 0.3 * cost, 2.0, 0.0, np.nan))
-    clock = Clock(pd.DataFrame(rows, columns=COLUMNS), QUIET, 12.0)
+    clock = RunTimes(pd.DataFrame(rows, columns=COLUMNS), QUIET, 12.0)
     write_small(path, comparisons, clock=clock)
     return path
 

@@ -18,7 +18,7 @@ from adapters.play import play
 from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.page import overview, panels
-from reports.page.error_cost import NO_CLOCK, Clock
+from reports.page.error_cost import NO_CLOCK, RunTimes
 from reports.page.overview import OverviewCell
 from reports.page.panels import drawn_of, numbers_of
 from reports.run.timing import noise_of
@@ -137,7 +137,7 @@ def test_a_panel_says_error_and_cost_or_why_there_is_none(
     assert numbers_of(cell, cost) == said
 
 
-def made(comparisons: list[Comparison], clock: Clock = NO_CLOCK) -> panels.Panels:
+def made(comparisons: list[Comparison], clock: RunTimes = NO_CLOCK) -> panels.Panels:
     """The section of these scenes."""
     names = overview.names_of(comparisons)
     found = panels.panels(comparisons, names, overview.heat_map(comparisons, names), clock)
@@ -151,17 +151,17 @@ def test_costs_are_those_of_the_scene_and_only_where_times_can_be_trusted():
     dt = two[1].middle_dt
     row = ["free_fall", *PLAYED[0].split(":"), dt, 1.0, 5, 12.5, 12.0, 13.0, 1.0, 2.0, 0.0, np.nan]
     table = pd.DataFrame([row], columns=COLUMNS)
-    costs = panels.costs_of(Clock(table, QUIET, 12.0))
+    costs = panels.costs_of(RunTimes(table, QUIET, 12.0))
 
     assert costs == {"free_fall": {(PLAYED[0], dt): 12.5}}
-    assert panels.costs_of(Clock(table, LOUD, 12.0)) == {}
-    timed = made_tables(two, Clock(table, QUIET, 12.0))
+    assert panels.costs_of(RunTimes(table, LOUD, 12.0)) == {}
+    timed = made_tables(two, RunTimes(table, QUIET, 12.0))
     assert list(timed.groups) == [panels.TIMED, "Walls, floors and fixed disks"]
     assert timed.groups[panels.TIMED] == ["free_fall"]
     assert timed.first == "free_fall"
 
 
-def made_tables(comparisons: list[Comparison], clock: Clock) -> panels.Panels:
+def made_tables(comparisons: list[Comparison], clock: RunTimes) -> panels.Panels:
     """As `made`, of comparisons without a table: no error is known."""
     names = overview.names_of(comparisons)
     unknown = {
@@ -341,7 +341,7 @@ def test_costs_stand_below_the_panels_of_a_scene_that_was_timed(
     """In another one it is said of each engine that it was not."""
     row = [HEAD_ON, *PLAYED[0].split(":"), comparisons[0].middle_dt, 1.0, 5]
     table = pd.DataFrame([[*row, 12.5, 12.0, 13.0, 1.0, 2.0, 0.0, np.nan]], columns=COLUMNS)
-    write_small(tmp_path / "r.html", comparisons, clock=Clock(table, QUIET, 12.0))
+    write_small(tmp_path / "r.html", comparisons, clock=RunTimes(table, QUIET, 12.0))
     page, heard = opened(browser, (tmp_path / "r.html").as_uri())
     said = {}
     for name in (HEAD_ON, ORBIT):

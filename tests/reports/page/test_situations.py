@@ -16,7 +16,7 @@ from adapters.play import play
 from reports.commands.report import medians
 from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
-from reports.page.error_cost import NO_CLOCK, Clock, with_times
+from reports.page.error_cost import NO_CLOCK, RunTimes, with_times
 from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
@@ -439,7 +439,7 @@ def test_without_times_to_trust_the_table_has_no_costs(
     )
     said = []
     for spread, asked in (([0.7, 1.0, 1.3], 12.0), ([1.0, 1.0, 1.0], 0.0), ([1.0, 1.0, 1.0], 12.0)):
-        clock = Clock(times, noise_of(spread), asked)
+        clock = RunTimes(times, noise_of(spread), asked)
         write_small(page, comparisons[:1], clock=clock)
         text = page.read_text(encoding="utf-8")
         said.append((f"No costs: {clock.fault}" in text, 'class="cost"' in text))
@@ -456,7 +456,7 @@ def test_a_cost_is_that_of_the_timing_pass_and_not_of_the_run(comparisons: list[
         for r in comparisons[0].runs
     ]
     quiet, busy = (
-        Clock(pd.DataFrame(rows, columns=TIMED), noise_of(spread), 12.0)
+        RunTimes(pd.DataFrame(rows, columns=TIMED), noise_of(spread), 12.0)
         for spread in ([1.0, 1.0, 1.0], [0.7, 1.0, 1.3])
     )
     found = with_times(scores(comparisons[:2]), quiet)

@@ -16,7 +16,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from reports.run.answers import Answer, put_answer, read_answer, record_of
+from reports.run.answers import ExactAnswer, put_answer, read_answer, record_of
 from scenarios.catalogue import scenario
 from scenarios.truth.cache import has_valid_types
 from tests.reports.run.small_runs import make
@@ -108,7 +108,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edited_answer_is_as_good_as_none(tmp_path: Path, edit: str):
     """Whatever was done to its file: nothing of it is read, and nothing is waited for."""
-    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
+    put_answer(
+        tmp_path / "one.npz", ExactAnswer(record_of(scenario("slow_collision")), "ok", "", 60.0)
+    )
     EDITS[edit](tmp_path / "one.npz")
 
     assert read_answer(tmp_path / "one.npz") is None
@@ -149,7 +151,9 @@ def test_an_answer_that_nobody_edited_is_believed_without_a_word(whole: Path, tm
 
 def test_the_answer_to_another_scene_is_not_the_answer_to_this_one(tmp_path: Path):
     """A file that is whole, under another name."""
-    put_answer(tmp_path / "one.npz", Answer(record_of(scenario("slow_collision")), "ok", "", 60.0))
+    put_answer(
+        tmp_path / "one.npz", ExactAnswer(record_of(scenario("slow_collision")), "ok", "", 60.0)
+    )
     shutil.copy(tmp_path / "one.npz", tmp_path / "other.npz")
 
     assert read_answer(tmp_path / "one.npz") is not None

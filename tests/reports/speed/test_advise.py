@@ -25,7 +25,7 @@ from reports.speed.advice import (
     SAVES_TIME,
     TOO_FAR_OFF,
     Attempt,
-    Change,
+    ChangedOption,
     ladder_of,
     those_that_keep,
 )
@@ -68,7 +68,7 @@ def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
     """Set against an error of 0.5 within 1 and a cost of 1 s; a saving within the noise is none."""
     plain = attempt(1, 0.1, 0.5, cost=1.0)
 
-    assert Change(plain, attempt(1, 0.1, error, cost=cost)).verdict(1.0, 0.05) == verdict
+    assert ChangedOption(plain, attempt(1, 0.1, error, cost=cost)).verdict(1.0, 0.05) == verdict
 
 
 @pytest.mark.parametrize("purpose", PURPOSES)

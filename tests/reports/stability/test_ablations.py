@@ -29,15 +29,15 @@ from reports.stability.ablations import (
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial
-from reports.stability.search import Search
-from reports.stability.variants import VARIANTS, Variant, play_as
+from reports.stability.search import LimitSearch
+from reports.stability.variants import VARIANTS, DrivenEngine, play_as
 from scenarios.catalogue import scenario
 
 
 @cache
-def found(case: str, engine: str) -> tuple[Search, Limit]:
+def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
     """The limit of an engine, and the search that remembers its failing run."""
-    search = Search(CASES[case], engine, QUICK)
+    search = LimitSearch(CASES[case], engine, QUICK)
     return search, search.limit()
 
 
@@ -90,8 +90,8 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
         engine.load = lambda scene, dt: load(replace(scene, restitution=scene.restitution / 2), dt)
         return engine
 
-    monkeypatch.setitem(VARIANTS, "pymunk:matched", Variant("pymunk:matched", halved))
-    search = Search(CASES["slow_collision"], "pymunk:matched", QUICK)
+    monkeypatch.setitem(VARIANTS, "pymunk:matched", DrivenEngine("pymunk:matched", halved))
+    search = LimitSearch(CASES["slow_collision"], "pymunk:matched", QUICK)
     limit = search.limit()
 
     assert limit.verdict == "never works"
@@ -114,7 +114,7 @@ def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does(
 def test_of_an_engine_whose_mechanisms_nobody_knows_there_is_no_ablation(engine: str):
     """End-of-step detection explains nothing in an engine that orders its collisions within the
     step."""
-    search = Search(CASES["overlap_recovery"], engine, QUICK)
+    search = LimitSearch(CASES["overlap_recovery"], engine, QUICK)
     assert sufficient_mechanisms(search, search.limit()) == ""
 
 

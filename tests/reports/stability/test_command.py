@@ -24,7 +24,7 @@ from reports.stability.command import write_files
 from reports.stability.limits import QUICK
 from reports.stability.maps import MAPS
 from reports.stability.results import COLUMNS, StabilityPlan, Task, done_before, tasks_of
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import VARIANTS, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
@@ -291,7 +291,7 @@ def test_an_engine_in_a_file_takes_part(tmp_path: Path):
     """It works above its threshold and fails below it, as its row says; afterwards it is gone."""
     name = f"{with_threshold(tmp_path)}:own"
     with taking_part({name: read_row(name)}):
-        search = Search(CASES["slow_collision"], name, QUICK)
+        search = LimitSearch(CASES["slow_collision"], name, QUICK)
         works = [search.trial(value, 2).works for value in (2.0, 0.5)]
 
     assert works == [True, False]

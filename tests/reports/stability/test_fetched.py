@@ -15,7 +15,7 @@ from adapters.npm_packages import missing
 from reports.stability.cases import CASES
 from reports.stability.limits import QUICK, Limit
 from reports.stability.results import StabilityPlan, Task
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import VARIANTS, taking_part
 from tests.reports.stability.kept_limits import FILE_OF_FETCHED, Kept, agrees, kept
 from tests.reports.terminal.command_line import crosscheck
@@ -31,7 +31,7 @@ def test_planck_is_driven_to_its_threshold():
     names = ("planck:shipped", "planck:matched")
     with taking_part({name: FETCHED[name] for name in names}):
         for name in names:
-            search = Search(CASES["slow_collision"], name, QUICK)
+            search = LimitSearch(CASES["slow_collision"], name, QUICK)
             works[name] = [search.trial(speed, 1).works for speed in (2.0, 0.5)]
 
     assert works == {"planck:shipped": [True, False], "planck:matched": [True, True]}
@@ -76,7 +76,7 @@ FAST = ("tunnelling_head_on", "slow_collision", "far_from_origin")
 def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
     """Of the cases that take less than a second."""
     with taking_part({row.engine: FETCHED[row.engine]}):
-        found = Search(CASES[row.case], row.engine, QUICK).limit()
+        found = LimitSearch(CASES[row.case], row.engine, QUICK).limit()
 
     assert agrees(found, row), (found.works_at, found.fails_at)
 

@@ -15,7 +15,7 @@ from reports.stability.cases_friction import FALL, FRICTION, in_corner
 from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
 from reports.stability.overview import findings
 from reports.stability.predicates import judge, truth_of
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import play_as
 
 MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
@@ -25,7 +25,7 @@ REFUSE = ("reference:exercise", "reference:lesson")
 @cache
 def limit(case: str, engine: str) -> Limit:
     """The limit in the quick form."""
-    return Search(CASES[case], engine, QUICK).limit()
+    return LimitSearch(CASES[case], engine, QUICK).limit()
 
 
 def bracket(case: str, engine: str) -> tuple[float, float]:
@@ -121,7 +121,7 @@ def test_a_little_less_friction_would_be_noticed():
         one = case.scene(x, run)
         return replace(one, scene=replace(one.scene, friction=0.89 * one.scene.friction))
 
-    weaker = Search(replace(case, scene=less), "reference:coulomb", QUICK).limit()
+    weaker = LimitSearch(replace(case, scene=less), "reference:coulomb", QUICK).limit()
     assert weaker.verdict == "never works"
 
 

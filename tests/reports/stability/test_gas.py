@@ -30,7 +30,7 @@ from reports.stability.predicates_gas import (
     literature,
     shares_of_speeds,
 )
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import play_as
 from scenarios.catalogue import SCENARIOS
 from scenarios.model import Scenario, Trajectory, frozen
@@ -250,7 +250,7 @@ def test_the_limit_of_a_fast_gas_is_that_of_other_draws_too(engine: str):
     def fails_at(seeds: int, by_chance: float) -> float:
         case = CASES["fast_gas"]
         other = replace(case, scene=lambda x, run: case.scene(x, run + seeds), by_chance=by_chance)
-        return Search(other, engine, QUICK).limit().fails_at
+        return LimitSearch(other, engine, QUICK).limit().fails_at
 
     limits = [fails_at(seeds, CASES["fast_gas"].by_chance) for seeds in (0, 100, 200)]
     first = [fails_at(seeds, 0.0) for seeds in (0, 100, 200)]

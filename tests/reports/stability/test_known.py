@@ -15,9 +15,9 @@ from reports.stability.cases import CASES
 from reports.stability.cases_alone import ball, far, on_spring, oscillator
 from reports.stability.limits import QUICK, Limit
 from reports.stability.predicates import apexes
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
-from reports.stability.variants import VARIANTS, Variant, play_as, played
+from reports.stability.variants import VARIANTS, DrivenEngine, play_as, played
 from scenarios.model import Scenario, Trajectory
 
 PARTNERS = [
@@ -36,7 +36,7 @@ DISCRETE = [
 @cache
 def limit(case: str, engine: str) -> Limit:
     """The limit in the quick form."""
-    return Search(CASES[case], engine, QUICK).limit()
+    return LimitSearch(CASES[case], engine, QUICK).limit()
 
 
 def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) -> None:
@@ -130,13 +130,13 @@ def apex_drift(scenario: Scenario, played: Trajectory) -> float:
     return float((heights[-1] - heights[0]) / (len(heights) - 1)) if len(heights) > 1 else np.nan
 
 
-def drift(engine: str | Variant, x: float, runs: int = 1) -> float:
+def drift(engine: str | DrivenEngine, x: float, runs: int = 1) -> float:
     """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt
     / fall time."""
     found = []
     for scenario in (ball(x, run) for run in range(runs)):
         trajectory = played(
-            engine if isinstance(engine, Variant) else VARIANTS[engine], scenario
+            engine if isinstance(engine, DrivenEngine) else VARIANTS[engine], scenario
         ).trajectory
         assert trajectory is not None
         height = scenario.scene.position[0, 1] - scenario.scene.radius[0]
@@ -154,14 +154,14 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
     assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
     # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall,
     # and the gain with it.
-    no_ccd = Variant(
+    no_ccd = DrivenEngine(
         "box2d:matched+no_ccd", partial(changed, "box2d:matched", continuous=False, bullet=False)
     )
     assert drift(no_ccd, 0.01) == pytest.approx(1.0, rel=0.1)
     assert abs(drift("box2d:matched", 0.01)) < 0.01
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
     # A soft contact gives back more or less with the phase of the collision in its step.
-    soft = Variant(
+    soft = DrivenEngine(
         "box2d_v3:matched+soft", partial(changed, "box2d_v3:matched", length_unit=0.02, hertz=30.0)
     )
     assert drift(soft, 0.005, runs=6) == pytest.approx(-1 / 4, rel=0.25)
@@ -238,7 +238,7 @@ def test_a_wrong_threshold_would_be_noticed():
     """The negative control: a scene that closes at twice the speed does not fail at 1 m/s."""
     case = CASES["slow_collision"]
     faster = replace(case, scene=lambda x, run: case.scene(2 * x, run))
-    found = Search(faster, "box2d:shipped", QUICK).limit()
+    found = LimitSearch(faster, "box2d:shipped", QUICK).limit()
 
     assert not min(found.works_at, found.fails_at) <= 1.0 <= max(found.works_at, found.fails_at)
 

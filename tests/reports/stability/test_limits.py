@@ -14,7 +14,7 @@ import pytest
 from adapters.engines import ENGINES, UNASKED
 from reports.stability.cases import CASES
 from reports.stability.limits import FULL, NEVER_FAILS, QUICK, Limit, engines_of
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import VARIANTS
 from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
 
@@ -54,7 +54,7 @@ CHANGED = (
 @cache
 def quick(case: str, engine: str) -> Limit:
     """Found here and now in the quick form."""
-    return Search(CASES[case], engine, QUICK).limit()
+    return LimitSearch(CASES[case], engine, QUICK).limit()
 
 
 def assert_agrees(row: Kept) -> None:
@@ -107,7 +107,7 @@ def wrong_ends(row: Kept) -> list[float]:
     The file keeps six digits, and which bounce comes too low may hang on the seventh; a hundredth
     is the width of a bracket of the full form.
     """
-    search = Search(CASES[row.case], row.engine, QUICK)
+    search = LimitSearch(CASES[row.case], row.engine, QUICK)
     away = FULL.ratio if row.fails_at > row.works_at else 1 / FULL.ratio
     ends = [(row.works_at, True, 1 / away), (row.fails_at, False, away)]
     return [
@@ -199,7 +199,7 @@ def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine:
     found = quick("bounce_drift", engine)
     case = CASES["bounce_drift"]
     others = [0.0021, 0.0026, 0.0034, 0.0039, 0.0043, 0.0046]
-    search = Search(
+    search = LimitSearch(
         replace(case, scene=lambda x, run: case.scene(x, run + 100), runs=8), engine, QUICK
     )
 

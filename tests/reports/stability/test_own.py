@@ -26,7 +26,7 @@ from reports.stability.interventions import (
 )
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
-from reports.stability.search import Search
+from reports.stability.search import LimitSearch
 from reports.stability.variants import VARIANTS, play_as
 from reports.stability.vary import VARIES, case_of_file, varied
 from scenarios.files.scene_file import read_scene_file
@@ -40,7 +40,7 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
     """The limit on a scene of tests/data/scenes, with the intervention that removes its failure,
     asked without an ablation."""
     path = str(SCENES / scene)
-    search = Search(case_of_file(path, what), engine, QUICK)
+    search = LimitSearch(case_of_file(path, what), engine, QUICK)
     limit = search.limit()
     [known] = explained(
         [replace(limit, case=f"{path}:{what}", intervention=intervention_of(search, limit))]
@@ -83,7 +83,7 @@ def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_cal
     """Where the step is what is varied, a finer one is no proof: end-of-step detection alone has
     the limit. Or nothing helps."""
     path = str(SCENES / "two.toml")
-    search = Search(case_of_file(path, "dt"), "pymunk:matched", QUICK)
+    search = LimitSearch(case_of_file(path, "dt"), "pymunk:matched", QUICK)
     [limit] = explained([with_replays(search, replace(search.limit(), case=f"{path}:dt"))])
     assert limit.why == "a collision takes effect at the end of the step in which it is found"
     assert (
@@ -168,12 +168,14 @@ def test_a_collision_that_nobody_makes_fails_however_near_to_the_start_it_is():
     """`match` leaves out a collision within two steps of the start; but a pair that should
     collide and never does is a wrong collision."""
     path = str(SCENES / "two.toml")
-    search = Search(case_of_file(path, "speed"), "reference:exercise", QUICK)
+    search = LimitSearch(case_of_file(path, "speed"), "reference:exercise", QUICK)
     fast = search.trial(1000.0)
 
     assert (fast.works, fast.broken) == (False, "collisions")
     assert search.trial(1.0).works
-    assert Search(case_of_file(path, "speed"), "event_driven:float64", QUICK).trial(1000.0).works
+    assert (
+        LimitSearch(case_of_file(path, "speed"), "event_driven:float64", QUICK).trial(1000.0).works
+    )
 
 
 def test_a_disk_that_float32_keeps_where_it_is_fails():
@@ -181,7 +183,7 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
     velocity says."""
     path = str(SCENES / "two.toml")
     far = {
-        name: Search(case_of_file(path, "offset"), name, QUICK).trial(1e6)
+        name: LimitSearch(case_of_file(path, "offset"), name, QUICK).trial(1e6)
         for name in VARIANTS
         if "+" not in name
     }
@@ -195,7 +197,7 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
 @pytest.mark.parametrize("x", [0.00294, 0.0167])
 def test_a_disk_that_is_struck_twice_between_two_samples_is_not_called_stuck(x: float):
     """In the cradle it leaves as it came, at rest or not, and has gone less than that."""
-    trial = Search(CASES["dt_cradle_with_gaps"], "box2d_v3:matched", FULL).trial(x)
+    trial = LimitSearch(CASES["dt_cradle_with_gaps"], "box2d_v3:matched", FULL).trial(x)
     assert trial.works, trial.event
 
 

@@ -29,8 +29,8 @@ from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure
 from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.results import Task, failed, limit_from, row_of
-from reports.stability.search import Search
-from reports.stability.variants import Variant, play_as
+from reports.stability.search import LimitSearch
+from reports.stability.variants import DrivenEngine, play_as
 from scenarios.families.placing import lay_out
 from scenarios.model import Scenario, Trajectory
 
@@ -59,7 +59,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
             "made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,)
         )
 
-    def play(_: Variant, scenario: Scenario) -> tuple[Scenario, Run]:
+    def play(_: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
         start = scenario.scene.state
         arrays = [
             np.array([a, a])
@@ -74,7 +74,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
 
 def limit_of(one: Case, form: Any = FULL) -> Limit:
     """The limit of an engine that does not matter."""
-    return Search(one, "reference:exercise", form).limit()
+    return LimitSearch(one, "reference:exercise", form).limit()
 
 
 UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
@@ -139,7 +139,7 @@ def test_what_works_only_where_it_is_harsh_is_called_so():
 def test_one_run_in_sixteen_is_enough_to_fail_and_is_the_one_that_is_kept():
     """The fraction that failed stands beside the limit; one run alone would have seen nothing."""
     rare = case(lambda x, run: 2.0 if run == 11 and x > 17 else 0.5, UP, runs=16)
-    search = Search(rare, "reference:exercise", FULL)
+    search = LimitSearch(rare, "reference:exercise", FULL)
     found = search.limit()
     failing = found.failing
 
@@ -232,8 +232,8 @@ def test_one_phase_alone_would_overlook_the_limit():
     one = CASES["tunnelling_head_on"]
     blind = replace(one, scene=lambda x, _run: at_speed(x, 1), runs=1)
 
-    assert Search(blind, "reference:exercise", QUICK).limit().works_at > 3.5
-    assert Search(one, "reference:exercise", QUICK).limit().fails_at < 2.1
+    assert LimitSearch(blind, "reference:exercise", QUICK).limit().works_at > 3.5
+    assert LimitSearch(one, "reference:exercise", QUICK).limit().fails_at < 2.1
 
 
 def test_a_worker_that_dies_is_a_row_of_the_table():
@@ -261,8 +261,8 @@ def test_a_limit_comes_back_from_the_journal_as_it_was():
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     """A prediction outside the bracket, or a variant that gets no farther, tests nothing."""
-    slow = Search(CASES["slow_collision"], "box2d:shipped", QUICK).limit()
-    free = Search(CASES["slow_collision"], "box2d:matched", QUICK).limit()
+    slow = LimitSearch(CASES["slow_collision"], "box2d:shipped", QUICK).limit()
+    free = LimitSearch(CASES["slow_collision"], "box2d:matched", QUICK).limit()
     elsewhere = replace(slow, works_at=4.0, fails_at=3.9)
     [both, _], [alone], [wrong, _] = (
         explained([slow, free]),
@@ -285,7 +285,9 @@ def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_p
     assert whole is not None
     failing = Trial(0.3, 1, 1, 2.0, first=0, at=float(scenario.times[3000]))
     found = Limit("gas", "reference:exercise", "quick", "never works", nan, 0.3, (failing,))
-    search = Search(CASES["fast_gas"], "reference:exercise", QUICK, seen={0.3: (scenario, run)})
+    search = LimitSearch(
+        CASES["fast_gas"], "reference:exercise", QUICK, seen={0.3: (scenario, run)}
+    )
     (tmp_path / "trajectories").mkdir()
     keep_failure(search, found, tmp_path)
     kept = kept_failure(found, tmp_path, scenario)

@@ -19,7 +19,7 @@ from reports.commands import run as run_command
 from reports.run.folders import RUN, begun, made_anew, replace_folder
 from reports.run.made import (
     MADE,
-    Kind,
+    FolderKind,
     Made,
     foreign_file_in,
     may_overwrite,
@@ -160,7 +160,7 @@ def test_the_folder_of_a_run_is_known_for_what_it_is(finished: Path):
         read_made(finished).files
     )  # type: ignore[union-attr]
     assert (
-        foreign_file_in(finished, Kind("crosscheck speed"))
+        foreign_file_in(finished, FolderKind("crosscheck speed"))
         == "was made by crosscheck run, not by crosscheck speed"
     )
 
@@ -443,7 +443,7 @@ def test_what_is_refused_before_it_is_written_leaves_the_record_as_it_was(tmp_pa
 def test_what_is_made_anew_takes_its_place_whole_or_not_at_all(tmp_path: Path):
     """The folder of lessons, and of settings: the old one stays if it fails, or if somebody has put
     something there."""
-    kind, target = Kind("crosscheck lesson"), tmp_path / "all"
+    kind, target = FolderKind("crosscheck lesson"), tmp_path / "all"
 
     def make(text: str, fails: bool = False) -> None:
         with made_anew(target, kind, "--export") as part, writing(part, ["index.html"]):

@@ -19,7 +19,7 @@ from reports.tune.search import (
     COLUMNS,
     NO_SEARCH,
     TUNED,
-    Search,
+    SettingsSearch,
     searched_of,
     shown,
 )
@@ -182,7 +182,7 @@ def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.Monk
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
     monkeypatch.setattr("reports.tune.search.searched_of", lambda _: slop)
-    search = Search("pymunk", ("column", "landing"), ((0, 1), (2, 3)), say=lambda _: None)
+    search = SettingsSearch("pymunk", ("column", "landing"), ((0, 1), (2, 3)), say=lambda _: None)
     table = search.run()
 
     assert search.chosen == PYMUNK
