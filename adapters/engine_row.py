@@ -70,7 +70,12 @@ class EngineRow:
             new process; False for all of `ENGINES` (a test plays each after others, bit for bit).
         distributions: the installed packages, by their names in pip, whose versions affect its
             numbers.
-        mark: how it is drawn; None: a colour and a shape are chosen that no other engine has.
+        mark: how it is drawn, the same for all profiles of an engine; None: a colour and a shape
+            are chosen that no other engine has.
+        dash: what tells its lines from those of the engine's other profiles: lengths of stroke and
+            gap in px. With a dash its mark is open; () is a solid line and a filled mark.
+        shape: in place of that of `mark`, where an open and a filled one do not tell all profiles
+            of the engine apart; "": that of `mark`.
         work: its `AccuracyParameter`; None if it has none.
         options: a change of one feature, in a few words -> parameters of `make`; `crosscheck speed`
             measures what it costs and breaks.
@@ -101,6 +106,8 @@ class EngineRow:
     leaves_state: bool = False
     distributions: tuple[str, ...] = ()
     mark: Mark | None = None
+    dash: tuple[int, ...] = ()
+    shape: str = ""
     work: AccuracyParameter | None = None
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     variants: Mapping[str, Variant] = field(default_factory=dict, hash=False)

@@ -152,6 +152,7 @@ _Rapier = partial(
     mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
     searched=partial(_javascript_searched, "rapier2d"),
 )
+SHIPPED = (6, 3)  # the dash of every profile of this name
 _BULLETS = "continuous collision, moving disks are bullets"
 
 ENGINES: dict[str, EngineRow] = {
@@ -167,6 +168,8 @@ ENGINES: dict[str, EngineRow] = {
         "reference:exercise to the bit, sooner: 636 lines, no pair asked that is far",
         1.0,
         FLOAT64,
+        dash=(7, 5),
+        shape="x",
         bits_of="reference:exercise",
     ),
     "reference:lesson": _Reference(
@@ -174,12 +177,15 @@ ENGINES: dict[str, EngineRow] = {
         "hand-written, the lesson: explicit Euler; 127 lines, asks every pair",
         0.0,
         FLOAT64,
+        dash=(2, 3),
     ),
     "reference:coulomb": _Reference(
         _coulomb,
         "hand-written: the exercise with friction; 79 lines, asks every pair",
         1.0,
         FLOAT64,
+        dash=(12, 3),
+        shape="triangle-left",
         bits_of="reference:exercise",
         adds_friction=True,
     ),
@@ -188,6 +194,8 @@ ENGINES: dict[str, EngineRow] = {
         "hand-written: exact flight, collisions in order, friction; 541 lines, no projection",
         0.5,
         FLOAT64,
+        dash=(9, 3, 2, 3),
+        shape="hourglass",
         orders_collisions=True,
     ),
     "pymunk:shipped": _Pymunk(
@@ -195,6 +203,7 @@ ENGINES: dict[str, EngineRow] = {
         "pymunk 7.3 (float64) as it comes: elasticity e on every shape",
         0.0,
         FLOAT64,
+        dash=SHIPPED,
     ),
     "pymunk:matched": _Pymunk(
         partial(_pymunk, "matched"),
@@ -220,6 +229,7 @@ ENGINES: dict[str, EngineRow] = {
         "box2d-py 2.3.8 (float32) as it comes: friction, sleep, threshold 1 m/s",
         1.0,
         FLOAT32,
+        dash=SHIPPED,
     ),
     "box2d:matched": _Box2D(
         partial(_box2d, "matched"),
@@ -247,6 +257,7 @@ ENGINES: dict[str, EngineRow] = {
         "Box2D 3.1 (pyb2d3, float32) as it comes: friction, sleep, threshold 1 m/s",
         0.625,
         FLOAT32,
+        dash=SHIPPED,
     ),
     "box2d_v3:matched": _Box2DV3(
         partial(_box2d_v3, "matched"),
@@ -291,6 +302,7 @@ FETCHED: dict[str, EngineRow] = {
         "planck 1.5 as it comes: Box2D 2.3 in JavaScript and float64",
         1.0,
         FLOAT64,
+        dash=SHIPPED,
     ),
     "planck:matched": _Planck(
         partial(_javascript, "planck", "matched"),
@@ -303,6 +315,7 @@ FETCHED: dict[str, EngineRow] = {
         "matter-js 0.20 (float64) as it comes: 100 pixels a metre, disks are polygons, air brakes",
         1.0,
         VERLET,
+        dash=SHIPPED,
         departs=dict.fromkeys(
             ("steps_obey_dt", "force_lasts_one_step", "same_instant"),
             "friction of the air: 1 % of the speed in 1/60 s, its default",
@@ -319,6 +332,7 @@ FETCHED: dict[str, EngineRow] = {
         "Rapier 0.21 (WebAssembly, float32) as it comes: friction, sleep, length unit 1 m",
         0.625,
         FLOAT32,
+        dash=SHIPPED,
     ),
     "rapier2d:matched": _Rapier(
         partial(_javascript, "rapier2d", "matched", float32=True),

@@ -51,7 +51,8 @@ class Look(NamedTuple):
 
 
 OF_TRUTH = Mark("#16191d", "#f4f4f2", "circle")
-# The shapes as SVG paths about the origin, as large as an 8 px mark of plotly.
+# The shapes as SVG paths about the origin, as large as an 8 px mark of plotly, by plotly's names.
+# Those of `PALETTE` are for rows without a mark and for files, not for a row to choose.
 PATHS = {
     "circle": "M4,0A4,4 0 1 1 -4,0A4,4 0 1 1 4,0Z",
     "triangle-up": "M0,-4.6L4.3,3H-4.3Z",
@@ -78,17 +79,7 @@ PALETTE = (
     Mark("#3d6b1f", "#a4d67a", "pentagon"),
     Mark("#7a4a21", "#e0a878", "bowtie"),
 )
-DASHED = {
-    "shipped": (6, 3),
-    "lesson": (2, 3),
-    "ordered": (9, 3, 2, 3),
-    "neighbours": (7, 5),
-    "coulomb": (12, 3),
-}
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
-# For an engine with more than two profiles: filled and open marks distinguish two where there is
-# no colour and no line; the others have their own shapes.
-SHAPED = {"ordered": "hourglass", "neighbours": "x", "coulomb": "triangle-left"}
 
 # Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep
 # to pale on dark.
@@ -122,8 +113,9 @@ HEAT_DARK = (
 def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile`, or the truth, is drawn."""
     light, dark, shape = OF_TRUTH if engine == TRUTH else mark_of(engine)
-    dash = CHANGED if "+" in profile else DASHED.get(profile, ())
-    return Look(light, dark, dash, SHAPED.get(profile, shape), not dash)
+    row = {**FETCHED, **ENGINES}.get(f"{engine}:{profile}")
+    dash = CHANGED if "+" in profile else row.dash if row else ()
+    return Look(light, dark, dash, row.shape or shape if row else shape, not dash)
 
 
 def looks_of(names: Iterable[str]) -> dict[str, Look]:
