@@ -17,7 +17,7 @@ from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_
 from scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
-METHODS = {  # variant -> its module
+METHODS = {  # a module of reference_impl -> its settings
     "exercise": {"integrator": "symplectic Euler"},
     "neighbours": {"integrator": "symplectic Euler"},
     "coulomb": {"integrator": "symplectic Euler"},

@@ -173,19 +173,20 @@ def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: py
 
 def test_the_readme_counts_as_the_tables_do():
     """Scenes, engines, probes and lessons are as many as it says."""
-    patterns = (
-        r"(\d+) scenes through\s+(\d+) engines",
-        r"answers (\d+) probes",
-        r"lesson`: (\d+) lessons",
-    )
-    said = [re.search(pattern, TEXT) for pattern in patterns]
+    patterns = {
+        "scenes": r"(\d+) scenes through",
+        "engines": r"through\s+(\d+) engines",
+        "probes": r"answers (\d+) probes",
+        "lessons": r"lesson`: (\d+) lessons",
+    }
+    said = {what: re.search(pattern, TEXT) for what, pattern in patterns.items()}
 
-    assert [int(number) for one in said if one for number in one.groups()] == [
-        len(SCENARIOS),
-        len(UNASKED),
-        len(PROBES),
-        len(LESSONS),
-    ]
+    assert {what: int(found.group(1)) for what, found in said.items() if found} == {
+        "scenes": len(SCENARIOS),
+        "engines": len(UNASKED),
+        "probes": len(PROBES),
+        "lessons": len(LESSONS),
+    }
 
 
 def test_the_readme_counts_the_solvers_of_the_confusion_table():

@@ -15,10 +15,12 @@ from adapters.advance import thrust_steps
 from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
 from adapters.engine import NOT_REPORTED
 from adapters.engines import ENGINES
+from adapters.mechanisms import ablated_reference
 from adapters.play import play
-from adapters.reference import Reference
+from adapters.reference import METHODS, Reference
 from adapters.run import STATUSES
 from reference_impl import exercise
+from reference_impl.blocks import ADVANCE
 from reports.run.cells import Cell
 from reports.run.playing import play_cell
 from scenarios.catalogue import scenario as from_catalogue
@@ -299,6 +301,21 @@ def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
             assert resolved == pytest.approx(wanted, rel=2.0**-24), setting  # float32
         elif wanted is not None:
             assert resolved == wanted, setting
+
+
+HAND_WRITTEN = [name for name in ENGINES if name.startswith("reference:")]
+
+
+def test_a_hand_written_solver_says_its_integrator_and_is_entered_with_two_arrays():
+    """Neither is missed by a run: settings would just be shorter, and calls longer."""
+    solvers = {name: ENGINES[name].make() for name in HAND_WRITTEN}
+
+    assert all(isinstance(solver, Reference) for solver in solvers.values())
+    assert [name for name, solver in solvers.items() if solver.name not in METHODS] == []
+    assert [n for n, solver in solvers.items() if solver.variant.__name__ not in ADVANCE] == []
+    # the control: a module of another folder, which `Reference` plays, too
+    assert Reference(ablated_reference).name not in METHODS
+    assert ablated_reference.__name__ not in ADVANCE
 
 
 def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
