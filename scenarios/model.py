@@ -128,7 +128,8 @@ class Scenario:
 
     @property
     def middle_substeps(self) -> int:
-        """Substeps of the middle step size, whose errors are the scores of the report."""
+        """Substeps of the middle step size, whose errors are the scores of the report; of an even
+        number of step sizes the finer of the two in the middle."""
         return self.substeps[len(self.substeps) // 2]
 
     def dt(self, substeps: int) -> float:

@@ -226,6 +226,20 @@ def test_every_file_that_a_document_names_exists(document: str):
         assert (folder / path).exists(), path
 
 
+def test_the_functions_of_a_score_are_in_the_files_that_architecture_names():
+    """A row of its table names files, and functions that one of them defines."""
+    table = TEXTS["ARCHITECTURE.md"].partition("| where |")[2].partition("\n\n")[0]
+    rows = [re.findall(r"`([\w/.]+)`", line) for line in table.splitlines()[2:]]
+    missing = []
+    for row in rows:
+        source = "".join((ROOT / name).read_text("utf-8") for name in row if "/" in name)
+        named = [name for name in row if "/" not in name and name.islower() and "." not in name]
+        missing += [name for name in named if f"def {name}(" not in source]
+
+    assert len(rows) > 5
+    assert missing == []
+
+
 def test_the_front_page_is_short_and_leads_to_every_other():
     """A page, and two clicks at most."""
     linked = re.findall(r"\]\(([^)]+)\)", TEXT + TEXTS["ARCHITECTURE.md"])
