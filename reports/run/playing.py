@@ -30,7 +30,7 @@ LOADING = 300.0
 
 class CellResult(NamedTuple):
     """What a worker returns for a cell: the run, its trajectory packed into a file, and the
-    versions that played it."""
+    `source_and_versions` that played it."""
 
     run: Run
     samples: int
@@ -66,7 +66,7 @@ def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
     allow(LOADING)
     run = play_cell(cell, row, scenario, ClockStart(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
-    return CellResult(replace(run, trajectory=None), samples, file, engine())
+    return CellResult(replace(run, trajectory=None), samples, file, source_and_versions())
 
 
 def conform_here(name: str, row: EngineRow) -> list[Finding]:
@@ -79,6 +79,6 @@ def conform_here(name: str, row: EngineRow) -> list[Finding]:
     return conform(name, row)
 
 
-def engine() -> str:
+def source_and_versions() -> str:
     """The source hash and the versions with which this process plays."""
     return repr((versions(), source_hash()))

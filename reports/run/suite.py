@@ -24,7 +24,7 @@ from reports.run.journal import Journal, plain
 from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
 from reports.run.machine import about
 from reports.run.made import writing
-from reports.run.playing import CellResult, conform_here, engine, play_here
+from reports.run.playing import CellResult, conform_here, play_here, source_and_versions
 from reports.run.runner import TIMEOUT, run_all
 from reports.run.scene_tables import SceneTasks
 from reports.run.scenes import open_scene, with_steps
@@ -350,7 +350,7 @@ def keep_cell(
     """Write the trajectory of the cell with this `key`, then its line, which is returned."""
     played = failed(cell, scenario, result) if isinstance(result, Failure) else result
     run, samples = played.run, played.samples
-    if played.played_by != engine():
+    if played.played_by != source_and_versions():
         raise OtherVersions(
             "a worker has other versions or other source of the engines than this machine"
         )
@@ -399,7 +399,9 @@ def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
         failure.status,
         failure.reason + last,
     )
-    return CellResult(run, samples, packed(trajectory) if trajectory else b"", engine())
+    return CellResult(
+        run, samples, packed(trajectory) if trajectory else b"", source_and_versions()
+    )
 
 
 def take_timings(
