@@ -158,7 +158,7 @@ class Game {
     const { t, i, j, shared, solid_only: mine } = flyer.diverged;
     const only = shortName(mine ? this.field.engines[this.now.solid] : name);
     if (i === undefined) return `${t.toFixed(2)} s: the ship leaves the field in ${only} only`;
-    return `after ${pairOf(i, j)} collide at ${t.toFixed(2)} s, in ${shared ? "both engines" : `${only} only`}`;
+    return `${t.toFixed(2)} s: ${pairOf(i, j)} collide in ${shared ? "both" : `${only} only`}`;
   }
 
   // Over the last second; the flight is slowed where the engines, the way to the server or the screen are too slow.
@@ -266,7 +266,7 @@ class Game {
 
 const keyOf = (event) => KEYS[event.key] ?? KEYS[event.key.toLowerCase()];
 const farewell = ({ left, left_at: at }) => at ? `left at ${at.toFixed(2)} s: ${left}` : `does not fly: ${left}`;
-const bodyOf = (k) => k === SHIP ? "the ship" : k < 0 ? `wall ${-1 - k}` : `disk ${k}`;
+const bodyOf = (k) => k === SHIP ? "ship" : k < 0 ? `wall ${-1 - k}` : `disk ${k}`;
 const pairOf = (i, j) => i === SHIP || j !== SHIP ? `${bodyOf(i)} and ${bodyOf(j)}` : pairOf(j, i);
 const raised = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
 

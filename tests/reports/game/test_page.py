@@ -159,16 +159,16 @@ def test_every_number_of_the_table_has_four_digits(first_frame: Page):
 def test_the_last_collision_before_a_divergence_is_named(first_frame: Page):
     """Its bodies, its time, and in which engine it is."""
     story = "(diverged) => game.story({ diverged }, 'pymunk:shipped')"
-    hit = {"t": 2.351, "shared": False, "solid_only": True}
+    last = {"t": 2.351, "shared": False, "solid_only": True}
     said = [
-        first_frame.evaluate(story, hit | pair)
+        first_frame.evaluate(story, last | pair)
         for pair in ({"i": 3, "j": SHIP}, {"i": SHIP, "j": -3}, {"i": 2, "j": 5, "shared": True})
     ]
 
     assert said == [
-        "after the ship and disk 3 collide at 2.35 s, in reference:exercise only",
-        "after the ship and wall 2 collide at 2.35 s, in reference:exercise only",
-        "after disk 2 and disk 5 collide at 2.35 s, in both engines",
+        "2.35 s: ship and disk 3 collide in reference:exercise only",
+        "2.35 s: ship and wall 2 collide in reference:exercise only",
+        "2.35 s: disk 2 and disk 5 collide in both",
     ]
 
 
@@ -193,8 +193,8 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     assert max(together) < 0.71 * FRAME / 16
     assert {diverged["i"], diverged["j"]} == {collisions.i[0], collisions.j[0]}
     assert 0 <= diverged["t"] - collisions.t[0] <= 2 * FRAME
-    pair = f"disk {diverged['i']} and disk {diverged['j']}".replace(f"disk {SHIP} ", "the ship ")
-    assert story == f"after {pair} collide at {diverged['t']:.2f} s, in both engines"
+    pair = f"disk {diverged['i']} and disk {diverged['j']}".replace(f"disk {SHIP} ", "ship ")
+    assert story == f"{diverged['t']:.2f} s: {pair} collide in both"
     assert marks[0]["name"] == "pymunk:shipped"
     assert page.evaluate("game.now.flyers[1].deviation") > 1e-3
 
