@@ -13,7 +13,7 @@ from reports.check.marks import Marked, number
 from reports.check.page import GENERATOR
 from reports.check.rows import TASKS
 from reports.check.terminal import same_code, sentence_on
-from reports.check.verdict import headline
+from reports.check.verdict import Tally, headline
 from reports.page.documents import render
 from reports.run.made import sealed
 from reports.terminal.foreign_text import put_text
@@ -50,6 +50,7 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
         causes=bars(causes(marked)),
         copies=same_code(root, checks),
         not_read=sentence_on(marked[0].not_read) if marked[0].not_read else "",
+        counted=Tally._fields,
         number=number,
         version=version("crosscheck2d"),
     )

@@ -13,7 +13,7 @@ from reports.check.picture import data_url, legend
 from reports.check.rows import TASKS, Verdict, shown
 from reports.check.scene_words import faults_of, scene_lines, together
 from reports.check.smallest_scene import DT, Smallest
-from reports.check.verdict import FileCheck
+from reports.check.verdict import FileCheck, Tally
 from reports.page import style
 from reports.page.documents import ENGINE, render
 from reports.page.replay import pack_layers, ratio_of
@@ -75,6 +75,7 @@ def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None
         check=check,
         tasks=TASKS,
         groups=GROUPS,
+        counted=Tally._fields,
         shows=shows,
         together=together,
         unseen=unseen(check, scenes),

@@ -14,7 +14,7 @@ from adapters.own_solver.file import printable
 from reports.check.outcomes import OUTCOMES
 from reports.check.rows import TASKS, CheckRow
 from reports.check.scene_words import faults_of, scene_lines, together
-from reports.check.verdict import FileCheck, headline, named, numbers_of
+from reports.check.verdict import FileCheck, Tally, headline, named, numbers_of
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
@@ -34,6 +34,7 @@ LEGEND = (
     "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not"
     " asked, or only in part: the file has no such part, or a FAULT hides it."
 )
+LEAST = 24  # columns of a name: student and file are told by its ends
 
 
 def print_file(one: FileCheck) -> None:
@@ -82,14 +83,17 @@ def print_fault(console: Console, number: int, row: CheckRow, also: Sequence[Che
 
 def print_tasks(console: Console, one: FileCheck) -> None:
     """Print the verdict of every task, the number of questions asked and of wrong answers."""
-    table = Table("task", "verdict", "asked", "wrong", box=None, padding=(0, 2, 0, 0))
+    table = Table("task", "verdict", *Tally._fields, box=None, padding=(0, 2, 0, 0))
     for task, title in TASKS.items():
-        rows, style = one.of(task), STYLE[one.tasks[task]]
-        if rows:
-            asked = sum(row.verdict != "not asked" for row in rows)
-            wrong = sum(row.verdict in ("fault", "follows") for row in rows)
-            table.add_row(title, Text(one.word(task), style), str(asked), str(wrong or ""))
+        if one.of(task):
+            verdict = Text(one.word(task), STYLE[one.tasks[task]])
+            table.add_row(title, verdict, *map(shown, one.tally(task)))
     console.print(table)
+
+
+def shown(count: int) -> str:
+    """A count in a table; nothing for none, so that what is wrong stands out."""
+    return str(count or "")
 
 
 def print_scene(scenes: Sequence[Smallest], page: Path) -> None:
@@ -136,20 +140,24 @@ def elided(name: str, room: int) -> str:
 
 
 def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[str] = ()) -> None:
-    """Print a row for each file with a verdict for every task; below, the meaning of the signs, the
-    first sentence of each file, the copies, and other entries of the folder."""
+    """Print a row for each file with a verdict for every task and the numbers of questions; below,
+    the meaning of the signs, the first sentence of each file, the copies, and other entries of the
+    folder."""
     console = Console()
     widest = {
         task: max(len(task), *(len(OUTCOMES[one.tasks[task]].short) for one in checks))
         for task in TASKS
     }
-    # beside all tasks, or beside some on a narrow terminal
-    room = max(console.width // 2, console.width - sum(width + 1 for width in widest.values()))
+    columns = [*widest.values(), *map(len, Tally._fields)]
+    beside = console.width - sum(width + 1 for width in columns)
+    room = (
+        beside if beside >= LEAST else console.width // 2
+    )  # then in two tables, one below the other
     rows: list[list[str | Text]] = []
     for one in checks:
         words = [Text(OUTCOMES[word].short, STYLE[word]) for word in one.tasks.values()]
-        rows.append([elided(name_in(folder, one), room), *words])
-    print_table(console, ["solver", *TASKS], rows, left=list(TASKS))
+        rows.append([elided(name_in(folder, one), room), *words, *map(shown, one.tally())])
+    print_table(console, ["solver", *TASKS, *Tally._fields], rows, left=list(TASKS))
     console.print(f"\n{LEGEND}", highlight=False)
     first = {
         name_in(folder, one): one.brief.removeprefix(f"{one.path}: ")

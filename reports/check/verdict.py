@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 from adapters.own_engine.surface import is_engine
 from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
@@ -18,6 +19,14 @@ RUN_INSTEAD = "to judge it: crosscheck run bouncing_ball_e09 --engine"
 MOST = 3  # sentences
 NONE = "holds no .js and no .py file"
 NAMED = 3  # files that are none
+
+
+class Tally(NamedTuple):
+    """Questions: how many could be asked, and how many of them have a wrong answer. The names of
+    the fields head these columns in every table of a check."""
+
+    asked: int
+    wrong: int
 
 
 @dataclass(frozen=True)
@@ -51,11 +60,6 @@ class FileCheck:
         return [row for row in self.rows if row.verdict == "free choice"]
 
     @property
-    def asked(self) -> list[CheckRow]:
-        """The rows that could be asked."""
-        return [row for row in self.rows if row.verdict != "not asked"]
-
-    @property
     def passed(self) -> bool:
         """Whether no fault was found."""
         return not self.refused and not self.faults
@@ -68,6 +72,15 @@ class FileCheck:
     def of(self, task: str) -> list[CheckRow]:
         """The rows of a task."""
         return [row for row in self.rows if row.task == task]
+
+    def tally(self, *tasks: str) -> Tally:
+        """The questions of these tasks, of all without any; a choice that is free is asked and not
+        wrong."""
+        rows = [row for row in self.rows if not tasks or row.task in tasks]
+        return Tally(
+            sum(row.verdict != "not asked" for row in rows),
+            sum(row.verdict in ("fault", "follows") for row in rows),
+        )
 
     @property
     def tasks(self) -> dict[str, Verdict]:
@@ -88,7 +101,7 @@ class FileCheck:
             return [self.refused]
         if not self.faults:
             return [
-                f"No fault found: {len(self.asked)} questions, {len(self.choices)} of them about"
+                f"No fault found: {self.tally().asked} questions, {len(self.choices)} of them about"
                 " free choices."
             ]
         return [sentence(row) for row in self.findings]

@@ -9,6 +9,7 @@ from io import StringIO
 from adapters.own_solver.file import printable
 from reports.check.marks import Marked, number
 from reports.check.rows import TASKS
+from reports.check.verdict import Tally
 
 # what a spreadsheet takes for the beginning of a formula
 FORMULA = ("=", "+", "-", "@")
@@ -20,15 +21,16 @@ def csv_text(marked: Sequence[Marked]) -> str:
     text = StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(
-        ["id", *(f"task {task}" for task in tasks), "total", "of", "not judged"]
-        + ["first cause", "seconds", "file"]
+        ["id", *(f"task {task}" for task in tasks), "total", "of", *Tally._fields]
+        + ["not judged", "begin with", "seconds", "file"]
     )
     for one in marked:
         points = {mark.task: number(mark.points) for mark in one.tasks}
         table.writerow(
             [cell(one.id), *(points.get(task, "0") for task in tasks)]
-            + [number(one.points), number(one.most), number(one.not_judged)]
-            + [cell(one.brief), f"{one.check.seconds:.2f}", cell(str(one.check.path))]
+            + [number(one.points), number(one.most), *one.check.tally()]
+            + [number(one.not_judged), cell(one.brief)]
+            + [f"{one.check.seconds:.2f}", cell(str(one.check.path))]
         )
     return text.getvalue()
 

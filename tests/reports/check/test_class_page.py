@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from time import perf_counter
 
+import pytest
 from playwright.sync_api import Browser
 
 from adapters.own_solver.file import SolverText
 from reports.check.class_page import NOTHING, bars, causes, distribution, write_class_page
+from reports.check.formats.marks_csv import csv_text
 from reports.check.marks import Marked
+from reports.check.page import write_page as write_file_page
+from reports.check.terminal import print_tasks
+from reports.check.verdict import Tally
+from reports.terminal.console import Console
 from tests.reports.check.test_marks import HOSTILE, marked, row, students
 from tests.reports.page.browsing import opened, overhang
 
@@ -32,6 +40,40 @@ def test_each_cause_counts_a_student_once_and_each_student_has_one_bar():
     assert [bar.length for bar in bars({"a": 4, "b": 1, "c": 0})] == [100.0, 25.0, 0.0]
 
 
+def test_terminal_page_and_csv_have_the_same_columns(
+    tmp_path: Path, browser: Browser, capsys: pytest.CaptureFixture[str]
+):
+    """Of a class and of one file: asked and wrong count the same questions everywhere; total, tasks
+    and what to begin with have the same headings and the same order."""
+    group = students()
+    one = group[1].check
+    write_class_page(tmp_path / "class.html", group)
+    write_file_page(tmp_path / "check.html", one, [])
+    print_tasks(Console(), one)
+    page, _ = opened(browser, (tmp_path / "class.html").as_uri())
+    heads = page.locator(".students thead th").all_inner_texts()
+    rows = [row.locator("td").all_inner_texts() for row in page.locator(".students tbody tr").all()]
+    page.context.close()
+    page, _ = opened(browser, (tmp_path / "check.html").as_uri())
+    of_file = [row.inner_text().split("\t") for row in page.locator(".tasks tr").all()]
+    page.context.close()
+    printed = [line.split("  ") for line in capsys.readouterr().out.splitlines()]
+    written = list(csv.DictReader(StringIO(csv_text(group))))
+
+    assert [word.split()[-1] for word in written[0] if word not in ("of", "seconds", "file")] == [
+        "id",
+        *(head.split()[-1] for head in heads[1:]),
+    ]
+    assert one.tally() == (len(one.rows) - 1, 2)
+    for k, name in enumerate(heads[1:]):
+        if name in Tally._fields:
+            assert [row[k] or "0" for row in rows] == [line[name] for line in written]
+    assert {"asked", "wrong"} <= {*heads}
+    assert [[word.strip() for word in line if word.strip()] for line in printed] == [
+        [word for word in row if word] for row in of_file if "".join(row[2:])
+    ]
+
+
 def of_text(name: str, text: str) -> Marked:
     """A right file of that text."""
     one = marked(name=name)
@@ -51,7 +93,9 @@ def test_a_class_is_sorted_filtered_and_opens_offline(browser: Browser, tmp_path
     ids = page.locator(".students tbody th:visible")
     everybody = ids.count()
     page.get_by_role("button", name="total").click()
-    totals = [float(x) for x in page.locator(".students tbody td:nth-child(2)").all_inner_texts()]
+    place = page.locator(".students thead th").all_inner_texts().index("total") + 1
+    cells = page.locator(f".students tbody td:nth-child({place})").all_inner_texts()
+    totals = [float(x) for x in cells]
     page.locator("#filter").fill("sign of that on a")
     filtered = ids.all_inner_texts()
     page.locator(".students details:visible summary").click()

@@ -400,5 +400,5 @@ def test_a_table_of_marks_names_who_handed_in_nothing():
 
     assert len(rows) == len(students())
     assert [one["total"] for one in rows][:2] == ["20", "15.5"]
-    assert (rows[4]["total"], rows[4]["first cause"]) == ("0", "holds no .js file")
+    assert (rows[4]["total"], rows[4]["begin with"]) == ("0", "holds no .js file")
     assert rows[0]["seconds"] == "1.50"

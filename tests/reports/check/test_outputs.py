@@ -247,7 +247,7 @@ def test_marks_of_a_class_are_written_in_several_formats_at_once(folder: Path, t
     assert done.returncode == 1
     assert [row["id"] for row in handed_in] == ["a", "ben", "cem", "dora"]
     assert [row["total"] for row in handed_in] == ["20", "17", "0", "0"]
-    assert "is not text" in handed_in[3]["first cause"]
+    assert "is not text" in handed_in[3]["begin with"]
     assert [one["id"] for one in json.loads((tmp_path / "m.json").read_text())["files"]] == [
         row["id"] for row in rows
     ]
