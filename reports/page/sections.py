@@ -13,7 +13,8 @@ from reports.page import overview, style
 from reports.page.charts import CHARTS, Drawing, packed_charts
 from reports.page.page_tables import by_name
 from reports.page.replay import frames, name_of, pack, played, ratio_of
-from scenarios.catalogue import family_of
+from scenarios.catalogue import SCENARIOS, family_of
+from scenarios.model import Scenario
 
 OWN = "Scenes of your own"
 
@@ -27,6 +28,7 @@ class ScenarioSection:
         family: the heading of the section.
         truth: a sentence on the exact answer.
         dt: s, the step size of `table`.
+        limits: the cases of the page of limits that ask of this scene, or of one like it.
         off_grid: the step sizes at which a thrust starts or stops inside a step, or "".
         fast: the step sizes at which a disk can pass through another, and caps on speed, or "".
         failures: the engines that did not play it to its end.
@@ -45,6 +47,7 @@ class ScenarioSection:
     family: str
     truth: str
     dt: float
+    limits: list[str]
     off_grid: str
     fast: str
     failures: list[overview.FailedRuns]
@@ -79,6 +82,7 @@ def section_of(
         family=family_of(scenario.name) or OWN,
         truth=truth_of(comparison),
         dt=comparison.middle_dt,
+        limits=limits_of(scenario),
         off_grid=off_grid_note(scenario),
         fast=fast_note(comparison),
         failures=overview.failures(comparison),
@@ -92,6 +96,18 @@ def section_of(
         pairs=overview.between_engines(comparison, names),
         settings=by_name(own),
     )
+
+
+# scene -> a case of `crosscheck stability` with another scene that asks something alike
+ASKED_ALIKE = {"column_of_ten": "column"}
+
+
+def limits_of(scenario: Scenario) -> list[str]:
+    """The cases of the page of limits that ask of a scene of the suite, or of one like it; scenes
+    with friction have none."""
+    if scenario.name not in SCENARIOS or scenario.scene.friction:
+        return []
+    return [f"dt_{scenario.name}", *filter(None, [ASKED_ALIKE.get(scenario.name)])]
 
 
 def by_family(sections: Sequence[ScenarioSection]) -> dict[str, list[ScenarioSection]]:

@@ -162,6 +162,7 @@ STACKS = (
         column_of,
         STANDS,
         whole=True,
+        report="column_of_ten",
     ),
     Case(
         "heavy_on_light",

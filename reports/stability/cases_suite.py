@@ -64,6 +64,7 @@ SUITE = tuple(
         runs=SEEDS if name in RANDOM else 1,
         ratio=1.2,
         refines=False,
+        report=name,
     )
     for name, build in SCENARIOS.items()
     if not build().scene.friction  # the kept limits are of the scenes without

@@ -83,6 +83,8 @@ class Case:
         by_chance: share of the runs at a value that may fail by chance, where what is read is a
             statistic or the worst of it depends on what is sampled.
         beside: what a failing run is shown beside.
+        report: a scene of the report that asks something alike; `overview.in_report` says how the
+            two differ.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Case:
     ratio: float = 1.0
     by_chance: float = 0.0
     beside: str = EXACT
+    report: str = ""
 
     @property
     def harsher(self) -> int:

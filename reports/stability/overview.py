@@ -7,14 +7,18 @@ from itertools import groupby
 from math import isnan
 from typing import NamedTuple
 
+import numpy as np
+
 from adapters.engines import ENGINES
-from reports.page.situations import ENGINE, grouped
+from reports.page.situations import ENGINE, FAR_OFF, grouped
 from reports.page.style import number
 from reports.stability.cases_friction import FRICTION
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
 from reports.stability.maps import MAPS, MapOf
 from reports.stability.touching import AT_ONCE, PAIRS, AtGap
 from reports.terminal.counts import counted, listed
+from scenarios.catalogue import scenario
+from scenarios.model import Scenario
 
 WITH_FRICTION = {case.name for case in FRICTION}
 EVERYWHERE = {"never": "everywhere"}  # the table shows where an engine fails, not where it works
@@ -60,6 +64,49 @@ def cell_of(case: Case, limit: Limit | None) -> LimitCell:
     passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
     text = limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
     return LimitCell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
+
+
+def held(case: Case) -> dict[str, str]:
+    """Symbol -> value with unit of what the numbers of a case depend on and it does not vary: the
+    step size dt and the radii R of the disks that move. A symbol is left out if it varies."""
+    ends = [case.scene(value, 0) for value in (case.values[0], case.values[-1])]
+    steps = [scenario.dt(scenario.substeps[0]) for scenario in ends]
+    radii = [scenario.scene.radius[~scenario.scene.static] for scenario in ends]
+    found = {}
+    if steps[0] == steps[1]:
+        found["dt"] = f"{number(1e3 * steps[0])} ms"
+    least, most = (sorted({float(pick(each)) for each in radii}) for pick in (np.min, np.max))
+    if len(least) == len(most) == 1:
+        span = (
+            number(least[0]) if least == most else f"{number(least[0], 2)} to {number(most[0], 2)}"
+        )
+        found["R"] = f"{span} m"
+    return found
+
+
+def in_report(case: Case) -> str:
+    """How the report judges the scene `case.report`, and how its question differs from the case's;
+    "" if the case names none."""
+    if not case.report:
+        return ""
+    one, mine = scenario(case.report), case.scene(case.values[0], 0)
+    dt = number(1e3 * one.dt(one.middle_substeps))
+    here = f"dt is {kept}" if (kept := held(case).get("dt")) else "dt is varied"
+    if np.array_equal(one.scene.position, mine.scene.position):
+        differ = f"the same scene, at dt {dt} ms; here {here}"
+    else:
+        differ = f"another scene: {setting(one)}, at dt {dt} ms; here {setting(mine)}, and {here}"
+    return (
+        f"{case.report} is {differ}. In the report an engine fails where a disk is more than"
+        f" {number(FAR_OFF)} radius from its exact position, or where there is no result; here it"
+        f" fails where {case.predicate.means}. So an engine may fail here and not there, and the"
+        " other way round."
+    )
+
+
+def setting(one: Scenario) -> str:
+    """How many walls a scene has, and how long it lasts."""
+    return f"{counted(len(one.scene.walls), 'wall')} for {number(one.duration)} s"
 
 
 def why(limit: Limit) -> str:

@@ -3,7 +3,7 @@ limit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -51,6 +51,8 @@ class CaseSection:
     reasons: list[overview.SharedReason]
     drawing: Drawing
     charts: str
+    held: Mapping[str, str]  # of `overview.held`
+    in_report: str  # of `overview.in_report`
 
     @property
     def anchor(self) -> str:
@@ -126,6 +128,8 @@ def section_of(case: Case, limits: list[Limit], folder: Path) -> CaseSection:
         overview.reasons(limits),
         drawing,
         packed_charts({"readings": drawing}),
+        overview.held(case),
+        overview.in_report(case),
     )
 
 

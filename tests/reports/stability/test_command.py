@@ -221,6 +221,12 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, results: Path
     assert not re.search(r"(?:src|href)=\"https?:", html)
     one = MAPS["dt_and_speed"]
     assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
+    wide = (
+        "[...document.querySelectorAll('.scroll')].some((box) => box.scrollWidth > box.clientWidth)"
+    )
+    assert inner < 1000 or not page.evaluate(wide)
+    row = page.locator("#limits tbody tr", has=page.locator("a[href='#c-slow_collision']"))
+    assert "closing speed, m/s dt 15.6 ms, R 0.25 m" in " ".join(row.inner_text().split())
 
 
 def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_made(results: Path):

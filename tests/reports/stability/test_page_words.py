@@ -1,0 +1,64 @@
+"""What the page of limits says beside its numbers: what a case keeps, and how the report asks."""
+
+from __future__ import annotations
+
+import pytest
+
+from reports.page.sections import limits_of
+from reports.page.situations import FAR_OFF
+from reports.page.style import number
+from reports.stability.cases import CASES
+from reports.stability.limits import Case
+from reports.stability.overview import held, in_report
+from scenarios.catalogue import SCENARIOS, scenario
+
+COLUMN = "column_of_ten"
+
+
+def played_with(case: Case, value: float) -> tuple[str, set[str]]:
+    """dt and the radii of the moving disks of a run, as the page writes them."""
+    one = case.scene(value, 0)
+    radii = one.scene.radius[~one.scene.static]
+    return f"{number(1e3 * one.dt(one.substeps[0]))} ms", {number(r) for r in radii}
+
+
+@pytest.mark.parametrize("name", ["slow_collision", "column", "tunnelling_thick_wall", "spin"])
+def test_what_a_case_keeps_is_that_of_every_run(name: str):
+    """Not only of those at the ends of its values."""
+    case = CASES[name]
+    kept = held(case)
+
+    for value in case.values:
+        dt, radii = played_with(case, value)
+        assert kept == {"dt": dt, "R": f"{min(radii)} m"}
+        assert len(radii) == 1
+
+
+def test_what_a_case_varies_is_not_said_to_be_kept():
+    """dt of a case that varies dt, R of one that makes a scene smaller."""
+    assert held(CASES["bounce_drift"]) == {"R": "0.25 m"}
+    assert list(held(CASES["scale_down"])) == ["dt"]
+    assert held(CASES["dt_galperin_314"]) == {"R": "0.25 to 0.5 m"}
+
+
+def test_the_column_of_the_report_and_that_of_the_limits_are_told_apart():
+    """Walls, time, step and criterion are those of the scenes, not typed; the same scene with
+    another dt says that it is the same."""
+    one, mine = scenario(COLUMN), CASES["column"].scene(10, 0)
+    said, same = in_report(CASES["column"]), in_report(CASES[f"dt_{COLUMN}"])
+
+    dt = number(1e3 * one.dt(one.middle_substeps))
+    assert f"{len(one.scene.walls)} wall for {number(one.duration)} s, at dt {dt} ms" in said
+    assert f"here {len(mine.scene.walls)} walls for {number(mine.duration)} s" in said
+    assert f"dt is {held(CASES['column'])['dt']}" in said
+    assert f"more than {number(FAR_OFF)} radius" in said
+    assert CASES["column"].predicate.means in said
+    assert f"{COLUMN} is the same scene, at dt {dt} ms; here dt is varied." in same
+
+
+def test_the_report_names_the_cases_that_name_its_scene():
+    """Both ways; scenes with friction and the reader's own have none."""
+    for name in SCENARIOS:
+        asked = {case.name for case in CASES.values() if case.report == name}
+        assert set(limits_of(scenario(name))) == asked
+    assert limits_of(scenario(COLUMN)) == [f"dt_{COLUMN}", "column"]
