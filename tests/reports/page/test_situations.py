@@ -23,7 +23,7 @@ from reports.page.overview import OverviewCell
 from reports.page.page_tables import summaries
 from reports.page.pooled import by_situation, scores
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
-from reports.page.style import PALETTE, PATHS, TRUTH, Look, look, looks_of, mark_of
+from reports.page.style import PALETTE, PATHS, TRUTH, Look, look, looks_of, mark_of, number
 from reports.run.timing import noise_of
 from reports.run.timing_pass import COLUMNS as TIMED
 from reports.run.timing_pass import SCENES
@@ -376,6 +376,39 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     assert "\u00a0ms:" in says
     assert "crosscheck advise my_scene.toml --error 1%" in says
     assert heard == []
+
+
+def test_every_engine_of_the_table_has_its_worst_scene(
+    browser: Browser, path: Path, comparisons: list[Comparison]
+):
+    """The largest error of those in the median, and the scene it is in, with a link; the heads say
+    what the numbers are. A situation of one scene has no worst."""
+    page, _ = opened(browser, path.as_uri(), viewport={"width": 1280, "height": 900})
+    heads = " ".join(page.locator(".which thead").inner_text().split())
+    rows = {
+        row.locator("th").inner_text().split("\n")[0]: [
+            " ".join(worst.inner_text().split()) for worst in row.locator(".worst").all()
+        ]
+        for row in page.locator(".which tbody tr").all()
+    }
+    box = "document.querySelector('.which').parentNode"
+    cut = page.evaluate(f"{box}.scrollWidth > {box}.clientWidth")
+    page.context.close()
+    found = scores(comparisons)
+    placed = situated(comparisons)
+    asked = situations.answers(found[found.middle].assign(cost=np.nan), placed, set())
+
+    assert "median error of the scenes" in heads
+    assert "off by more than 1 radius (1 rad): by how many" in heads
+    for row in asked:
+        shown = [row.best, *(row.others if row.best.median <= 1 else []), *filter(None, [row.own])]
+        said = [
+            f"worst {number(one.worst, 2).replace('∞', 'no result')} in {one.worst_in}"
+            for one in shown
+        ]
+        assert rows[row.title] == (said if len(row.scenes) > 1 else [])
+    assert any(rows.values())
+    assert not cut
 
 
 @pytest.mark.slow  # a page of its own in Chromium
