@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +76,30 @@ def yardstick_of(reached: pd.DataFrame) -> pd.DataFrame:
     cost; if it is not there, those of the first engine."""
     names = reached.engine + ":" + reached.profile
     return reached[names == (YARDSTICK if (names == YARDSTICK).any() else names.iloc[0])]
+
+
+def said_of_cheaper(pooled: pd.DataFrame) -> str:
+    """Why a smaller error seems to cost less than a larger one, in a sentence; "" if none does.
+
+    Args:
+        pooled: engine, profile, accuracy, cost from `paired_cost`, nan where there is none, and got
+            of `of` scenarios, for each of `ACCURACIES`. Each accuracy is a mean over the scenarios
+            that engine and yardstick both reach with it: other ones for each accuracy.
+    """
+    for name, mine in pooled.groupby(pooled.engine + ":" + pooled.profile, sort=False):
+        priced = mine.dropna(subset="cost")
+        for (_, loose), (_, strict) in pairwise(priced.iterrows()):
+            if strict.cost < loose.cost:
+                own = yardstick_of(pooled)
+                reach = ", ".join(f"{row.accuracy} in {row.got}" for row in own.itertuples())
+                return (
+                    f"Compare engines at one error, not two errors of an engine: {name} seems to"
+                    f" reach {strict.accuracy} for less than {loose.accuracy}, as the costs of each"
+                    f" error are of other scenes. {own.iloc[0].engine}:{own.iloc[0].profile}, with"
+                    f" which all are compared, reaches {reach} of {own.iloc[0].of} scenes. In a"
+                    " scene by itself a smaller error never costs less."
+                )
+    return ""
 
 
 def paired_cost(mine: pd.DataFrame, own: pd.DataFrame) -> float:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from adapters.engines import ENGINES, OWN, row_of
-from reports.compare.pareto import ACCURACIES
+from reports.compare.pareto import ACCURACIES, said_of_cheaper
 from reports.compare.pooling import said_of_pool
 from reports.page import style
 from reports.run.arguments import checked_engines, checked_scenes, opening
@@ -154,6 +154,7 @@ def print_summary(results: Results, page: str) -> None:
     console.print()
     print_texts(console, marks_in(rows, scenes))
     said = [said_of_pool(results.pooled)]
+    said += filter(None, [said_of_cheaper(results.pooled_reached)])
     if len(results.explained):
         said.append(f"Error budget: {sentence(results.explained)}.")
     said.append(said_of_noise(results))

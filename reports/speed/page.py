@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from reports.compare.order import ELSEWHERE, UNSTEADY
-from reports.compare.pareto import ACCURACIES, YARDSTICK
+from reports.compare.pareto import ACCURACIES, YARDSTICK, said_of_cheaper
 from reports.compare.pooling import said_of_pool
 from reports.page import situations, style
 from reports.page.charts import Drawing, packed_charts
@@ -144,7 +144,8 @@ def pooled_section(results: Results) -> SpeedSection:
             " reach it: shown is the geometric mean of the cost of the latter over all its scenes,"
             " times the geometric mean of the ratios. never: in half of the scenes or more it is"
             " not reached at any dt, or the engine fails. not yet: in half or more it is not"
-            " reached at the finest dt measured. Hover for how many of each.",
+            " reached at the finest dt measured. Hover for how many of each."
+            f" {said_of_cheaper(results.pooled_reached)}",
             charts.matched(results.pooled_reached, tall=True),
         ),
     }

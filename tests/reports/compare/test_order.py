@@ -21,6 +21,7 @@ from reports.compare.order import (
     verdict_of,
 )
 from reports.compare.pareto import (
+    ACCURACIES,
     FAILED,
     NOT_REACHED,
     UNREACHABLE,
@@ -28,6 +29,7 @@ from reports.compare.pareto import (
     cost_to_reach,
     front,
     paired_cost,
+    said_of_cheaper,
     yardstick_of,
 )
 from reports.compare.pooling import middle_half
@@ -155,6 +157,33 @@ def test_the_cost_of_an_accuracy_is_that_of_the_cheapest_dt_that_keeps_it():
 
     assert cost_to_reach(0.1, DT, cost, error, ORDER)[:2] == (cost[3], DT[3])
     assert cost_to_reach(0.3, DT, cost, error, ORDER)[:2] == (cost[1], DT[1])
+
+
+def test_in_a_scene_a_smaller_error_never_costs_less():
+    """Whatever errors and costs a ladder of step sizes has, as far as both are reached."""
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        cost, error = rng.lognormal(size=5), 10.0 ** rng.uniform(-8, 0, 5)
+        costs = [cost_to_reach(a, DT, cost, error, ORDER).cost for a in ACCURACIES.values()]
+        reached = [each for each in costs if np.isfinite(each)]
+        assert reached == sorted(reached)
+
+
+def test_a_smaller_error_that_seems_cheaper_is_explained_by_the_scenes():
+    """Pooled over other scenes: a cheap one that alone reaches the smaller error. The control: with
+    the costs of the same scenes nothing is said."""
+    columns = ["engine", "profile", "accuracy", "cost", "got", "of"]
+    own = [
+        ("reference", "exercise", "1 %", 70.0, 24, 38),
+        ("reference", "exercise", "0.1 %", 90.0, 18, 38),
+    ]
+    falls = [("x", "y", "1 %", 4.0, 37, 38), ("x", "y", "0.1 %", 3.0, 36, 38)]
+    rises = [("x", "y", "1 %", 4.0, 37, 38), ("x", "y", "0.1 %", 5.0, 36, 38)]
+    said = said_of_cheaper(pd.DataFrame(own + falls, columns=columns))
+
+    assert "x:y seems to reach 0.1 % for less than 1 %" in said
+    assert "reference:exercise, with which all are compared, reaches 1 % in 24, 0.1 % in 18" in said
+    assert said_of_cheaper(pd.DataFrame(own + rises, columns=columns)) == ""
 
 
 def test_what_is_not_reached_says_why():
