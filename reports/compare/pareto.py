@@ -93,11 +93,11 @@ def said_of_cheaper(pooled: pd.DataFrame) -> str:
                 own = yardstick_of(pooled)
                 reach = ", ".join(f"{row.accuracy} in {row.got}" for row in own.itertuples())
                 return (
-                    f"Compare engines at one error, not two errors of an engine: {name} seems to"
-                    f" reach {strict.accuracy} for less than {loose.accuracy}, as the costs of each"
-                    f" error are of other scenes. {own.iloc[0].engine}:{own.iloc[0].profile}, with"
-                    f" which all are compared, reaches {reach} of {own.iloc[0].of} scenes. In a"
-                    " scene by itself a smaller error never costs less."
+                    "The costs of two errors come from different scenes, so compare engines at one"
+                    f" error: {name} seems to reach {strict.accuracy} for less than"
+                    f" {loose.accuracy}. {own.iloc[0].engine}:{own.iloc[0].profile}, with which all"
+                    f" are compared, reaches {reach} of {own.iloc[0].of} scenes. In one scene a"
+                    " smaller error never costs less."
                 )
     return ""
 

@@ -81,8 +81,9 @@ def _collisions_missed(scenario: Scenario, played: Trajectory) -> Reading:
     true = truth_of(scenario)
     should, does = gain(true), gain(played)
     missed = int(((should > 0) & (does < 0.01 * should)).any())
-    at = float(true.collisions.t[0])
-    return Reading(missed, at, "the collision is missed: the disks pass through each other")
+    at, wall = float(true.collisions.t[0]), true.collisions.j[0] < 0
+    through = "the disk passes through the wall" if wall else "the disks pass through each other"
+    return Reading(missed, at, f"the collision is missed: {through}")
 
 
 def _collisions_spurious(scenario: Scenario, played: Trajectory) -> Reading:
@@ -212,7 +213,7 @@ COLLISIONS_MISSED = Predicate(
     "collisions missed",
     "collisions",
     0.0,
-    "a disk passes through another that it should collide with",
+    "a disk passes through a disk or a wall that it should collide with",
     _collisions_missed,
 )
 COLLISIONS_SPURIOUS = Predicate(
