@@ -28,6 +28,8 @@ class FirstScreen:
     Attributes:
         scenes: how many there are.
         exact: how many of them have an exact answer.
+        rough: how many of them have friction.
+        cells: how many runs there are: a scene in an engine at a step size each.
         steps: s, the smallest and the largest step size.
         versions: engine -> its libraries and their versions.
         said: a solver's file -> what `crosscheck check` says of it.
@@ -45,6 +47,8 @@ class FirstScreen:
 
     scenes: int
     exact: int
+    rough: int
+    cells: int
     steps: tuple[float, float]
     versions: Mapping[str, str]
     said: Mapping[str, Sequence[str]]
@@ -80,6 +84,8 @@ def first_screen(
     return FirstScreen(
         scenes=len(comparisons),
         exact=sum(comparison.truth is not None for comparison in comparisons),
+        rough=sum(bool(comparison.scenario.scene.friction) for comparison in comparisons),
+        cells=sum(len(comparison.runs) for comparison in comparisons),
         steps=step_range(comparisons),
         versions=versions_of(comparisons),
         said=said,

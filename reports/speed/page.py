@@ -57,6 +57,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         names=results.names,
         about=about,
         pooled=pooled_section(results),
+        rough=sum(situations.FRICTION in places for places in situated(results).values()),
         answers=answers,
         whole=situations.whole(answers),
         far_off=situations.FAR_OFF,

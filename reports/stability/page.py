@@ -96,6 +96,8 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
         findings=overview.findings(limits),
         about=results.header,
         engines=[name for name in names if "+" not in name],
+        engines_changed=[name for name in names if "+" in name],
+        alike=sum(section.case.name == f"dt_{section.case.report}" for section in sections),
         maps=overview.map_tables(maps),
         all_maps=MAPS,
         laws=laws,

@@ -242,6 +242,17 @@ def test_text_from_files_is_inert(page: Page) -> None:
     assert page.locator("main img").count() == 0
 
 
+def test_the_page_says_what_its_counts_count(page: Page, comparisons: list[Comparison]) -> None:
+    """Engines and cells are those of the runs, by name and profile, refused ones too."""
+    lede = " ".join(page.locator(".lede").inner_text().split())
+    counts = " ".join(page.locator(".lede + .small").inner_text().split())
+    runs = [run for comparison in comparisons for run in comparison.runs]
+
+    assert f"through {len({run.name for run in runs})} engines" in lede
+    assert f"{len(runs)} cells here" in counts
+    assert f"once for each of its profiles, as {runs[0].name}." in counts
+
+
 def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:
     """The map and the scenario's list both name what crashed and what was refused."""
     cells = page.locator("#map td.failed").all_inner_texts()

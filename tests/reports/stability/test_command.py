@@ -229,6 +229,15 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, results: Path
     assert "closing speed, m/s dt 15.6 ms, R 0.25 m" in " ".join(row.inner_text().split())
 
 
+def test_the_page_says_what_its_counts_count(page: Page):
+    """Profiles, engines with one thing changed, cases of its own and of the report."""
+    counts = page.locator("#summary .small").inner_text()
+
+    assert "An engine is counted once for each of its profiles, as pymunk:matched." in counts
+    assert "2 engines are here" in counts
+    assert f"{len(page.locator('section.scenario').all())} cases" in counts
+
+
 def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_made(results: Path):
     """From folder to folder of the defaults, both ways; where the other is not made there is no
     link."""
