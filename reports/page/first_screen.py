@@ -30,6 +30,7 @@ class FirstScreen:
         exact: how many of them have an exact answer.
         rough: how many of them have friction.
         cells: how many runs there are: a scene in an engine at a step size each.
+        rough_cells: how many of them are of scenes with friction.
         steps: s, the smallest and the largest step size.
         versions: engine -> its libraries and their versions.
         said: a solver's file -> what `crosscheck check` says of it.
@@ -49,6 +50,7 @@ class FirstScreen:
     exact: int
     rough: int
     cells: int
+    rough_cells: int
     steps: tuple[float, float]
     versions: Mapping[str, str]
     said: Mapping[str, Sequence[str]]
@@ -76,6 +78,7 @@ def first_screen(
     Scenes with friction are ranked in a row of their own, and are not in the first picture.
     """
     without_friction, _ = situations.by_friction(comparisons)
+    with_friction = [each for each in comparisons if each.scenario.scene.friction]
     scores = pooled.scores(comparisons)
     middle = error_cost.with_times(scores[scores.middle], clock)
     answers = situations.answers(middle, situated(comparisons), untrusted)
@@ -84,8 +87,9 @@ def first_screen(
     return FirstScreen(
         scenes=len(comparisons),
         exact=sum(comparison.truth is not None for comparison in comparisons),
-        rough=sum(bool(comparison.scenario.scene.friction) for comparison in comparisons),
+        rough=len(with_friction),
         cells=sum(len(comparison.runs) for comparison in comparisons),
+        rough_cells=sum(len(comparison.runs) for comparison in with_friction),
         steps=step_range(comparisons),
         versions=versions_of(comparisons),
         said=said,
