@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
+import pytest
+from playwright.sync_api import Browser
 
 from adapters.run import Run
 from reports.page.charts import ChartLine, Drawing, figure_of
@@ -11,6 +15,7 @@ from reports.page.findings import not_counted, unranked_sentence
 from reports.page.page_tables import conformance_matrix
 from reports.page.pooled import with_marks
 from reports.page.report import how_broken
+from tests.reports.page.browsing import overhang
 
 
 def test_who_has_no_mark_in_the_chart_has_none_in_its_legend():
@@ -58,3 +63,16 @@ def test_a_refusal_in_the_table_of_probes_is_not_asked():
     ]
 
     assert conformance_matrix(pd.DataFrame(rows)) == {"walls": {"a.js:own": ("not asked", 2)}}
+
+
+@pytest.mark.parametrize("box", ["p", "li", "summary"])
+def test_a_long_path_stays_in_its_box_on_a_phone(browser: Browser, box: str):
+    """At 400 px, wherever a solver's file is named outside a table."""
+    page = browser.new_page(viewport={"width": 400, "height": 800})
+    css = (Path(__file__).parents[3] / "reports/page/page.css").read_text("utf-8")
+    named = f"<{box}><span class=who>/home/{'x' * 300}.py<i>:own</i></span></{box}>"
+    page.set_content(f"<style>{css}</style><main>{named}</main>")
+    wide = overhang(page)
+    page.close()
+
+    assert wide <= 0
