@@ -39,13 +39,14 @@ def limit(case: str, engine: str) -> Limit:
     return LimitSearch(CASES[case], engine, QUICK).limit()
 
 
-def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) -> None:
+def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) -> Limit:
     """The bracket holds the value; `slack` times further out is still called holding."""
     found = limit(case, engine)
     low, high = sorted((found.works_at, found.fails_at))
     assert low / slack <= value <= high * slack, (
         f"{engine} in {case}: {value} is not in {low} .. {high}"
     )
+    return found
 
 
 @pytest.mark.parametrize("engine", DISCRETE)
@@ -60,8 +61,11 @@ def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) ->
 def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(
     case: str, value: float, engine: str
 ):
-    """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall."""
-    assert_fails_at(case, engine, value)
+    """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall; what is
+    passed through is named."""
+    found = assert_fails_at(case, engine, value)
+    assert found.failing is not None
+    assert ("wall" in found.failing.event) == ("wall" in case)
 
 
 @pytest.mark.parametrize(
