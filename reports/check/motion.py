@@ -261,7 +261,9 @@ def turning(answers: dict[str, SolverAnswer]) -> CheckRow:
     if all(whole) and not near(turns, 0.0):
         said = "it is reduced by whole turns, which does not change the direction"
         return CheckRow("turns", "1", asked, got, expected, "free choice", said)
-    cause = f"it is changed by {shown(abs(answer - right))} rad, which is not a multiple of 2 pi"
+    cause = (
+        f"the angle is changed by {shown(abs(answer - right))} rad, which is not a multiple of 2 pi"
+    )
     return judged("turns", "1", asked, got, expected, all(whole), cause)
 
 
