@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import hashlib
+import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ LARGEST = 2**20  # bytes; the exercise's file has about 5000
 PATIENCE = 3
 LONGEST = 300  # characters of a message
 KINDS = {".js": "javascript", ".py": "python"}
+DEF = re.compile(r"^[ \t]*def \w+\(.*:", re.MULTILINE)
+FUNCTION = re.compile(r"^function \w+\s*\(.*\)\s*\{", re.MULTILINE)
 
 
 class NotASolver(ValueError):
@@ -117,10 +120,24 @@ def read_solver(path: Path) -> SolverText:
     text = decoded(path, data)
     if not text.strip():
         raise NotASolver(f"{path}: is empty; save your solver into it")
+    if is_python_in_javascript(kind, text):
+        raise NotASolver(f"{path}: is written in Python; give it a name that ends in .py")
+    if is_javascript_in_python(kind, text):
+        raise NotASolver(f"{path}: is written in JavaScript; give it a name that ends in .js")
     beside = read_beside(path, text) if kind == "python" else read_library(path, text)
     return SolverText(
         path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items()))
     )
+
+
+def is_python_in_javascript(kind: str, text: str) -> bool:
+    """Whether a .js file has a function of Python, and nothing that begins one of JavaScript."""
+    return kind == "javascript" and bool(DEF.search(text)) and not re.search("function|=>", text)
+
+
+def is_javascript_in_python(kind: str, text: str) -> bool:
+    """Whether a .py file has a function of JavaScript and none of Python."""
+    return kind == "python" and bool(FUNCTION.search(text)) and not DEF.search(text)
 
 
 def read_beside(path: Path, text: str) -> dict[str, str]:

@@ -377,6 +377,8 @@ REFUSED = {
     "junk.js": (bytes(range(256)) * 20, "is not text (byte 0 at offset 0); save it as UTF-8 text"),
     "junk.py": (b"import os\n\x00\x01", "is not text (byte 0 at offset 10)"),
     "empty.js": (b" \n", "is empty"),
+    "python.js": (PY.encode(), "is written in Python; give it a name that ends in .py"),
+    "javascript.py": (JS.encode(), "is written in JavaScript; give it a name that ends in .js"),
     "solver.txt": (b"hello", "a solver is a .js or a .py file"),
 }
 
