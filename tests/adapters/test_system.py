@@ -65,7 +65,7 @@ main()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("platform", ["win32", "darwin"])
+@pytest.mark.parametrize("platform", ["win32", pytest.param("darwin", marks=pytest.mark.long)])
 def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform: str):
     """JavaScript and Python, right and wrong, with Windows' line ends: the marks of Linux.
 

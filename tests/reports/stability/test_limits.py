@@ -71,9 +71,11 @@ def name_of(row: Kept) -> str:
 
 
 def some_of(rows: list[Kept]) -> list[Any]:
-    """Every twentieth is for the gate, the others are for the long run."""
+    """Every twentieth is for the gate, the others are for the long run; begun where none of them is
+    a gas of a million steps, which takes 8 s."""
     return [
-        pytest.param(row, marks=[pytest.mark.long] if k % 20 else []) for k, row in enumerate(rows)
+        pytest.param(row, marks=[] if k % 20 == 15 else [pytest.mark.long])
+        for k, row in enumerate(rows)
     ]
 
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from itertools import product
 from pathlib import Path
 
 import pandas as pd
@@ -143,15 +144,18 @@ def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("how", BOTH)
 @pytest.mark.parametrize(
-    "words",
+    ("words", "how"),
     [
-        ["run"],
-        ["check", SOLVERS],
+        (["run"], signal.SIGTERM),
+        (["check", SOLVERS], signal.SIGINT),
         *(
-            pytest.param(words, marks=pytest.mark.long)
-            for words in (["list"], ["diff", "done", "done"], ["report", "done"])
+            pytest.param(words, how, marks=pytest.mark.long)
+            for words, how in [
+                (["run"], signal.SIGINT),
+                (["check", SOLVERS], signal.SIGTERM),
+                *product((["list"], ["diff", "done", "done"], ["report", "done"]), BOTH),
+            ]
         ),
     ],
 )
@@ -172,17 +176,22 @@ def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: 
     assert not ended.left
 
 
+LESSON = (
+    ["lesson"],
+    "reports.lessons.lesson:play_once:waits",
+    "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n",
+)
+GAME = (["play", "--engine", "reference"], "reports.game.session:Flight:waits", SOCKET)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("how", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 0)])
 @pytest.mark.parametrize(
-    ("words", "stalled", "asked"),
+    ("words", "stalled", "asked", "how", "status"),
     [
-        (
-            ["lesson"],
-            "reports.lessons.lesson:play_once:waits",
-            "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n",
-        ),
-        (["play", "--engine", "reference"], "reports.game.session:Flight:waits", SOCKET),
+        (*LESSON, signal.SIGTERM, 143),
+        (*GAME, signal.SIGINT, 0),
+        pytest.param(*LESSON, signal.SIGINT, 0, marks=pytest.mark.long),
+        pytest.param(*GAME, signal.SIGTERM, 143, marks=pytest.mark.long),
     ],
 )
 def test_a_server_ends_though_a_page_never_gets_its_answer(
