@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from adapters.own_solver.process import processes_reused
 from reports.run.stepping import Spent
 from scenarios.model import Array
 
@@ -83,7 +84,8 @@ def interleaved(
 
     A thing that has used `budget` s skips the remaining rounds, but never the first `fewest` after
     the warm-up. Slow changes of the machine (heat, clock, other processes) thus affect all alike.
-    The garbage collector is off meanwhile, as in `timeit`. It ends after `limit` s, and an
+    The garbage collector is off meanwhile, as in `timeit`. The process of a solver's file is
+    reused, because starting one takes longer than most samples. It ends after `limit` s, and an
     incomplete last round is left out.
     """
     rng = np.random.default_rng(seed)
@@ -94,16 +96,17 @@ def interleaved(
     gc.collect()
     gc.disable()
     try:
-        for k in range(WARM_UP, rounds):
-            whole = len(samples)
-            for place, index in enumerate(rng.permutation(len(what))):
-                one = what[index]
-                if perf_counter() > end:
-                    return samples[:whole]
-                if k < fewest or spent[one.key] < budget:
-                    sample = sampled(one, k, place)
-                    spent[one.key] += (sample.cost + sample.wrapping) * one.amount * sample.runs
-                    samples.append(sample)
+        with processes_reused():
+            for k in range(WARM_UP, rounds):
+                whole = len(samples)
+                for place, index in enumerate(rng.permutation(len(what))):
+                    one = what[index]
+                    if perf_counter() > end:
+                        return samples[:whole]
+                    if k < fewest or spent[one.key] < budget:
+                        sample = sampled(one, k, place)
+                        spent[one.key] += (sample.cost + sample.wrapping) * one.amount * sample.runs
+                        samples.append(sample)
     finally:
         if collecting:
             gc.enable()
