@@ -16,6 +16,7 @@ from typing import NamedTuple
 from adapters.conformance.conform import Finding, conform
 from adapters.conformance.probe import loaded, plain
 from adapters.engine_row import EngineRow
+from adapters.own_solver.process import keep_processes
 from adapters.play import play_once, unwatched
 from adapters.run import Run
 from reports.run.cells import Cell, source_hash, versions
@@ -64,6 +65,7 @@ def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
     """In the worker: play, append every good state to the trail, and return the run with its
     trajectory packed."""
     allow(LOADING)
+    keep_processes()  # a file plays many cells, and a process takes longer to start than most
     run = play_cell(cell, row, scenario, ClockStart(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
     return CellResult(replace(run, trajectory=None), samples, file, source_and_versions())
