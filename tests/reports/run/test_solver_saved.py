@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,8 @@ from reports.check.command import make_page, scenes_of
 from reports.check.verdict import check_file
 from reports.run import suite
 from reports.run.archive import Archive, trajectory_file
+from reports.run.cells import Cell
+from reports.run.playing import play_here
 from reports.run.trajectories import load_trajectory
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
@@ -118,6 +122,48 @@ def test_what_numba_keeps_would_be_taken_for_another_text(
     first, second = played(before), played(after)
 
     assert np.array_equal(first.trajectory.position, second.trajectory.position)
+
+
+COUNTS = {
+    "counts.js": """
+var calls = 0;
+function integrate(sphere, dt) { sphere.position.x += ++calls; }
+function sphereSphereCollisionHandling(a, b) {}
+""",
+    "counts.py": """
+calls = 0
+def integrate(sphere, dt):
+    global calls
+    calls += 1
+    sphere.position.x += calls
+def sphereSphereCollisionHandling(a, b): pass
+""",
+}
+
+
+@pytest.mark.parametrize("file", COUNTS)
+def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+):
+    """Though one process plays both: a file that moves a sphere by the number of its calls so far
+    plays the same twice."""
+    started = Counter()
+    begin = solver_process.SolverProcess.begin
+    monkeypatch.setattr(
+        solver_process.SolverProcess,
+        "begin",
+        lambda self, settings: (started.update([file]), begin(self, settings)),
+    )
+    (tmp_path / file).write_text(COUNTS[file])
+    row = engine_file(tmp_path / file)
+    cell = Cell("head_on_equal_e09", 0, "x:own", 1)
+    question = replace(scenario(cell.scene), truth=None)
+    with solver_process.processes_reused():
+        first, second = (play_here(cell, row, question) for _ in range(2))
+
+    assert first.run.status == "ok", first.run.reason
+    assert first.file == second.file
+    assert started[file] == 1
 
 
 @pytest.mark.long
