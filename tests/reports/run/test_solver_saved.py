@@ -127,7 +127,7 @@ def test_what_numba_keeps_would_be_taken_for_another_text(
 COUNTS = {
     "counts.js": """
 var calls = 0;
-function integrate(sphere, dt) { sphere.position.x += ++calls; }
+function integrate(sphere, dt) { sphere.position.x += 1e-3 * ++calls; }
 function sphereSphereCollisionHandling(a, b) {}
 """,
     "counts.py": """
@@ -135,7 +135,7 @@ calls = 0
 def integrate(sphere, dt):
     global calls
     calls += 1
-    sphere.position.x += calls
+    sphere.position.x += 1e-3 * calls
 def sphereSphereCollisionHandling(a, b): pass
 """,
 }
