@@ -376,9 +376,14 @@ def separating(
         return chosen("that of the formula", said)
     got = f"A is changed by {shown(seen[0][1][0])} m/s"
     cause = found.mistake if found else ""
+    if all(near(change(h, -law(h, e), e), changed, 0.1) for h, changed in seen):
+        cause = ABSOLUTE
     return judged("separating", "2c", asked, got, expected, False, cause)
 
 
+ABSOLUTE = (
+    "it takes the absolute value of (vA - vB).n: a pair that moves apart is driven further apart"
+)
 UNALIKE = "the result depends on which sphere is A: the two are not treated alike"
 
 
