@@ -52,10 +52,14 @@
     const queue = hear ? new RAPIER.EventQueue(true) : undefined;
     // What it cuts speeds and spins at, found by the probes: 400 length units a second, an eighth of a turn a step.
     const caps = { speed: 400 * space.lengthUnit, spin: Math.PI / 4 / dt };
+    const why = {
+      speed: `at which Rapier cuts speeds: 400 of its length units of ${+space.lengthUnit.toPrecision(4)} m a second`,
+      spin: "the most that Rapier allows at this dt",
+    };
     function mustNotBeCut(what, value, unit) {
       // float32 leaves what was cut a little below the cap
       if (chosen.matched && Math.abs(value) > caps[what] * (1 - 1e-5)) {
-        throw new Refused(`a disk reaches a ${what} of ${caps[what].toPrecision(6)} ${unit}, the most that Rapier allows at this dt`);
+        throw new Refused(`a disk reaches a ${what} of ${+caps[what].toPrecision(6)} ${unit}, ${why[what]}`);
       }
     }
     const pushed = new Set();

@@ -13,14 +13,16 @@ from reports.page import pooled
 from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
 from reports.page.style import number
 from reports.terminal.counts import counted, listed
+from scenarios.catalogue import SCENARIOS
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
     """The closest engines, the effect of settings, the failures. Before them come the reader's own
-    solvers, after them the solvers with time-of-impact ordering, and last the closest engines in
-    scenes with friction, if there are others. Engines in `untrusted` are left out."""
+    solvers, after them the solvers with time-of-impact ordering, the ends of the exact answers, and
+    last the closest engines in scenes with friction, if there are others. Engines in `untrusted`
+    are left out."""
     smooth, rough = by_friction(comparisons)
-    sentences = findings_alike(smooth, untrusted)
+    sentences = [*findings_alike(smooth, untrusted), *early_ends(comparisons)]
     if not rough:
         return sentences
     scores = pooled.scores(rough)
@@ -55,6 +57,17 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
     ]
     exact = [unranked_sentence(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
     return sentences if engines is off else [*own, *sentences, *exact]
+
+
+def early_ends(comparisons: Sequence[Comparison]) -> list[str]:
+    """A sentence for each scene of the reader's own whose exact answer ends before the scene."""
+    return [
+        f"The exact answer of {scenario.name} ends at {number(truth.horizon)} s of"
+        f" {number(scenario.duration)} s, and no error after that counts"
+        f"{f': {truth.reason}' if truth.reason else ''}."
+        for scenario, truth in ((each.scenario, each.truth) for each in comparisons)
+        if scenario.name not in SCENARIOS and truth and truth.horizon < scenario.duration
+    ]
 
 
 def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFrame:

@@ -261,7 +261,7 @@ def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
     row = FETCHED["rapier2d:matched"]
     run = play_once(row.make, "rapier2d:matched", long, 0.05)
     assert run.status == "unsupported"
-    assert "the most that Rapier allows" in run.reason
+    assert "400 of its length units of 0.125 m a second" in run.reason
     read = 0
     with loaded(row, scene, dt=0.05) as engine, suppress(Unsupported):
         while read < 24:

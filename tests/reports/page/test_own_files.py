@@ -1,7 +1,9 @@
-"""What the page says of a solver's own file that is asked in some scenes only, or not scored."""
+"""What the page says of a solver's own file that is asked in some scenes only, or not scored;
+and of a scene of one's own whose exact answer ends early."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +12,13 @@ import pytest
 from playwright.sync_api import Browser
 
 from adapters.run import Run
+from reports.compare.comparison import compare
 from reports.page.charts import ChartLine, Drawing, figure_of
-from reports.page.findings import not_counted, unranked_sentence
+from reports.page.findings import early_ends, not_counted, unranked_sentence
 from reports.page.page_tables import conformance_matrix
 from reports.page.pooled import with_marks
 from reports.page.report import how_broken
+from scenarios.catalogue import scenario
 from tests.reports.page.browsing import overhang
 
 
@@ -53,6 +57,18 @@ def test_a_file_is_not_asked_where_the_exercise_does_not_ask():
         "a.js is within 1 radius of the exact answer in 1 of 2 scenes, off by 1.8 radii in oblique,"
         " not asked in 1 scene (the exercise has no walls). It is not ranked among the engines."
     )
+
+
+def test_the_end_of_the_exact_answer_to_a_scene_of_ones_own_is_said():
+    """Of the catalogue's scenes the section "How far to trust" says it, in one sentence for all."""
+    known = [scenario("falling_box"), scenario("bouncing_ball_e09")]
+    own = [replace(each, name=f"my-{each.name}") for each in known]
+
+    assert early_ends([compare(each, []) for each in known]) == []
+    assert early_ends([compare(each, []) for each in own]) == [
+        "The exact answer of my-falling_box ends at 0.409 s of 2 s, and no error after that counts:"
+        " beyond it the rounding of float64 makes any engine diverge."
+    ]
 
 
 def test_a_refusal_in_the_table_of_probes_is_not_asked():
