@@ -19,6 +19,8 @@ LARGEST = 2**20  # bytes; the exercise's file has about 5000
 # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
 PATIENCE = 3
 LONGEST = 300  # characters of a message
+# the first bytes of what is handed in under the name of a solver
+DOCUMENTS = {b"%PDF-": "a PDF", b"PK\x03\x04": "a zip, or a document of Office", rb"{\rtf": "RTF"}
 KINDS = {".js": "javascript", ".py": "python"}
 DEF = re.compile(r"^[ \t]*def \w+\(.*:", re.MULTILINE)
 FUNCTION = re.compile(r"^function \w+\s*\(.*\)\s*\{", re.MULTILINE)
@@ -214,6 +216,9 @@ def letters(path: Path, data: bytes) -> str:
         return data.decode("utf-32", errors="replace")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", errors="replace")
+    for begins, what in DOCUMENTS.items():
+        if data.startswith(begins):
+            raise NotASolver(f"{path}: is {what}; save the text of your solver alone, as UTF-8")
     odd = next((k for k, byte in enumerate(data) if byte < 32 and byte not in b"\t\n\r\f\v"), None)
     if odd is not None:
         raise NotASolver(

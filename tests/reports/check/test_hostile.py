@@ -375,6 +375,8 @@ REFUSED = {
     "big.js": (b"// " + b"x" * 5_000_000, "has 5.0 MB; a solver has a few kilobytes"),
     "big.py": (b"# " + b"x" * 5_000_000, "has 5.0 MB"),
     "junk.js": (bytes(range(256)) * 20, "is not text (byte 0 at offset 0); save it as UTF-8 text"),
+    "pdf.js": (b"%PDF-1.7\n%\xe2\xe3\n1 0 obj\n", "is a PDF; save the text of your solver alone"),
+    "office.js": (b"PK\x03\x04\x14\x00\x06", "is a zip, or a document of Office"),
     "junk.py": (b"import os\n\x00\x01", "is not text (byte 0 at offset 10)"),
     "empty.js": (b" \n", "is empty"),
     "python.js": (PY.encode(), "is written in Python; give it a name that ends in .py"),
