@@ -6,14 +6,15 @@ import csv
 import io
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
 
-from adapters.engines import ENGINES
+from adapters.engine_row import EngineRow
+from adapters.engines import ENGINES, FETCHED
 from reports.compare.comparison import Comparison
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import HEAD_ON, ORBIT, PLAYED, write_small
@@ -149,12 +150,13 @@ def test_a_scene_that_is_asked_for_has_half_a_page_and_others_none(sheet: Page):
     assert (others, controls) == (False, 0)
 
 
-@pytest.mark.long  # 39 scenes, as many as a whole run has and one more
+@pytest.mark.long  # as many scenes as a whole run has and one more
+@pytest.mark.parametrize("engines", [ENGINES, {**ENGINES, **FETCHED}], ids=["11", "17"])
 def test_a_whole_run_is_twelve_pages_at_most(
-    browser: Browser, comparisons: list[Comparison], tmp_path: Path
+    browser: Browser, comparisons: list[Comparison], tmp_path: Path, engines: dict[str, EngineRow]
 ):
-    """Of 39 scenes through ten engines; all scenes on paper are more."""
-    many = [as_all_engines(comparisons[1], f"scene_of_a_long_name_{k}") for k in range(39)]
+    """Of 51 scenes; all scenes on paper are more."""
+    many = [as_all_engines(comparisons[1], f"scene_of_long_name_{k}", engines) for k in range(51)]
     pages = []
     for on_paper in ((), [each.scenario.name for each in many]):
         write_small(tmp_path / "r.html", many, on_paper=on_paper)
@@ -166,14 +168,14 @@ def test_a_whole_run_is_twelve_pages_at_most(
     assert pages[0] <= 12 < pages[1]
 
 
-def as_all_engines(comparison: Comparison, name: str) -> Comparison:
+def as_all_engines(comparison: Comparison, name: str, engines: Iterable[str]) -> Comparison:
     """The comparison under another name, what one engine played given to all."""
     scenario = replace(comparison.scenario, name=name)
     engine, profile = PLAYED[0].split(":")
     mine = [run for run in comparison.runs if run.name == PLAYED[0]]
     table = comparison.table
     rows = table[(table.engine == engine) & (table.profile == profile)]
-    whose = [each.split(":") for each in ENGINES]
+    whose = [each.split(":") for each in engines]
     runs = [replace(run, engine=e, profile=p, scenario=name) for e, p in whose for run in mine]
     parts = [rows.assign(engine=e, profile=p, scenario=name) for e, p in whose]
     return replace(
