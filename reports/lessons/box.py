@@ -49,7 +49,7 @@ def show_box(settings: Settings) -> Shown:
 
     facts = [
         (
-            f"contact impulses of {run.name}, step by step, in {number(scenario.duration)} s",
+            f"contact impulses of {run.name}, step by step, in {number(run.trajectory.t[-1])} s",
             str(len(run.trajectory.collisions)),
         )
         for run in shown.runs
@@ -94,7 +94,11 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
             Claim(
                 "Until the first collision the exact energy is level. Explicit Euler"
                 f" (reference:lesson) gains m g² dt / 2 in a second, {number(gain)} J for all"
-                " disks; symplectic Euler (reference:exercise) loses as much.",
+                " disks; symplectic Euler (reference:exercise) loses as much. Under a constant"
+                " force neither is better. In a motion that repeats, such as an orbit or a"
+                " pendulum, the energy of symplectic Euler stays near its first value, and that of"
+                " explicit Euler grows (Hairer, Lubich and Wanner, Geometric Numerical Integration,"
+                " chapter I.1).",
                 lambda shown: all(
                     np.abs(
                         shown.y(name)[: len(flight)][flight]
@@ -137,10 +141,11 @@ BOX = Lesson(
     asks="Where does the energy go?",
     text=(
         (
-            "Small disks start from random places with random velocities and fall. At a wall the"
-            " normal velocity becomes <code>v' = −e v</code>: a collision leaves <code>e²</code> of"
-            " the energy of this part of the motion. Nothing else may take energy. Between two"
-            " collisions the sum of <code>m v²/2 + m g y</code> must be level."
+            "Small disks start from random places with random velocities and fall. In a collision"
+            " of a disk with a wall, or with another disk, the relative velocity along the normal"
+            " becomes <code>v' = −e v</code>, which leaves <code>e²</code> of the energy of this"
+            " part of the motion. Nothing else may take energy. Between two collisions the sum of"
+            " <code>m v²/2 + m g y</code> must be level."
         ),
         (
             "The exact answer ends where float64 can no longer follow the motion, or where a disk"

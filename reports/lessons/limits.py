@@ -4,6 +4,7 @@ with the run that fails."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
@@ -90,7 +91,20 @@ def limits_of(name: str) -> list[Limit]:
     one change test."""
     case = CASES[name]
     searches = [LimitSearch(case, engine, QUICK) for engine in engines_of(case)]
-    return explained([with_replays(search, search.limit()) for search in searches])
+    limits = explained([with_replays(search, search.limit()) for search in searches])
+    if case.predicate.bound:
+        return limits
+    # The share of runs that fail is drawn; the search stops at the first one.
+    whole = {search.engine: search for search in searches if search.engine in DISTINCT}
+    return [
+        replace(
+            limit,
+            trials=tuple(whole[limit.engine].trial(t.value, to_the_end=True) for t in limit.trials),
+        )
+        if limit.engine in whole
+        else limit
+        for limit in limits
+    ]
 
 
 def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]:
@@ -265,8 +279,8 @@ LIMITS = Lesson(
             "<b>Continuous collision detection</b> (CCD) looks for a contact along the whole way of"
             " a disk in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk"
             " against walls and static disks, and against moving disks only if it is marked as a"
-            " <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, and Box2D 2.3 at e = 1"
-            " without gravity. A name with a + is an engine with one change: "
+            " <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, as does Box2D 2.3 where"
+            " e = 1 and there is no gravity. A name with a + is an engine with one change: "
             + "; ".join(f"<code>+{name}</code>, {change}" for name, change in CHANGES.items())
             + "."
         ),

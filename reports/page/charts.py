@@ -247,7 +247,7 @@ def mark_end(figure: go.Figure, horizon: float, duration: float) -> None:
     ink = {"dash": "dot", "width": 1, "color": style.look(style.TRUTH).light}
     figure.add_shape(x0=horizon, x1=horizon, y0=0, y1=1, yref="paper", line=ink)
     figure.add_annotation(
-        text="truth ends",
+        text="exact answer ends",
         x=horizon,
         y=1,
         yref="paper",

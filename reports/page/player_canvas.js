@@ -37,7 +37,7 @@ Object.assign(Player.prototype, {
     this.drawEvent(pen, layers);
     this.drawScaleBar(pen);
     this.note.textContent = layers.filter((layer) => this.ended(layer))
-      .map((layer) => `${layer.name} ends at ${layer.ends} s`).join("; ");
+      .map((layer) => `${layer.name === "truth" ? "exact answer" : layer.name} ends at ${layer.ends} s`).join("; ");
   },
 
   colour(layer) { return this.looks[layer.name][darkPage() ? "dark" : "light"]; },

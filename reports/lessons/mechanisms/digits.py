@@ -48,14 +48,15 @@ def show_digits(settings: Settings) -> Shown:
 def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) -> list[Claim]:
     """What rounding a place that often may add up to, and what it adds up to in Box2D."""
     apart = float(np.spacing(np.float32(far + 2)))  # m; the disk moves by 2 m
-    most = steps * apart  # half of it along x, less along y
+    most = steps * apart / 2  # along x; y has smaller numbers, and far more digits
     largest = float(np.max(box2d.y))
     claims = [
         Claim(
             f"{number(far)} m from the origin two neighbouring float32 numbers are"
             f" {number(1e3 * apart)} mm apart, and a step is {number(1e3 * dt)} mm. Box2D rounds"
-            f" the position in each of {steps} steps. These errors could add up to"
-            f" {number(1e3 * most)} mm. Here the largest distance is {number(1e3 * largest)} mm.",
+            f" the position in each of {steps} steps, by at most half of that. These errors could"
+            f" add up to {number(1e3 * most)} mm. Here the largest distance is"
+            f" {number(1e3 * largest)} mm.",
             lambda shown: (
                 apart / 100 < shown.y("box2d:shipped").max() <= most
                 and abs(shown.y("box2d:shipped").max() / largest - 1) <= 1e-9
@@ -73,7 +74,7 @@ def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) 
             1,
             Claim(
                 "Here every step is rounded the same way, so the error grows in proportion to the"
-                " time.",
+                " time: after twice the time it is twice as large.",
                 lambda shown: (
                     np.abs(
                         shown.y("box2d:shipped")

@@ -81,8 +81,9 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
     return [
         Claim(
             "Box2D without CCD (+no_ccd) turns round a velocity that gravity has"
-            " changed already. The ball gains |v| dt of height at each bounce, where v is its"
-            f" speed: {number(1e3 * fall * dt)} mm at the first, and more at each later one.",
+            " changed already. The ball gains about |v| dt of height at each bounce, where v is"
+            f" its speed: some {number(1e3 * fall * dt, 2)} mm at the first, and more at each later"
+            " one.",
             lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
         ),
         continuous,

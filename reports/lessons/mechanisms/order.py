@@ -9,7 +9,10 @@ from reports.lessons.lesson import Claim, Settings, Shown, Slider, time_step
 from reports.lessons.mechanisms.ablation import PLAIN, follows, lies_on, page
 from reports.lessons.mechanisms.falling import ROUNDING_MM, falling
 from reports.page.style import number
+from scenarios.families.lesson import free_fall
 from scenarios.model import Array
+
+END = free_fall().duration  # s
 
 
 def show_order(settings: Settings) -> Shown:
@@ -18,16 +21,17 @@ def show_order(settings: Settings) -> Shown:
 
     def claims(offset: Array) -> list[Claim]:
         mm, both = number(offset[-1]), number(2 * offset[-1])
-        half = number(500 / 60 / settings["k"])
+        # mm/s: x + (v ± g dt / 2) t - g t² / 2 is g dt t / 2 off at every time
+        faster = number(offset[-1] / END)
         return [
             Claim(
                 f"pymunk:matched moves first. It is g dt t / 2 above the parabola, {mm} mm in the"
-                f" end: its fall is late by dt / 2 = {half} ms, at every time.",
+                f" end: the exact flight of a disk that is thrown g dt / 2 = {faster} mm/s faster.",
                 follows("pymunk:matched", offset, ROUNDING_MM),
             ),
             Claim(
                 f"reference:exercise changes the velocity first. It is as far below, {mm} mm in the"
-                " end: its fall is early by dt / 2.",
+                " end: the exact flight of a disk that is thrown as much slower.",
                 follows(PLAIN, -offset, ROUNDING_MM),
             ),
             Claim(
@@ -49,7 +53,7 @@ ORDER = page(
     3,
     "order",
     "Velocity or position first",
-    "Why is a falling disk late by half a step?",
+    "Why is a thrown disk off its parabola?",
     "With the same gravity and the same step, one engine moves a disk with the old velocity and"
     " the other with the new one. [thrust] does this with a force.",
     ["pymunk:matched"],

@@ -154,7 +154,7 @@ NO_CLAIM = {
         "Velocity first is α = 1": "defines α",
     },
     "box": {
-        "A collision leaves e²": "follows from the formula before it",
+        "In a collision of a disk": "the law; e² follows from the formula in it",
         "Between two collisions the sum": "the law; the first claim says who breaks it",
         "The exact answer ends": "defines where; lesson 7 claims it",
     },

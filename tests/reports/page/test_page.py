@@ -139,7 +139,7 @@ def test_the_truth_is_not_drawn_beyond_its_horizon(
 
     assert before is not None
     assert after is None
-    assert "truth ends at" in page.locator(f"#s-{ORBIT} .ended").inner_text()
+    assert "exact answer ends at" in page.locator(f"#s-{ORBIT} .ended").inner_text()
 
 
 def test_the_replay_is_played_with_the_keyboard(page: Page) -> None:
