@@ -76,7 +76,7 @@ function drawChart(chart) {
   for (const [axis, place] of guides) drawGuide(picture, axis, place);
   chart.curves.forEach((curve, k) => drawCurve(picture, curve, x, y, [k, chart.curves.length], clip));
   nameGuides(picture, guides, chart.curves.map((curve) => curve.x.map((each, j) => [x.place(each), y.place(curve.y[j])])));
-  figure.append(caption, picture);
+  figure.append(caption, picture, savesOf(chart, picture));
   return figure;
 }
 

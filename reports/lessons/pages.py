@@ -87,7 +87,7 @@ def lesson_page(
     return render(
         "lessons/lesson.html.j2",
         generator=GENERATOR,
-        scripts=[*ENGINE, "lessons/chart.js", "lessons/lesson.js"],
+        scripts=[*ENGINE, "lessons/save.js", "lessons/chart.js", "lessons/lesson.js"],
         styles=STYLES,
         looks=looks_of(lesson),
         connects=not grid,

@@ -287,6 +287,7 @@ def traces_of(
             "x": shortened(at),
             "y": [top] * len(lost),
             "text": [f"{name}: failed"] * len(lost),
+            "customdata": [None] * len(lost),  # neither cost nor error: both are only places
             "hovertemplate": "%{text}",
             "marker": {"symbol": look.symbol, "size": 10, "color": look.light},
         }
@@ -341,6 +342,7 @@ def said_of(row: Mapping[Any, Any]) -> str:
     step = f", dt {style.number(row['dt_s'])} s" if np.isfinite(row["dt_s"]) else ""
     lines = [f"{name}{step}", f"error {style.number(row['error'])} radii"]
     if row["scenario"] == POOLED:
+        lines[0] += f", step size {int(row['step_size']) + 1} of each scene"
         lines[0] += f", over {counted(int(row['of']), 'scene')}"  # fewer, if it refused some
     part = row["cost"] - row.get("bare", np.nan) if row["scenario"] == POOLED else row["idle"]
     if part > 0:

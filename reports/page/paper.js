@@ -37,14 +37,22 @@ function onPaper(text, plot) {
   return { data: figure.data, layout: layoutOf(figure, "paper-") };
 }
 
-// A row a point of what is shown: the number itself, where the chart draws it below a break of its axis.
+// A row a point of what is shown: the number itself, where the chart draws it below a break of its axis; the column of
+// a chart that has columns; and what a point says of itself.
 function numbersOf(plot) {
   const { data, layout } = withoutHidden(JSON.parse(drawn.get(plot)), plot);
   const quoted = (value) => `"${String(value ?? "").replaceAll("\"", "\"\"")}"`;
   const titles = [layout.xaxis, layout.yaxis].map((axis) => axis.title?.text ?? axis.title ?? "");
-  const rows = [["engine", ...titles].map(quoted)];
-  for (const trace of data.filter((each) => each.visible && each.hoverinfo !== "skip")) {
-    trace.x.forEach((x, k) => rows.push([quoted(trace.name), x ?? "", (trace.customdata ?? trace.y)[k] ?? ""]));
+  const columns = layout.meta?.columns;
+  const traces = data.filter((each) => each.visible && each.hoverinfo !== "skip");
+  const says = traces.some((each) => each.text);
+  const rows = [["engine", columns ? layout.meta.of : titles[0], titles[1], ...(says ? ["point"] : [])].map(quoted)];
+  for (const trace of traces) {
+    trace.x.forEach((x, k) => {
+      const value = (trace.customdata ?? trace.y)[k] ?? "", failed = trace.customdata && value === "";
+      const said = says ? [quoted(trace.text?.[k].replaceAll("<br>", "; "))] : [];
+      rows.push([quoted(trace.name), columns ? quoted(columns[Math.round(x)]) : failed ? "" : x ?? "", value, ...said]);
+    });
   }
   return rows.map((row) => row.join(",")).join("\n") + "\n";
 }

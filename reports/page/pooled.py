@@ -88,6 +88,8 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Recommendatio
     figure = figure_of(
         lines, axis, "error (radii)", markers=len(answers), mode="markers", height=340
     )
+    # for the file of its numbers: a mark stands beside the middle of its column
+    figure.layout.meta = {"of": "situation", "columns": [answer.title for answer in answers]}
     return Drawing(
         "Error by situation",
         "Each mark is an engine: the median over the scenes of its largest position error at the"

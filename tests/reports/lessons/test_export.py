@@ -4,9 +4,12 @@ reported at once."""
 from __future__ import annotations
 
 import base64
+import csv
+import io
 import json
 import zlib
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from playwright.sync_api import Browser
@@ -16,7 +19,9 @@ from reports.lessons import command, pages
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention
 from reports.lessons.lesson import Shown
+from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, index_page, linked, offline
+from reports.page.style import TRUTH
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -49,6 +54,40 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     assert heard == []
     assert len(held) == len(lesson.grid)
     assert held["1,0"]["charts"] == json.loads(json.dumps(lesson.at((1, 0)).to_json()["charts"]))
+
+
+@pytest.mark.slow
+def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, tmp_path: Path):
+    """The picture has the title and a legend and needs no style of the page; the numbers are those
+    of the curves."""
+    lesson, path = LESSONS["order"], tmp_path / "order.html"
+    path.write_text(
+        offline(lesson, {places: answer_json("order", places) for places in lesson.grid})
+    )
+    page, heard = opened(browser, path.as_uri(), accept_downloads=True)
+    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    files = {}
+    for kind in ("SVG", "CSV"):
+        with page.expect_download() as download:
+            page.locator(f".saves button:has-text('{kind}')").first.click()
+        assert download.value.suggested_filename.endswith(f"Above the parabola.{kind.lower()}")
+        files[kind] = Path(download.value.path()).read_text(encoding="utf-8")
+    page.context.close()
+    chart = lesson.at(lesson.start).to_json()["charts"][0]
+    rows = list(csv.reader(io.StringIO(files["CSV"])))
+    picture = ElementTree.fromstring(files["SVG"])
+    said = {element.text for element in picture.iter("{http://www.w3.org/2000/svg}text")}
+
+    shown = {TRUTH: "exact answer", ABLATED: "ablated reference"}
+    assert rows[0] == ["curve", chart["x"], chart["y"]]
+    for curve in chart["curves"]:
+        name = shown.get(curve["name"], curve["name"])
+        mine = [(float(x), float(y)) for who, x, y in rows[1:] if who == name]
+        assert mine == list(zip(curve["x"], curve["y"]))
+        assert name in said
+    assert {"Above the parabola", chart["x"], chart["y"]} <= said
+    assert "class=" not in files["SVG"]
+    assert heard == []
 
 
 @pytest.mark.slow

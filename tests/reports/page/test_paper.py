@@ -223,6 +223,24 @@ def test_the_numbers_of_a_chart_are_saved_as_they_were_computed(
 
 
 @pytest.mark.slow
+def test_the_numbers_of_a_chart_by_situation_name_the_situation(browser: Browser, path: Path):
+    """Not where a mark stands in its column; those of error against steps name their step size."""
+    page, heard = opened(browser, path.as_uri(), accept_downloads=True)
+    text, other = (
+        saved(page, "csv", f".plot[data-chart={chart}]") for chart in ("situations", "pooled")
+    )
+    page.context.close()
+    rows, points = (list(csv.DictReader(io.StringIO(each))) for each in (text, other))
+
+    assert list(rows[0]) == ["engine", "situation", "error (radii)"]
+    assert {row["situation"] for row in rows} == {"Single collisions"}
+    failed = [row for row in points if "failed" in row["point"]]
+    assert {row["largest error (radii)"] for row in failed} == {""}
+    assert all("step size" in row["point"] for row in points if row not in failed)
+    assert heard == []
+
+
+@pytest.mark.slow
 def test_a_chart_is_saved_as_a_picture_with_its_title_and_legend(browser: Browser, path: Path):
     """As SVG, in the colours of paper also where the page is dark, without what is hidden."""
     page, heard = opened(
