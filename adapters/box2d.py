@@ -268,9 +268,9 @@ class Box2DEngine:
         angle = np.array([b.angle for b in bodies], float)
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
         if self.matched:
-            must_not_be_cut(
-                "speed", np.hypot(velocity[:, 0], velocity[:, 1]), self.speed_cap, "m/s"
-            )
+            speed = np.hypot(velocity[:, 0], velocity[:, 1])
+            unit = f": {Box2D.b2_maxTranslation:g} of its length units of {1 / self.length:.3g} m"
+            must_not_be_cut("speed", speed, self.speed_cap, "m/s", unit)
             must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
         return State(position, velocity, angle, angular_velocity)
 

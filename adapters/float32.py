@@ -23,13 +23,14 @@ def must_fit(**quantities: Array) -> None:
             raise Unsupported(f"{name} {bad:g} does not fit into float32")
 
 
-def must_not_be_cut(what: str, values: Array, cap: float, unit: str) -> None:
+def must_not_be_cut(what: str, values: Array, cap: float, unit: str, because: str = "") -> None:
     """Raise `Unsupported` if the engine has cut `values` to its cap: a scene is played as it is or
-    not at all."""
+    not at all. `because`: where the cap comes from, the end of the sentence."""
     # in float32 a cut value is a little below the cap
     if np.abs(values).max() > cap * (1 - 1e-5):
         raise Unsupported(
-            f"a disk reaches a {what} of {cap:g} {unit}, the most that Box2D allows at this dt"
+            f"a disk reaches a {what} of {cap:.4g} {unit}, the most that Box2D allows at this"
+            f" dt{because}"
         )
 
 

@@ -23,6 +23,7 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, State
 from scenarios.truth.exact import with_oracle
 
+ROUNDING = 1e-12  # of float64, over some dozen operations on numbers of the order of 1
 NAMES = ("reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64")
 INTERVAL = 1 / 64
 
@@ -103,17 +104,22 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
             (
                 f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, "
                 f"v₂' = v₂ − J n/m₂ = {pair(after.velocity[1])} m/s; "
-                f"separation over approach speed: {number(-separating / closing, 6)}"
+                f"separation over approach speed: {or_rounding(-separating / closing, 6)}"
             ),
         ),
         (
             "Momentum",
             (
                 f"m₁v₁ + m₂v₂ = {pair(start)} before and {pair(end)} kg m/s after: off by "
-                f"{number(float(np.abs(end - start).max()), 2)}"
+                f"{or_rounding(float(np.abs(end - start).max()), 2)}"
             ),
         ),
     ]
+
+
+def or_rounding(value: float, digits: int) -> str:
+    """A number of the order of 1, or that it is 0 but for its last digits."""
+    return number(value, digits) if abs(value) > ROUNDING else "0 to rounding"
 
 
 def pair(vector: Array) -> str:
