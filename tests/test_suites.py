@@ -1,4 +1,4 @@
-"""Every test is played by one of three: the fast suite, the gate, the long run; and only once."""
+"""Every test is played by one of three: the fast suite, the gate, the long run."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-def calls_of(script: str) -> list[str]:
-    """The commands in a script of `.ci` that select tests by their marks."""
+def call_of(script: str) -> str:
+    """The one command in a script of `.ci` that selects tests by their marks."""
     text = (ROOT / ".ci" / script).read_text("utf-8")
-    return re.findall(r"^ *(?:exec )?uv run (pytest .*-m .+)$", text, re.MULTILINE)
+    (call,) = re.findall(r"^(?:exec )?uv run (pytest -m .+)$", text, re.MULTILINE)
+    return call
 
 
 def selected(words: str) -> str:
@@ -27,13 +28,11 @@ def selected(words: str) -> str:
 
 
 OPTIONS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["pytest"]
-(BESIDE, GATE), (LONG,) = calls_of("run"), calls_of("long")
 SUITES = {
     "fast": selected(OPTIONS["ini_options"]["addopts"]),
-    "beside": selected(BESIDE),  # the first run, in the gate
-    "gate": selected(GATE),
+    "gate": selected(call_of("run")),
     # it also plays every property again, with more examples
-    "long": selected(LONG).removesuffix(" or hypothesis"),
+    "long": selected(call_of("long")).removesuffix(" or hypothesis"),
 }
 
 
@@ -65,8 +64,7 @@ def test_every_test_is_played_by_one_suite_and_none_is_the_gate_blind_to(
 def test_the_marks_say_which_suite():
     """`long` outranks `slow`, of which it is a variant; a file of long ones is noticed."""
     assert suites_of([]) == suites_of(["hypothesis", "parametrize"]) == ["fast"]
-    assert suites_of(["slow"]) == ["gate"]
-    assert suites_of(["independent"]) == suites_of(["slow", "independent"]) == ["beside"]
+    assert suites_of(["slow"]) == suites_of(["independent"]) == ["gate"]
     assert suites_of(["long"]) == suites_of(["slow", "long"]) == ["long"]
     assert suites_of(["independent", "long"]) == ["long"]
     tests = [("a.py::one", ["fast"]), ("a.py::two", ["long"]), ("b.py::three", ["long"])]
