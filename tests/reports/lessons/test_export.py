@@ -92,7 +92,7 @@ def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, t
 
 @pytest.mark.slow
 def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path: Path):
-    """A sheet of A4 sideways, with the longest answers; in letters as on the screen they do not."""
+    """A sheet of A4 sideways, with the longest answers; unbroken and in larger letters they do not."""
     got = dict.fromkeys(ENGINES, ("not modelled", "keeps"))
     asked = [
         Convention("What friction acts in a bounce with e = 0, where 0.2 is stated?", "0", got)
@@ -103,7 +103,10 @@ def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path:
     page.emulate_media(media="print")
     end = "document.querySelector('.conventions').getBoundingClientRect().right - innerWidth"
     right = page.evaluate(end)
-    page.evaluate("document.querySelector('.conventions').style.fontSize = '1rem'")
+    page.evaluate(
+        "document.querySelectorAll('.conventions, .conventions td')"
+        ".forEach((each) => Object.assign(each.style, {fontSize: '1rem', whiteSpace: 'nowrap'}))"
+    )
     wide = page.evaluate(end)
     page.context.close()
 
