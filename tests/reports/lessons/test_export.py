@@ -92,7 +92,7 @@ def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, t
 
 @pytest.mark.slow
 def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path: Path):
-    """A sheet of A4 sideways, with the longest answers; unbroken and in larger letters they do not."""
+    """A sheet of A4 sideways, with the longest answers; unbroken in larger letters they do not."""
     got = dict.fromkeys(ENGINES, ("not modelled", "keeps"))
     asked = [
         Convention("What friction acts in a bounce with e = 0, where 0.2 is stated?", "0", got)
