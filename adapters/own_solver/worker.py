@@ -107,7 +107,7 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
     while len(answers) < len(request):
         k = len(answers)
         if k != alone and not endless and (questions := questions_at(request, k, solver)):
-            answers += solver.together(questions, request[k][2])
+            answers += solver.together(questions, request[k][2] * TOGETHER)
             alone = len(answers)
             continue
         command, argument, limit = request[k]
@@ -122,6 +122,10 @@ def reply(solver: Any, request: list[tuple[str, Any, float]]) -> list[dict[str, 
             if failure.kind in ("timeout", "memory"):
                 endless |= dict.fromkeys([*calls, "step"], vars(failure))
     return answers
+
+
+# of the time of a question: all together take a few milliseconds, or one of them is asked again
+TOGETHER = 0.2
 
 
 def questions_at(request: list[tuple[str, Any, float]], k: int, solver: Any) -> list[Any]:

@@ -25,7 +25,7 @@ from reports.check.questions import (
 from reports.check.rows import CheckRow
 
 # s that a call may take if others are known not to return; a right one takes microseconds
-SOON = 0.1
+SOON = 0.02
 FAR = "reach/25"  # two spheres four times as far apart, in x and in y, as when they touch
 
 
