@@ -502,7 +502,13 @@ def stability(
             help=f"What to vary in FILE.toml: {VARIED}; may be given again. Default: each of them.",
         ),
     ] = None,
-    engine: Engines = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[:PROFILE]|FILE",
+            help="Only this engine, or your engine's file; may be given again.",
+        ),
+    ] = None,
     full: Annotated[
         bool,
         typer.Option(

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from reports.check.impulse import UNALIKE
 from reports.check.rows import FOLLOWS, TASKS, UNKNOWN, CheckRow
 
 # The causes that different tasks report for one mistake in the distance or the normal.
@@ -26,6 +27,14 @@ SAME_MISTAKE = (
     {
         "they are moved with x and y of the normal exchanged",
         "x and y of the normal are exchanged",
+    },
+    {"the sizes are doubled", "brackets are missing: each is moved by sizes - distance / 2"},
+    {
+        "only the size of A is used",
+        "only the size of B is used",
+        "the size of A is used twice",
+        "the size of B is used twice",
+        UNALIKE,
     },
     {"they are moved along x only", "the normal is taken along x"},
     {"they are moved along y only", "the normal is taken along y"},

@@ -7,7 +7,8 @@ import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
-from reports.check.questions import QUESTIONS, Ball, SolverAnswer
+from adapters.own_solver.restitution import code_of
+from reports.check.questions import QUESTIONS, Ball, SolverAnswer, was_stopped
 from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
@@ -48,6 +49,8 @@ def failure(task: str, part: str, answers: dict[str, SolverAnswer]) -> CheckRow:
     """The fault of a function that fails in a part of its task."""
     failed = failed_calls(answers)
     got = f"it fails in {len(failed)} of {len(answers)} calls"
+    if was_stopped(failed):
+        got = "a call does not return; those after it are not tried"
     why = next(answer.failed for answer in failed.values())
     asked = f"Does {FUNCTIONS[task]} return from every call?"
     cause = f"{FUNCTIONS[task]}: {why}"
@@ -61,15 +64,15 @@ def not_implemented(task: str, got: str, cause: str) -> CheckRow:
 
 
 def same_again(
-    function: str, answers: dict[str, SolverAnswer], others: dict[str, SolverAnswer]
+    function: str, answers: dict[str, SolverAnswer], others: dict[str, SolverAnswer], text: str
 ) -> list[CheckRow]:
     """A fault if answers depend on earlier questions, in the part of the task that they affect;
-    else nothing. `others`: the answers that differ."""
+    else nothing. `others`: the answers that differ; `text`: of the file."""
     mine = {name: other for name, other in others.items() if name in answers}
     if not mine:
         return []
-    kept = sorted({name for answer in mine.values() for name in answer.kept})
-    where = f" in the global {kept[0]}" if len(kept) == 1 else ""
+    kept = {name for answer in mine.values() for name in answer.kept} or globals_changed(text)
+    where = f" in the global {min(kept)}" if len(kept) == 1 else ""
     return [
         judged(
             SAME_AGAIN,
@@ -83,6 +86,22 @@ def same_again(
             " asked in a fresh world",
         )
     ]
+
+
+def globals_changed(text: str) -> set[str]:
+    """The variables that a file defines outside functions and changes, or has a field changed, in
+    indented lines, as far as its text shows."""
+    code = code_of(text)
+    defined = set(re.findall(r"^(?:let |var |const )?(\w+)\s*=(?!=)", code, re.MULTILINE))
+    inside = [line for line in code.splitlines() if line[:1].isspace() and len(line) <= LONGEST]
+    own = {name for line in inside for name in re.findall(r"\b(?:let|var|const)\s+(\w+)", line)}
+    changed = {name for line in inside for name in re.findall(rf"\b(\w+){CHANGED}", line)}
+    return defined & changed - own - {"ufo", "asteroids"}
+
+
+LONGEST = 200  # characters of a line that is searched
+# n = ..., n.x += ..., n[0]++, n.push(...)
+CHANGED = r"(?:(?:\.\w+|\[[^\]]*\])*\s*(?:[-+*/]?=(?!=)|\+\+|--)|\.(?:push|append|add)\()"
 
 
 def keeps_state(rows: Iterable[CheckRow]) -> bool:

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of
+from reports.check.functions import CHANGED
 from reports.check.impacts import APPROACH, AS_IF_EQUAL
 from reports.check.questions import QUESTIONS, Question, fresh_world
-from reports.check.rows import SAME_AGAIN, CheckRow
+from reports.check.rows import SAME_AGAIN, UNKNOWN, CheckRow
 
-LIMIT = 0.5  # s a traced call may take: the first accesses are enough for one that never returns
+LIMIT = 0.2  # s a traced call may take: the first accesses are enough for one that never returns
 # task -> the question that is traced
 SHOWN = {"1": "force", "2": "collision/light on heavy"}
 MOST = 5  # lines in a row
@@ -26,13 +27,15 @@ class Access(NamedTuple):
     Attributes:
         kind: "r" or "w".
         sphere: its index in the question. field: of the sphere; "position" for both x and y.
-        lines: the lines of the file on the call stack, the innermost first.
+        lines: the lines of the file on the call stack, the innermost first, without helpers.
+        helpers: the lines of helpers, which take any vector.
     """
 
     kind: str
     sphere: int
     field: str
     lines: Sequence[int]
+    helpers: tuple[int, ...] = ()
 
     @property
     def line(self) -> int:
@@ -40,9 +43,10 @@ class Access(NamedTuple):
         return self.lines[0] if self.lines else 0
 
 
-def accesses_of(process: SolverProcess, question: Question) -> list[Access]:
+def accesses_of(process: SolverProcess, question: Question, text: str) -> list[Access]:
     """The reads and writes of the calls of a question, in order, in a fresh world, up to a failure
-    if there is one. Raises `SolverFailed` if the process is lost."""
+    if there is one; with the lines of the file's text outside helpers. Raises `SolverFailed` if the
+    process is lost."""
     if process.surface == "advance":
         return []  # its spheres are arrays, which record nothing
     *_, seen = process.request(
@@ -52,29 +56,54 @@ def accesses_of(process: SolverProcess, question: Question) -> list[Access]:
             ("accesses", None, LIMIT),
         ]
     )
-    return outside_helpers([Access(*row) for row in seen]) if isinstance(seen, list) else []
+    code = code_of(text).splitlines()
+    return outside_helpers(
+        [
+            Access(kind, sphere, field, [line for line in lines if line <= len(code)])
+            for kind, sphere, field, lines in (seen if isinstance(seen, list) else [])
+        ],
+        code,
+    )
 
 
-def outside_helpers(seen: list[Access]) -> list[Access]:
-    """The accesses without those of helper functions. A line that writes both positions and
-    velocities is in a helper, which sets any vector; its accesses get the line of the caller."""
-    written: dict[int, set[str]] = {}
+def outside_helpers(seen: list[Access], code: Sequence[str]) -> list[Access]:
+    """The accesses without those of helper functions, which get the line of the caller instead.
+
+    A helper takes any vector: the caller's line names the field and its own does not, or one of its
+    lines writes both positions and velocities, or reads both in calls from different lines.
+    """
+    callers: dict[tuple[str, int], dict[str, set[tuple[int, ...]]]] = {}
     for access in seen:
-        if access.kind == "w":
-            written.setdefault(access.line, set()).add(access.field)
-    helpers = {line for line, fields in written.items() if fields >= {"position", "velocity"}}
-    if not helpers:
+        fields = callers.setdefault((access.kind, access.line), {})
+        fields.setdefault(access.field, set()).add(tuple(access.lines[1:]))
+    helpers = {
+        line
+        for (kind, line), fields in callers.items()
+        if fields.keys() >= {"position", "velocity"}
+        and (kind == "w" or fields["position"].isdisjoint(fields["velocity"]))
+    }
+
+    def in_helper(access: Access) -> bool:
+        return bool(access.line) and (access.line in helpers or passed_on(access, code))
+
+    if not any(map(in_helper, seen)):
         return seen
     return outside_helpers(
         [
-            access._replace(lines=access.lines[1:])
-            if access.line in helpers and len(access.lines) > 1
-            else access._replace(lines=())
-            if access.line in helpers
+            access._replace(lines=access.lines[1:], helpers=(*access.helpers, access.line))
+            if in_helper(access)
             else access
             for access in seen
-        ]
+        ],
+        code,
     )
+
+
+def passed_on(access: Access, code: Sequence[str]) -> bool:
+    """Whether the caller's line names the field of an access, and its own line does not."""
+    own, caller = (*access.lines, 0, 0)[:2]
+    named = re.compile(rf"""[.\["']{access.field}\b""")
+    return bool(caller and named.search(code[caller - 1]) and not named.search(code[own - 1]))
 
 
 def part_of(seen: Sequence[Access], failed_at: int, text: str) -> str:
@@ -152,10 +181,12 @@ CALLED = {
 # causes on the lines that compute the normal of a pair, and those that name it but are elsewhere
 ABOUT_NORMAL = re.compile(r"\bnormal\b|\bd[xy] is")
 SIGN_OF_J = "sign of the normal or of J"
+ONE_PLACE = "in one of its two places"
+AFTER = "after the displacement"
 NO_MASSES = "the masses are missing"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
 GUARD = re.compile(r"==\s*0\b")  # two at the same place
-HEAD_OF_LOOP = re.compile(r"\b(?:for|while|forEach|map)\b")
+HEAD_OF_LOOP = re.compile(r"\b(?:for|while|do|forEach|map)\b")
 BRANCH = re.compile(r"\bif\b.*[<>]|[<>].*\?")  # on the order of two numbers
 ASSIGNS = re.compile(r"([\w.,\s\[\]]+?)\s*[-+*/]?=(?![=>])")
 
@@ -172,6 +203,22 @@ def detection_lines(seen: Sequence[Access]) -> list[int]:
     sizes = [a for a in seen[:first_write] if a.field == "size"]
     both = next((k + 1 for k, a in enumerate(sizes) if a.sphere != sizes[0].sphere), 1)
     return [a.line for a in sizes[:both]]
+
+
+def distance_lines(seen: Sequence[Access]) -> list[int]:
+    """The lines that read positions before any write, with those of the helpers that do it."""
+    first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
+    written = {a.line for a in seen if a.kind == "w"}
+    reads = [a for a in seen[:first_write] if a.field == "position" and a.line not in written]
+    return [line for a in reads for line in (*a.helpers, a.line)]
+
+
+def calls_for_one(writes: Sequence[Access], of_it: Sequence[Access]) -> list[int]:
+    """The lines that call, for one sphere, a function whose lines write both."""
+    callers: dict[int, set[Sequence[int]]] = {}
+    for a in writes:
+        callers.setdefault(a.line, set()).add(tuple(a.lines[1:2]))
+    return [a.lines[1] for a in of_it if len(callers[a.line]) > 1 and len(a.lines) > 1]
 
 
 def displacement_lines(seen: Sequence[Access], cause: str) -> list[int]:
@@ -234,7 +281,7 @@ class Source:
         needed = QUESTIONS[question].calls[0][0]
         if question not in self.traced:
             has = self.process.functions[needed]
-            found = accesses_of(self.process, QUESTIONS[question]) if has else []
+            found = accesses_of(self.process, QUESTIONS[question], self.text) if has else []
             self.traced[question] = found
         return self.traced[question]
 
@@ -250,8 +297,7 @@ class Source:
         elif row.task == "loop":
             numbers = self.calls(row.name)
         elif "does not come back" in row.cause:
-            seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
-            numbers = [seen[-1].line] if seen else []
+            numbers = self.endless_lines(self.accesses(SHOWN["1" if row.task == "1" else "2"]))
         elif row.name == SAME_AGAIN:
             numbers = self.assignment_lines(re.findall(r"global (\w+)", row.cause))
         else:
@@ -266,10 +312,14 @@ class Source:
             who = {"velocity of A": {0}, "velocity of B": {1}}.get(row.name, {0, 1})
             writes = [a for a in seen if a.kind == "w" and a.field in WRITTEN[row.name]]
             # Where one sphere is not written at all, its lines belong beside those of the other.
-            return [a.line for a in writes if a.sphere in who] or [a.line for a in writes]
+            of_it = [a for a in writes if a.sphere in who] or writes
+            return [*calls_for_one(writes, of_it), *(a.line for a in of_it)]
         made = self.normal_lines(seen, row.cause)
         if row.task == "2a":
-            return [*made, *detection_lines(seen)]
+            sizes = detection_lines(seen)
+            if row.cause == UNKNOWN:
+                return [*distance_lines(seen), *sizes, *self.branches(sizes)]
+            return [*made, *sizes, *(self.branches(sizes) if "compar" in row.cause else [])]
         if row.task == "2b":
             return made or displacement_lines(seen, row.cause)
         if row.task == "2c" and SIGN_OF_J in row.cause:
@@ -278,23 +328,40 @@ class Source:
                 *impulse_lines(seen, "mass"),
                 *(a.line for a in seen if is_write(a, "velocity")),
             ]
+        if row.task == "2c" and ONE_PLACE in row.cause:
+            return [
+                *impulse_lines(seen, "velocities"),
+                *(a.line for a in seen if is_write(a, "velocity")),
+            ]
         if row.task == "2c" and row.cause.startswith(AS_IF_EQUAL):
             return [*self.lines_of_j(seen), *(a.line for a in seen if is_write(a, "velocity"))]
         if row.task == "2c" and row.cause == APPROACH:
-            return self.branches(seen) or impulse_lines(seen, row.cause)
+            velocities = [a.line for a in seen if a.field == "velocity"]
+            return self.branches(velocities) or impulse_lines(seen, row.cause)
         if row.task == "2c" and NO_MASSES in row.cause:
             return self.lines_of_j(seen) or impulse_lines(seen, row.cause)
         if row.task == "2c":
             return made or impulse_lines(seen, row.cause)
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
 
-    def branches(self, seen: Sequence[Access]) -> list[int]:
-        """The first line from the last that reads a velocity on which compares two numbers in a
-        condition."""
-        last = max((a.line for a in seen if a.field == "velocity"), default=0)
+    def branches(self, lines: Sequence[int]) -> list[int]:
+        """The first line from the last of these on that compares two numbers in a condition."""
+        last = max(lines, default=0)
         code = code_of(self.text).splitlines()
         after = range(last, min(last + MOST, len(code)) + 1) if last else ()
         return [k for k in after if BRANCH.search(code[k - 1])][:1]
+
+    def endless_lines(self, seen: Sequence[Access]) -> list[int]:
+        """The head of the loop that a call does not leave, and the lines in it that are known."""
+        if not seen:
+            return []
+        code = code_of(self.text).splitlines()
+        # The call was stopped anywhere: its latest access is not the same every time.
+        body = sorted({a.line for a in seen[-LOOPS:-1]}) if repeated(seen) else []
+        ahead = range(seen[-1].line, len(code) + 1)
+        around = range(body[0] if body else 0, 0, -1)
+        heads = (k for k in (around or ahead) if k and HEAD_OF_LOOP.search(code[k - 1]))
+        return [next(heads, seen[-1].line), *body]
 
     def lines_of_j(self, seen: Sequence[Access]) -> list[int]:
         """The lines that set a variable after the last that reads a velocity, up to the first that
@@ -317,18 +384,26 @@ class Source:
         code = code_of(self.text).splitlines()
         written = {a.line for a in seen if a.kind == "w"}
         first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
-        read = dict.fromkeys(a.line for a in seen[:first_write] if a.field == "position")
-        reads = [line for line in read if line and line not in written]
+        displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
+        before, after = (
+            [
+                line
+                for line in dict.fromkeys(a.line for a in part if a.field == "position")
+                if line and line not in written
+            ]
+            for part in (seen[:first_write], seen[displaced + 1 :])
+        )
+        reads = (after if AFTER in cause else []) or before
         if not reads:
             return []
         made = {name for line in reads for name in assigned(code[line - 1])}
         kicks = [a.line for a in seen if is_write(a, "velocity") and a.line > max(reads)]
-        after = [
+        between = [
             k
             for k in range(max(reads) + 1, min(kicks, default=max(reads) + 1))
             if k not in written and not code[k - 1].lstrip().startswith("if")
         ]
-        changes = [k for k in after if made & {*assigned(code[k - 1])}]
+        changes = [k for k in between if made & {*assigned(code[k - 1])}]
         if ABOUT_NORMAL.search(cause):
             return [*reads, *changes] if len(reads + changes) <= MOST else [*changes, *reads]
         used = rf"\b(?:{'|'.join(made)})\b"
@@ -370,6 +445,6 @@ class Source:
 
     def assignment_lines(self, names: Sequence[str]) -> list[int]:
         """The lines that change one of these variables."""
-        change = re.compile(rf"\b(?:{'|'.join(names)})\s*(?:[-+*/]?=(?!=)|\+\+|--)")
+        change = re.compile(rf"\b(?:{'|'.join(names)}){CHANGED}")
         code = code_of(self.text).splitlines()
         return [k for k, line in enumerate(code, 1) if names and change.search(line)]

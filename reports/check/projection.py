@@ -63,6 +63,8 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
     "brackets are missing: sizes / 2 - distance": lambda s, a, b: s.sizes / 2 - s.distance,
     "only the size of A is used": lambda s, a, b: a.r - s.distance,
     "only the size of B is used": lambda s, a, b: b.r - s.distance,
+    "the size of A is used twice": lambda s, a, b: 2 * a.r - s.distance,
+    "the size of B is used twice": lambda s, a, b: 2 * b.r - s.distance,
     "the shares are the inverse masses, which do not add up to 1": lambda s, a, b: (
         s.overlap * (1 / a.m + 1 / b.m)
     ),

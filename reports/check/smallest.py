@@ -85,6 +85,8 @@ def smallest_scenes(
 
 def part_of(row: CheckRow) -> str | None:
     """The part in which a scene shows a fault; None if it does not."""
+    if row.name == "rest kept" and ("alpha" in row.cause or "angularVelocity" in row.cause):
+        return "turn"
     return None if row.name in UNSEEN else ROWS.get(row.name, PARTS.get(row.task))
 
 
@@ -215,13 +217,14 @@ MEETING = {"2d": "2c"}  # any wrong velocity, if only 2d has a fault
 
 
 def flight_fault(scenario: Scenario, played: SceneAnswer, part: str) -> str:
-    """What is wrong with the flight of a sphere without collisions. `part`: "place", "turn", or "1"
-    for both."""
+    """What is wrong with the place of a sphere that did not collide, or with the angle of any: no
+    collision turns one. `part`: "place", "turn", or "1" for both."""
     t, right = scenario.duration, by_formulas(scenario)
     met = {int(i) for row in played.contacts for i in row[1:3]}
-    for k in set(range(scenario.scene.n)) - met:
+    for k in range(scenario.scene.n):
         x, angle = right.position[-1, k], right.angle[-1, k]
-        if part != "turn" and not near(played.position[-1, k], x, SINGLE):
+        flew = part != "turn" and k not in met
+        if flew and not near(played.position[-1, k], x, SINGLE):
             return (
                 f"sphere {k} is at {shown(played.position[-1, k])} m after {shown(t)} s, not at"
                 f" {shown(x)} m"

@@ -151,7 +151,7 @@ def task_1(
     rows, usable = implemented("1", process.functions["integrate"], mine, text)
     if not usable:
         return [*rows, not_asked("velocity", "1", "integrate cannot be judged further")]
-    return [*rows, *same_again("integrate", mine, others), *motion_rows(mine)]
+    return [*rows, *same_again("integrate", mine, others, text), *motion_rows(mine)]
 
 
 def task_2(
@@ -175,7 +175,7 @@ def task_2(
     found = explain(mine, restitution)
     if found is not None and found.impulse == APPROACH and moved_together(mine):
         found = replace(found, impulse=BACKWARDS)
-    rows += same_again("sphereSphereCollisionHandling", mine, others)
+    rows += same_again("sphereSphereCollisionHandling", mine, others, text)
     rows += projection_rows(mine, found)
     rows += impulse_rows(mine, restitution, found)
     return sorted(rows, key=lambda row: row.task), restitution

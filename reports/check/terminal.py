@@ -39,7 +39,7 @@ LEAST = 24  # columns of a name: student and file are told by its ends
 
 def print_file(one: FileCheck) -> None:
     """Print the sentences with lines and numbers, the verdict of every task, the consequences of
-    the faults, and the free choices under an explaining title."""
+    the faults, what could not be asked, and the free choices, each under an explaining title."""
     console = Console()
     if one.passed or one.refused:
         console.print(legible(one.sentences[0]), highlight=False)
@@ -57,6 +57,8 @@ def print_file(one: FileCheck) -> None:
             names.setdefault(TASKS[row.task], []).append(row.name)
         follow = "; ".join(f"{title} ({', '.join(rows)})" for title, rows in names.items())
         console.print(f"\nThese follow from the faults above: {follow}.", highlight=False)
+    if unasked := [row for row in one.rows if row.verdict == "not asked"]:
+        print_rows(console, "Not asked:", unasked)
     if one.choices:
         print_rows(
             console, "Free choices. The exercise leaves them open; none is a fault:", one.choices

@@ -44,7 +44,7 @@ def said_of(engines: Sequence[str]) -> dict[str, list[str]]:
     with closing(run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)) as results:
         for name, check in results:
             found[name] = (
-                [f"It was not checked within {CHECKING:g} s."]
+                [f"It was not checked within {CHECKING:g} s: crosscheck check says more."]
                 if isinstance(check, Failure)
                 else check.says
             )

@@ -143,10 +143,11 @@ class Game {
   fill(row, flyer, solid) {
     const cell = (name) => row.querySelector(`[data-cell=${name}]`);
     const put = (name, text) => { if (cell(name).textContent !== text) cell(name).textContent = text; };
-    put("momentum", flyer ? vector(flyer.momentum) : "");
-    put("energy", flyer ? figure(flyer.energy) : "");
-    put("ship_deviation", flyer && !solid ? figure(flyer.ship_deviation) : "");
-    put("deviation", flyer && !solid ? figure(flyer.deviation) : "");
+    const flies = flyer && !flyer.left;
+    put("momentum", flies ? vector(flyer.momentum) : "");
+    put("energy", flies ? figure(flyer.energy) : "");
+    put("ship_deviation", flies && !solid ? figure(flyer.ship_deviation) : "");
+    put("deviation", flies && !solid ? figure(flyer.deviation) : "");
     put("collisions", flyer ? String(flyer.collisions) : "");
     put("diverged", flyer ? this.story(flyer, row.dataset.engine) : "");
     cell("diverged").classList.toggle("gone", Boolean(flyer?.left));

@@ -312,7 +312,21 @@ def reasons(
     }
     budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
     measure = "energy" if purpose == "energy" else "position_radii"
-    return [OutOfReach(one, one.reason or largest(budgets.get(one.task), measure)) for one in short]
+    return [
+        OutOfReach(
+            one,
+            one.reason
+            or (ASK_THE_EXERCISE if row_of(one.name).exercise else "")
+            or largest(budgets.get(one.task), measure),
+        )
+        for one in short
+    ]
+
+
+ASK_THE_EXERCISE = (
+    "not known of a file; a right solver of the exercise has the error of reference:exercise, so"
+    " ask with --engine reference:exercise"
+)
 
 
 def played_as(name: str) -> str:

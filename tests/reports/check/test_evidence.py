@@ -4,6 +4,7 @@ and that no answer depends on the question before it."""
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from reports.check.formats.questions_json import SCHEMA, as_json
 from reports.check.lines import Access, Source, accesses_of, part_of
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
 from reports.check.rows import UNKNOWN, CheckRow
-from reports.check.verdict import FileCheck
+from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.confusion import judged
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT, HERE, MUTANTS
@@ -30,6 +31,7 @@ FAULTY = (
     "state_in_impulse.py",
     "two_overlap_and_b_sign.js",
     "impulse_sign.js",
+    "size_of_a_twice.js",
 )
 COUNTS = {  # keeps a count of its calls, which it also writes into the sphere
     "count.js": "let n = 0;\nfunction integrate(s, dt) { s.alpha = ++n; }\n",
@@ -250,12 +252,85 @@ def test_the_lines_are_those_in_which_the_cause_is(cause: str, task: str, lines:
     assert [line for line, _ in found] == lines
 
 
+PUSH = (
+    (
+        "function norm",
+        "function push(s, J, n) { s.velocity = plus(s.velocity, times(J / s.mass, n)); }\n"
+        "function norm",
+    ),
+    ("A.velocity = minus(A.velocity, times(J / A.mass, n));", "push(A, J, n);"),
+    ("B.velocity = plus(B.velocity, times(J / B.mass, n));", "push(B, J, n);"),
+)
+ENDLESS = "while (gap < 0) { A.position.x += 0; B.position.y += 0; }"
+
+
+@pytest.mark.parametrize(
+    ("changes", "lines"),
+    [
+        pytest.param(
+            [("{ x: a.x - b.x, y: a.y - b.y }", "{ x: a.x - b.x, y: a.y + b.y }")],
+            ["function minus", "var r = minus(", "var gap", "if (gap > 0)"],
+            id="in a helper",
+        ),
+        pytest.param(
+            [("minus(A.velocity, B.velocity), n)", "minus(A.velocity, B.velocity), r)")],
+            ["var closing", "A.velocity =", "B.velocity ="],
+            id="in one of two places",
+        ),
+        pytest.param(
+            [("if (gap > 0)", "if (gap < 0)")],
+            ["var gap", "if (gap < 0)"],
+            id="in the comparison",
+        ),
+        pytest.param(
+            PUSH,
+            ["function push", "push(A"],
+            id="in a call of a function of one's own",
+        ),
+        pytest.param(
+            [("var closing", f"{ENDLESS}\n  var closing")],
+            ["while (gap < 0)"],
+            id="in an endless loop",
+        ),
+        pytest.param(
+            [
+                ("function norm", "var last = { x: 0, y: 0 };\nfunction norm"),
+                ("var closing", "last.x += n.x;\n  var closing"),
+                ("times(J / B.mass, n)", "times(J / B.mass * last.x, n)"),
+            ],
+            ["var last", "last.x += n.x"],
+            id="in what is kept",
+        ),
+    ],
+)
+def test_the_lines_lead_to_the_mistake(
+    changes: Sequence[tuple[str, str]], lines: list[str], tmp_path: Path
+):
+    """Of helpers.js, whose vectors are read by functions that know no sphere."""
+    text = (CORRECT_FILES / "helpers.js").read_text("utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    (tmp_path / "helpers.js").write_text(text, "utf-8")
+    first = begin_with(check_file(tmp_path / "helpers.js"))
+
+    assert len(first.lines) == len(lines), first
+    for (number, shown), begin in zip(first.lines, lines):
+        assert shown.startswith(begin)
+        assert text.splitlines()[number - 1].strip() == shown
+
+
+def test_a_size_used_twice_is_one_fault(checks: dict[str, FileCheck]):
+    """Of the detection: the overlap, and what depends on who is A, follow from it."""
+    assert [row.name for row in checks["size_of_a_twice.js"].faults] == ["overlap"]
+
+
 @pytest.mark.parametrize("name", ["complex_numbers.py", "plain.js"])
 def test_the_lines_that_are_shown_are_those_of_the_task_and_not_of_a_helper(name: str):
     """`put(a.velocity, ...)` is where a velocity is written, not the body of put."""
     solver = read_solver(CORRECT_FILES / name)
     with SolverProcess(solver) as process:
-        seen = accesses_of(process, QUESTIONS["collision/light on heavy"])
+        seen = accesses_of(process, QUESTIONS["collision/light on heavy"], solver.text)
     lines = solver.text.splitlines()
     wrote = {field: {a.line for a in seen if (a.kind, a.field) == ("w", field)} for field in FIELDS}
 
