@@ -577,7 +577,7 @@ REASONS = (
         "restart",
         "*",
         "the impulses and contacts of the last step are not part of the state that can be read",
-        "warm starting; contact caches",
+        "warm starting: a step begins with the impulses of the last one; contact caches",
     ),
 )
 

@@ -60,7 +60,7 @@ def show_rolling(settings: Settings) -> Shown:
                 guides=guides,
             ),
             LessonChart(
-                "Slip at rest",
+                "Size of that slip",
                 "time in s",
                 "|v + r ω| in m/s, 0 at the foot",
                 played.curves(lambda each: np.maximum(np.abs(slip(each)), STILL)),
