@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.compare.comparison import Comparison
-from reports.page import error_cost, pooled, situations
+from reports.page import cost_points, error_cost, pooled, situations
 from reports.page.charts import Drawing, packed_charts
 
 
@@ -69,7 +69,7 @@ class FirstScreen:
 def first_screen(
     comparisons: Sequence[Comparison],
     untrusted: Set[str],
-    clock: error_cost.RunTimes,
+    clock: cost_points.RunTimes,
     findings: Sequence[str],
     said: Mapping[str, Sequence[str]],
 ) -> FirstScreen:
@@ -80,7 +80,7 @@ def first_screen(
     without_friction, _ = situations.by_friction(comparisons)
     with_friction = [each for each in comparisons if each.scenario.scene.friction]
     scores = pooled.scores(comparisons)
-    middle = error_cost.with_times(scores[scores.middle], clock)
+    middle = cost_points.with_times(scores[scores.middle], clock)
     answers = situations.answers(middle, situated(comparisons), untrusted)
     drawings = pooled.drawings(scores, answers, untrusted)
     first = error_cost.error_cost(pooled.scores(without_friction), clock, untrusted)

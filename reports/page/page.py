@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from reports.compare.comparison import Comparison
-from reports.page import error_cost, overview, style
+from reports.page import cost_points, overview, style
 from reports.page.charts import NOISE, POINTS
 from reports.page.documents import CHARTED, render
 from reports.page.first_screen import first_screen
@@ -34,7 +34,7 @@ def write_page(
     known_answers: pd.DataFrame,
     about: Mapping[str, Any],
     lessons: Mapping[str, Any],
-    clock: error_cost.RunTimes = error_cost.NO_CLOCK,
+    clock: cost_points.RunTimes = cost_points.NO_CLOCK,
     said: Mapping[str, Sequence[str]] = MappingProxyType({}),
     on_paper: Sequence[str] = (),
 ) -> None:

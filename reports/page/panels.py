@@ -15,8 +15,8 @@ from adapters.engines import DISTINCT, FETCHED
 from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.compare.laws import deviation
+from reports.page.cost_points import RunTimes
 from reports.page.documents import deflated
-from reports.page.error_cost import RunTimes
 from reports.page.overview import NO_FRICTION, OverviewCell
 from reports.page.replay import played
 from reports.page.sections import OWN

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from reports.compare.comparison import Comparison
-from reports.page.error_cost import RunTimes
+from reports.page.cost_points import RunTimes
 from reports.page.findings import findings, not_counted
 from reports.page.page import write_page
 from reports.run.archive import Archive

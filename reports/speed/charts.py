@@ -14,7 +14,7 @@ from reports.compare.pareto import ACCURACIES, FAILED, front
 from reports.compare.pooling import without_idle
 from reports.page import style
 from reports.page.charts import ZERO, broken_axis, decades, marked_break, shortened, sized
-from reports.page.error_cost import light_marks
+from reports.page.cost_picture import light_marks
 from reports.speed.models import KINDS
 from scenarios.model import Array
 

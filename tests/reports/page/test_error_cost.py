@@ -12,7 +12,9 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from reports.compare.comparison import Comparison
-from reports.page.error_cost import ErrorCost, RunTimes, error_cost, surely_less
+from reports.page.cost_points import RunTimes
+from reports.page.cost_sentences import surely_less
+from reports.page.error_cost import ErrorCost, error_cost
 from reports.page.pooled import SCORES, scores
 from reports.run.timing import noise_of
 from reports.run.timing_pass import COLUMNS

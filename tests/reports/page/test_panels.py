@@ -18,7 +18,7 @@ from adapters.play import play
 from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.page import overview, panels
-from reports.page.error_cost import NO_CLOCK, RunTimes
+from reports.page.cost_points import NO_CLOCK, RunTimes
 from reports.page.overview import OverviewCell
 from reports.page.panels import drawn_of, numbers_of
 from reports.run.timing import noise_of

@@ -16,7 +16,7 @@ from adapters.play import play
 from reports.commands.report import medians
 from reports.compare.comparison import Comparison, compare
 from reports.page import charts, findings, overview, situations
-from reports.page.error_cost import NO_CLOCK, RunTimes, with_times
+from reports.page.cost_points import NO_CLOCK, RunTimes, with_times
 from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
