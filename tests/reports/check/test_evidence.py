@@ -13,9 +13,10 @@ import pytest
 
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
+from reports.check.accesses import Access, accesses_of, part_of
 from reports.check.consequences import with_consequences
 from reports.check.formats.questions_json import SCHEMA, as_json
-from reports.check.lines import Access, Source, accesses_of, part_of
+from reports.check.lines import Source
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
 from reports.check.rows import UNKNOWN, CheckRow
 from reports.check.verdict import FileCheck, check_file
