@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from reports.compare.order import FINEST
 from reports.compare.pooling import POOLED
 from reports.page import style
-from reports.page.charts import broken_axis, decades, marked_break, shortened
+from reports.page.charts import Figure, broken_axis, decades, marked_break, shortened
 from reports.page.cost_points import bare, by_engine, no_nearer
 from reports.terminal.counts import counted
 from scenarios.model import Array
@@ -23,7 +22,7 @@ TALL = 460  # px
 GOOD = "#1d8a63"  # the best corner, on a light and on a dark page
 
 
-def picture(table: pd.DataFrame, axis: str) -> go.Figure:
+def picture(table: pd.DataFrame, axis: str) -> Figure:
     """Error against cost: a line for each engine over its step sizes."""
     drawn = table[table.cost.notna() & np.isfinite(table.error)]
     costs, errors = (drawn[column].to_numpy(float) for column in ("cost", "error"))
@@ -44,13 +43,8 @@ def picture(table: pd.DataFrame, axis: str) -> go.Figure:
         "height": TALL,
     }
     layout |= marked_break(y_axis, floor) if floor > 0 else {}
-    return go.Figure(
-        traces,
-        layout
-        | best_corner(
-            layout.get("shapes", []), "near and cheap" if axis == TIME else "near in few steps"
-        ),
-    )
+    says = "near and cheap" if axis == TIME else "near in few steps"
+    return {"data": traces, "layout": layout | best_corner(layout.get("shapes", []), says)}
 
 
 def cost_range(costs: Array) -> list[float]:

@@ -152,4 +152,4 @@ def content_policy(scripts: Sequence[str]) -> str:
 
 def deflated(text: str) -> str:
     """Text, deflated, as base64: what `unpack` of player.js reads."""
-    return base64.b64encode(zlib.compress(encoded(text), 9)).decode()
+    return base64.b64encode(zlib.compress(encoded(text))).decode()

@@ -10,6 +10,7 @@ import numpy as np
 
 from adapters.engines import OWN
 from adapters.friction import REFUSAL
+from reports.compare import laws
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
@@ -115,6 +116,7 @@ def names_of(comparisons: Iterable[Comparison]) -> list[str]:
     return list(dict.fromkeys(run.name for comparison in comparisons for run in comparison.runs))
 
 
+@laws.cached
 def values(comparison: Comparison) -> Found:
     """The numbers of a scenario at the middle dt, against the truth or else the laws of physics."""
     table = comparison.table

@@ -24,8 +24,7 @@ function layoutOf(figure, ink = "") {
   const axis = { gridcolor: line, linecolor: line, zeroline: false, ticks: "outside", tickcolor: line, automargin: true };
   const layout = figure.layout;
   for (const name of ["xaxis", "yaxis"]) {
-    const title = layout[name].title;
-    layout[name] = { ...layout[name], ...axis, title: { ...title, font: { size: 12 }, standoff: 8 } };
+    layout[name] = { ...layout[name], ...axis, title: { text: layout[name].title, font: { size: 12 }, standoff: 8 } };
   }
   return {
     ...layout, template: null, showlegend: false, height: layout.height ?? 290, margin: { l: 58, r: 12, t: 26, b: 44 },

@@ -42,7 +42,7 @@ function onPaper(text, plot) {
 function numbersOf(plot) {
   const { data, layout } = withoutHidden(JSON.parse(drawn.get(plot)), plot);
   const quoted = (value) => `"${String(value ?? "").replaceAll("\"", "\"\"")}"`;
-  const titles = [layout.xaxis, layout.yaxis].map((axis) => axis.title?.text ?? axis.title ?? "");
+  const titles = [layout.xaxis, layout.yaxis].map((axis) => axis.title ?? "");
   const columns = layout.meta?.columns;
   const traces = data.filter((each) => each.visible && each.hoverinfo !== "skip");
   const says = traces.some((each) => each.text);

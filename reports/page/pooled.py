@@ -60,8 +60,8 @@ def drawings(
 
 def with_marks(drawings: Mapping[str, Drawing]) -> list[str]:
     """The engines that have a mark in one of the charts."""
-    traces = [t for drawing in drawings.values() if drawing.figure for t in drawing.figure.data]
-    return [t.name for t in traces if any(y is not None and np.isfinite(y) for y in t.y)]
+    traces = [t for drawing in drawings.values() if drawing.figure for t in drawing.figure["data"]]
+    return [t["name"] for t in traces if any(y is not None and np.isfinite(y) for y in t["y"])]
 
 
 def by_situation(found: pd.DataFrame, answers: Sequence[situations.Recommendation]) -> Drawing:
@@ -89,7 +89,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Recommendatio
         lines, axis, "error (radii)", markers=len(answers), mode="markers", height=340
     )
     # for the file of its numbers: a mark stands beside the middle of its column
-    figure.layout.meta = {"of": "situation", "columns": [answer.title for answer in answers]}
+    figure["layout"]["meta"] = {"of": "situation", "columns": [answer.title for answer in answers]}
     return Drawing(
         "Error by situation",
         "Each mark is an engine: the median over the scenes of its largest position error at the"

@@ -58,7 +58,7 @@ def pack_layers(
     ).encode()
     head += b" " * (-len(head) % 4)
     whole = len(head).to_bytes(4, "little") + head + b"".join(bodies)
-    return base64.b64encode(zlib.compress(whole, 9)).decode()
+    return base64.b64encode(zlib.compress(whole)).decode()
 
 
 def played(comparison: Comparison) -> list[tuple[Run | None, Trajectory]]:

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from reports.compare.pareto import ACCURACIES, FAILED, front
 from reports.compare.pooling import without_idle
 from reports.page import style
-from reports.page.charts import ZERO, broken_axis, decades, marked_break, shortened, sized
+from reports.page.charts import ZERO, Figure, broken_axis, decades, marked_break, shortened, sized
 from reports.page.cost_picture import light_marks
 from reports.speed.models import KINDS
 from scenarios.model import Array
@@ -27,7 +26,7 @@ LOWEST = 1e-7
 TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
-def speed(points: pd.DataFrame, tall: bool = False) -> go.Figure:
+def speed(points: pd.DataFrame, tall: bool = False) -> Figure:
     """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and
     then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
@@ -142,7 +141,7 @@ def front_of(
     }
 
 
-def sweeps(points: pd.DataFrame, relative: bool = False) -> go.Figure:
+def sweeps(points: pd.DataFrame, relative: bool = False) -> Figure:
     """Error against cost: a line for each sweep over its values, and a line for its engine over a
     ladder of dt.
 
@@ -192,7 +191,7 @@ def sweep_hover(what: str, row: dict[str, Any], relative: bool) -> str:
     )
 
 
-def matched(reached: pd.DataFrame, tall: bool = False) -> go.Figure:
+def matched(reached: pd.DataFrame, tall: bool = False) -> Figure:
     """The cost of each accuracy, a mark an engine; at the top, engines that do not reach it."""
     names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
     y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
@@ -227,7 +226,7 @@ def at(row: dict[str, Any]) -> str:
     return f"at dt {style.number(row['dt_s'])} s " if np.isfinite(row["dt_s"]) else ""
 
 
-def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
+def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> Figure:
     """Cost of a step against the number of disks; a cross where an engine was stopped."""
     y_axis = log_axis("engine time (µs per step)", costs.cost.to_numpy(float))
     x_axis = log_axis("disks", np.append(costs.n.to_numpy(float), 10.0))
@@ -254,7 +253,7 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> go.Figure:
     return figure(traces, x_axis, y_axis, TALL)
 
 
-def options(table: pd.DataFrame, ratio: str, title: str) -> go.Figure:
+def options(table: pd.DataFrame, ratio: str, title: str) -> Figure:
     """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged
     engine, 1: the same; a change that failed the scene stands at the right edge.
     """
@@ -419,10 +418,9 @@ def figure(
     y_axis: dict[str, Any],
     height: int | None,
     floor: float = ZERO,
-) -> go.Figure:
+) -> Figure:
     """The figure, with a band where `floor` is below a break of y; page.js adds what all share."""
     layout: dict[str, Any] = {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis}
     broken = floor not in (ZERO, LOWEST)
-    return go.Figure(
-        traces, layout | (marked_break(y_axis, floor) if broken else {}) | sized(height)
-    )
+    shaded = marked_break(y_axis, floor) if broken else {}
+    return {"data": traces, "layout": layout | shaded | sized(height)}

@@ -112,10 +112,10 @@ def section(
 ) -> SpeedSection:
     """A `SpeedSection`, its figures packed."""
     traces = [
-        trace.name
+        trace["name"]
         for each in drawings.values()
         if each.figure is not None
-        for trace in each.figure.data
+        for trace in each.figure["data"]
     ]
     names = [name for name in dict.fromkeys(traces) if ":" in name]
     rows = [] if orders is None else charts.records(orders)

@@ -128,7 +128,7 @@ def test_without_times_to_trust_the_picture_says_so_and_claims_none(
 ):
     """The axis counts steps, and no sentence has a time in it; with a quiet clock both do."""
     found = shown(noise=noise, asked=asked)
-    axis = found.drawings["pooled"].figure.layout.xaxis.title.text
+    axis = found.drawings["pooled"].figure["layout"]["xaxis"]["title"]
 
     assert says in found.fault
     assert axis == "steps per simulated second"
@@ -136,7 +136,8 @@ def test_without_times_to_trust_the_picture_says_so_and_claims_none(
     assert not any(word in "".join(found.sentences) for word in ("µs", "cost", "cheap", "time"))
     assert found.costs == []
     assert shown().fault == ""
-    assert "µs per simulated second" in shown().drawings["pooled"].figure.layout.xaxis.title.text
+    figure = shown().drawings["pooled"].figure
+    assert "µs per simulated second" in figure["layout"]["xaxis"]["title"]
 
 
 def test_what_no_step_reaches_and_what_failed_are_drawn_as_such():
@@ -144,19 +145,22 @@ def test_what_no_step_reaches_and_what_failed_are_drawn_as_such():
     edge "failed" for no result."""
     errors = ERRORS | {NEAR: (np.inf, 0.02, 0.01)}
     figure = shown(errors, scenes=1).drawings["scene_0"].figure
-    dotted = [trace.name for trace in figure.data if trace.line.dash == "1px,4px"]
-    lost = [trace.name for trace in figure.data if trace.text and "failed" in trace.text[0]]
+    lines = [trace for trace in figure["data"] if "line" in trace]
+    dotted = [trace["name"] for trace in lines if trace["line"]["dash"] == "1px,4px"]
+    said = [trace for trace in figure["data"] if trace.get("text")]
+    lost = [trace["name"] for trace in said if "failed" in trace["text"][0]]
 
     assert dotted == [STUCK]
     assert lost == [NEAR]
-    assert figure.layout.yaxis.ticktext[-1] == "failed"
+    assert figure["layout"]["yaxis"]["ticktext"][-1] == "failed"
 
 
 def test_the_light_mark_is_the_cost_without_the_binding():
     """Of 10 µs with 4 of the binding at 6; of 100 with 99.9 at the tenth that noise leaves
     unknown."""
     found = shown(binding=BINDING | {FAST: 4.0, NEAR: 99.9}, scenes=1)
-    light = {t.name: t.x for t in found.drawings["scene_0"].figure.data if t.opacity == 0.35}
+    traces = found.drawings["scene_0"].figure["data"]
+    light = {trace["name"]: trace["x"] for trace in traces if trace.get("opacity") == 0.35}
 
     assert light[FAST][0] == pytest.approx(6.0)
     assert light[NEAR][0] == pytest.approx(10.0)

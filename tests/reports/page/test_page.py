@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,9 +14,10 @@ from playwright.sync_api import Browser, Page, TimeoutError
 
 from reports.compare.comparison import Comparison
 from reports.lessons.catalogue import LESSONS
-from reports.page.charts import CHARTS
+from reports.page.charts import CHARTS, Drawing, packed_charts
 from reports.page.page import write_page
 from tests.reports.page.browsing import opened, overhang
+from tests.reports.page.figures import check_figures
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, HOSTILE, ORBIT, PLAYED
 
 
@@ -290,6 +292,27 @@ def test_the_page_fits_in_eight_megabytes(path: Path) -> None:
     assert len(library) < 2.5e6
     assert (len(html) - len(library)) / 3 < (8e6 - 2.5e6) / 40
     assert "http://" not in html.split("<script>")[0]
+
+
+def test_every_figure_is_one_that_plotly_knows(path: Path) -> None:
+    """They are plain dicts, because plotly's own class would take a third of the page's time."""
+    assert check_figures(path.read_text()) > 3 * len(CHARTS)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"data": [{"type": "scatter", "colour": "red"}]},
+        {"data": [{"type": "scatter", "mode": "dots"}]},
+        {"layout": {"xaxis": {"type": "logarithmic"}}},
+        {"data": [{"type": "scatter", "y": [float("nan")]}]},
+    ],
+)
+def test_a_figure_that_plotly_does_not_know_is_found(wrong: dict[str, Any]) -> None:
+    """The control of `check_figures`."""
+    packed = packed_charts({"wrong": Drawing("", "", wrong)})
+    with pytest.raises(ValueError):  # noqa: PT011 - plotly's and json's
+        check_figures(f'<script type="text/plain" id="charts:wrong">{packed}</script>')
 
 
 def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 import pytest
 from playwright.sync_api import Browser
 
@@ -272,17 +273,18 @@ def test_no_mark_is_left_out_however_many_situations_there_are(
     rows = situations.answers(found[found.middle], situated(comparisons), set())
     figure = by_situation(found, [rows[-1]] * 8).figure
     assert figure is not None
-    numbers = int(sum(np.isfinite(np.array(trace.y, float)).sum() for trace in figure.data))
+    numbers = int(sum(np.isfinite(np.array(trace["y"], float)).sum() for trace in figure["data"]))
 
     def drawn() -> int:
         page = browser.new_page()
-        page.set_content(figure.to_html(include_plotlyjs=True))
+        page.set_content(go.Figure(figure).to_html(include_plotlyjs=True))
         count = page.locator(".scatterlayer .point").count()
         page.close()
         return count
 
     assert drawn() == numbers
-    figure.update_traces(marker_maxdisplayed=7)
+    for trace in figure["data"]:
+        trace["marker"]["maxdisplayed"] = 7
     assert drawn() < numbers
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 import pytest
 
 from reports.compare.order import ORDER
@@ -90,7 +91,7 @@ def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_
             point(step_size=2, cost=np.nan, error=np.inf),
         ]
     )
-    figure = charts.speed(table)
+    figure = go.Figure(charts.speed(table))
     edge = [trace for trace in figure.data if trace.mode == "markers"][-1]
 
     assert edge.y[0] == pytest.approx(0.05)
@@ -117,7 +118,9 @@ def test_a_sweep_that_fails_most_scenes_stays_on_the_pooled_chart():
     ]
     pool = tables.pooled_sweeps(pd.DataFrame(rows))
     edge = next(
-        trace for trace in charts.sweeps(pool, relative=True).data if trace.mode == "markers"
+        trace
+        for trace in go.Figure(charts.sweeps(pool, relative=True)).data
+        if trace.mode == "markers"
     )
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
@@ -162,7 +165,7 @@ def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
         }
     )
     for ratio in ("error_ratio", "cost_ratio"):
-        figure = charts.options(table, ratio, "")
+        figure = go.Figure(charts.options(table, ratio, ""))
         trace = figure.data[-1]
         assert trace.x[1] > 1.5
         assert FAILED in figure.layout.xaxis.ticktext
@@ -183,7 +186,7 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
         samples=pd.DataFrame([sample]), stopped={("box2d:matched", 3): "refused: no"}
     )
     costs, growth = tables.grown(measured)
-    names = [trace.name for trace in charts.sizes(costs, growth).data]
+    names = [trace.name for trace in go.Figure(charts.sizes(costs, growth)).data]
 
     assert growth.set_index("engine").stopped.to_dict() == {"pymunk": "", "box2d": "3: refused: no"}
     assert names == ["pymunk:matched", "box2d:matched"]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import plotly.graph_objects as go
 import pytest
 from playwright.sync_api import Browser
 
@@ -30,6 +31,7 @@ from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN
 from tests.reports.page.browsing import opened, overhang
+from tests.reports.page.figures import check_figures
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
 
@@ -117,7 +119,7 @@ def test_errors_are_those_of_the_comparison(results: Results):
 def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Results):
     """Both stand above every error that was measured; the refused one in the corner, as nobody
     knows its cost."""
-    figure = charts.speed(results.points[results.points.scenario == SCENES[0]])
+    figure = go.Figure(charts.speed(results.points[results.points.scenario == SCENES[0]]))
     top = 10 ** figure.layout.yaxis.range[1]
     alone = [trace for trace in figure.data if trace.mode == "markers"]
     edges = {trace.name: trace for trace in alone if trace.hoverinfo != "skip"}  # no light mark
@@ -134,7 +136,7 @@ def test_failed_and_refused_points_stay_on_the_chart_at_its_edge(results: Result
 def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
     """In a head-on collision it is both cheapest and exact, so that nobody else is on the front."""
     points = results.points[results.points.scenario == SCENES[0]]
-    drawn = {trace.name: trace for trace in charts.speed(points).data}
+    drawn = {trace.name: trace for trace in go.Figure(charts.speed(points)).data}
     front, steps = drawn[charts.FRONT], drawn[charts.FRONT_OF_STEPS]
     mine = points[points.engine == "event_driven"]
 
@@ -150,7 +152,7 @@ def test_the_chart_of_speed_is_no_longer_four_fifths_empty(results: Results):
     """Between the largest error of an exact engine and the smallest of the others the axis is
     broken: the others have more than half of it."""
     points = results.points[results.points.scenario == SCENES[0]]
-    low, high = charts.speed(points).layout.yaxis.range
+    low, high = go.Figure(charts.speed(points)).layout.yaxis.range
     rough = points[np.isfinite(points.error) & (points.error >= charts.LOWEST)].error
 
     assert (points.error < charts.LOWEST).any()
@@ -257,7 +259,7 @@ def test_the_line_of_a_sweep_goes_over_all_its_values_from_cheap_to_expensive(re
     """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth
     of it."""
     points = results.sweeps[results.sweeps.scenario == "falling_box"]
-    drawn = {trace.name: trace for trace in charts.sweeps(points).data}
+    drawn = {trace.name: trace for trace in go.Figure(charts.sweeps(points)).data}
     sweep = drawn["pymunk:matched+iterations"]
 
     assert len(sweep.x) == len(sweep.y) == 8
@@ -348,9 +350,10 @@ def test_the_page_draws_every_chart_and_asks_nothing_of_anywhere(
     browser: Browser, results: Results, tmp_path: Path, width: int, scheme: str
 ):
     """No request but for itself, no word on the console, nothing wider than the page, a figure in
-    every place."""
+    every place, each one that plotly knows."""
     page = tmp_path / "speed.html"
     write_page(page, results, about("crosscheck speed", 0) | SAID)
+    assert check_figures(page.read_text()) == 2 + 2 + 3 + 1 + 2 * len(SCENES)
     tab, heard = opened(
         browser, page.as_uri(), viewport={"width": width, "height": 900}, color_scheme=scheme
     )

@@ -27,6 +27,7 @@ from reports.stability.results import COLUMNS, StabilityPlan, Task, done_before,
 from reports.stability.search import LimitSearch
 from reports.stability.variants import VARIANTS, taking_part
 from tests.reports.page.browsing import opened
+from tests.reports.page.figures import check_figures
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
@@ -212,12 +213,14 @@ def test_a_failure_is_one_click_away_and_opens_just_before_it(page: Page):
 
 
 def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, results: Path):
-    """No sideways scrolling, at most 8 MB, a cell for every value of a map."""
+    """No sideways scrolling, at most 8 MB, a cell for every value of a map, figures that plotly
+    knows."""
     width, inner = page.evaluate("() => [document.documentElement.scrollWidth, innerWidth]")
     html = (results / "stability.html").read_text()
 
     assert width <= inner
     assert len(html) < 8e6
+    assert check_figures(html) > 0
     assert not re.search(r"(?:src|href)=\"https?:", html)
     one = MAPS["dt_and_speed"]
     assert page.locator(".grid tbody td").count() == 2 * len(one.x) * len(one.y)
