@@ -12,6 +12,7 @@ import sys
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
+from itertools import count
 from math import atan, pi, sin
 from types import ModuleType, SimpleNamespace
 
@@ -35,7 +36,7 @@ from adapters.play import play_once
 from reports.run import arguments
 from reports.speed.budget import RESIDUAL, TOTAL, budget_of
 from reports.speed.plan import middle
-from reports.tune.score import cost_of
+from reports.tune import score
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import HERE as SOLVERS
@@ -629,11 +630,17 @@ def test_what_crosscheck_tune_starts_from_is_what_the_file_of_an_engine_has(name
     assert seen[0] == seen[1]
 
 
-@fetched
-@pytest.mark.slow
-def test_the_cost_of_a_step_in_v8_is_what_the_search_counts():
-    """Sixteen times the substeps of Rapier cost more, though the exchange with its process does
-    not."""
-    row, scene = FETCHED["rapier2d:matched"], scenario("line_gas")
-    fine, plain_one = partial(row.make, iterations=64), partial(row.make, iterations=4)
-    assert cost_of(fine, plain_one, [(replace(scene, duration=1.0), None)]) > 2
+@pytest.mark.parametrize(
+    "name", [pytest.param("rapier2d:matched", marks=fetched), "reference:exercise"]
+)
+def test_of_an_engine_in_v8_the_search_counts_the_time_in_v8(
+    name: str, monkeypatch: pytest.MonkeyPatch
+):
+    """Every look at this process's clock finds it an hour on: that hour, which stands for the
+    exchange with V8, counts only where the engine has no clock of its own."""
+    hour = 3600.0
+    monkeypatch.setattr(score, "thread_time", count(0.0, hour).__next__)
+    took = score.spent((ENGINES | FETCHED)[name].make, scenario("head_on_equal_e09"))
+
+    assert (took == hour) == (name in ENGINES)
+    assert 0.0 < took <= hour
