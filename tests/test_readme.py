@@ -241,13 +241,34 @@ def test_the_functions_of_a_score_are_in_the_files_that_architecture_names():
 
 
 def test_the_front_page_is_short_and_leads_to_every_other():
-    """A page, and two clicks at most."""
-    linked = re.findall(r"\]\(([^)]+)\)", TEXT + TEXTS["ARCHITECTURE.md"])
-
+    """A page; each README is linked from it, from ARCHITECTURE.md, or from the folder above."""
     assert len(TEXT.splitlines()) <= 120
-    assert set(TEXTS) - {"README.md"} <= {
-        f"{path}/README.md" if "." not in path else path for path in linked
+    linked = {
+        (ROOT / document).parent.joinpath(path).resolve()
+        for document, text in TEXTS.items()
+        for path in re.findall(r"\]\((?!https?:)([^)#]+)\)", text)
+        if document.count("/") < 2
     }
+    assert [
+        document
+        for document in set(TEXTS) - {"README.md"}
+        if not {ROOT / document, (ROOT / document).parent} & linked
+    ] == []
+
+
+def test_every_file_of_the_source_is_named_where_its_folder_is_explained():
+    """In the README.md of its folder. A folder without one, whose files are all of one kind, is
+    itself named in the README.md of the folder above."""
+    files = [path for top in TOP[:-1] for path in (ROOT / top).rglob("*.py")]
+    missing = []
+    for path in (path for path in files if path.name != "__init__.py"):
+        place, name = path.parent, path.name
+        if not (place / "README.md").exists():
+            place, name = place.parent, place.name + "/"
+        if f"`{name}" not in TEXTS[f"{place.relative_to(ROOT).as_posix()}/README.md"]:
+            missing.append(path.relative_to(ROOT).as_posix())
+
+    assert missing == []
 
 
 def test_what_is_read_first_is_short():
