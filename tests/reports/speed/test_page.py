@@ -317,7 +317,7 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     Without the cut scene none of the latter.
     """
     rows = [
-        row for name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4) if name in PLAYED
+        row for name in PLAYED if name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4)
     ]
     both = pd.concat(
         [results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)]
