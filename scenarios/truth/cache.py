@@ -56,9 +56,9 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
         scenario.duration,
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
     ]
-    if scene.friction:  # without friction, rotation does not affect the motion
+    if scene.friction:  # without friction, the record holds no rotation
         torques = [p.torque for p in scenario.thrusts]
-        parts += [scene.friction, scene.inertia, scene.angular_velocity, torques]
+        parts += [scene.friction, scene.inertia, scene.angle, scene.angular_velocity, torques]
     hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())
     for part in parts:
         hashed.update(np.ascontiguousarray(part, dtype="<f8").tobytes())

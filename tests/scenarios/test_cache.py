@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 
 from reports.run.answers import ExactAnswer, put_answer, read_answer
 from scenarios.catalogue import scenario
-from scenarios.model import Scenario
+from scenarios.model import Scenario, Scene
 from scenarios.truth import cache as truth_cache
 from scenarios.truth import exact as oracle
 from scenarios.truth.exact import OracleTruth, TruthRecord
@@ -92,6 +92,20 @@ def test_what_decides_the_answer_decides_the_key():
     }
     assert len(keys) == 7
     assert truth_cache.key_of(replace(ONE, name="other", substeps=(3,)), False) in keys
+
+
+def test_with_friction_every_field_of_a_scene_decides_the_key():
+    """The angle, too: the record holds the rotation from it on."""
+    rough = replace(ONE.scene, friction=0.25)
+    lines = {"walls": [[[-9.0, -9.0], [9.0, -9.0]]], "wrap": [[-9.0, -9.0], [9.0, 9.0]]}
+    names = [field.name for field in fields(Scene)]
+    scenes = [
+        replace(rough, **{name: lines[name] if name in lines else getattr(rough, name) + 2**-10})
+        for name in names
+    ]
+    keys = {truth_cache.key_of(replace(ONE, scene=scene), False) for scene in (rough, *scenes)}
+
+    assert len(keys) == 1 + len(names)
 
 
 def test_many_writers_leave_one_whole_record(folder: Path):
