@@ -12,7 +12,7 @@ from adapters.mechanisms.table import NAMES
 from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
 from reports.speed.explained import LEAST, TO
 
-EXPLAINED = TO[0]  # of the engine's error: what is left over below it is said to be none
+EXPLAINED = TO[0]  # of the engine's error: a residual below it is said to be none
 FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar is empty
 WHO = ["engine", "profile"]
 

@@ -94,7 +94,11 @@ def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
     event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
     return Reading(
-        float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk)
+        float(lost.max()) / MOST_LOST,
+        float(played.t[k + 1]),
+        event,
+        "wrong distance",
+        disk=int(disk),
     )
 
 

@@ -188,7 +188,7 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
         if "+" not in name
     }
 
-    assert far["box2d:matched"].broken == "strays"
+    assert far["box2d:matched"].broken == "wrong distance"
     assert not far["box2d:matched"].works
     assert far["reference:exercise"].works
     assert far["event_driven:float64"].works
