@@ -91,8 +91,8 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
     if 0 < memory < LEAST_MEMORY:
         refuse(
             [
-                f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played"
-                " anything; allowed is more"
+                f"--memory {memory}: a worker needs {LEAST_MEMORY} MB before it plays"
+                " anything; must be more"
             ]
         )
     if scheduler:

@@ -222,8 +222,8 @@ MEETING = Lesson(
             " conserved."
         ),
         (
-            "The normal is the line of centres at the time at which the collision is detected, not"
-            " at the time at which it happens."
+            "The normal is the line of centres when the collision is detected, not when the disks"
+            " touch."
         ),
     ),
     sliders=(

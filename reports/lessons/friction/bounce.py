@@ -213,7 +213,7 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
             ),
         ),
         Claim(
-            f"{BOX2D} turns the disk as if the friction acted {number(1e3 * SHORT, 2)} mm above the"
+            f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
             f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
             " friction impulse should change it.",
             lambda shown: turned_short(shown, settings["spin"]),

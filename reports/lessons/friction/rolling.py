@@ -264,11 +264,11 @@ ROLLING = Lesson(
             "An engine keeps a coefficient for each shape, and mixes those of floor and disk by a"
             " rule of its own: pymunk multiplies them, Box2D takes the root of the product. As"
             " shipped, both have <code>µ</code> here. <code>pymunk:matched</code> gives both the"
-            " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] tries the rules."
+            " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] compares the rules."
         ),
         (
-            "The last chart shows the <b>slip at rest</b>, what is left when the disk should roll."
-            " See [lever] for that of Box2D 2.3."
+            "The last chart shows the <b>slip at rest</b>: the slip that remains when the disk"
+            " should roll. See [lever] for the slip at rest of Box2D 2.3."
         ),
     ),
     sliders=(

@@ -103,9 +103,9 @@ CORRECTION = page(
     "correction",
     "Slop and position correction",
     "What becomes of an overlap?",
-    "The exercise projects two disks apart at once. Box2D undoes a share of their overlap at a"
-    " time and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact. Here a"
-    " disk starts deep in a fixed one, for which there is no exact answer. Continuous"
+    "The exercise removes an overlap in one step, by projection. Box2D removes a share of it in"
+    " each pass and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact."
+    " Here a disk starts deep in a fixed disk, for which there is no exact answer. Continuous"
     " collision detection (CCD, see [gravity]) is off in Box2D (<code>+no_ccd</code>), because it"
     " removes the overlap by other means.",
     [NO_CCD],

@@ -93,7 +93,8 @@ DIGITS = page(
     "Single precision",
     "Why does a free disk drift, far from the origin?",
     "A float32 number has 24 binary digits. The farther a disk is from the origin, the more of"
-    " them the integer part of its coordinate takes, and the fewer are left for a step.",
+    " these digits the integer part of its coordinate takes. Fewer digits remain for the"
+    " displacement in a step.",
     ["box2d:shipped"],
     show_digits,
     Slider("digits", "Binary digits", (53, 24), 0),

@@ -113,7 +113,8 @@ def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
             follows(PLAIN, last, ROUNDING),
         ),
         Claim(
-            "So does pymunk:matched here, because disks that only just touch are no contact to it."
+            "So does pymunk:matched here, because it finds no contact between disks that just"
+            " touch."
             f" If the disks of the row overlap by {number(OVERLAP)} m, it solves their contacts"
             f" together: the first disk is thrown back at {number(-thrown[0])} m/s, and all others"
             " move on.",
