@@ -153,4 +153,4 @@ def test_the_best_of_the_libraries_is_named_where_a_solver_of_this_project_is_be
     limits = [limit(case, engine) for case in cases for engine in engines]
     (said,) = (one for one in findings(limits) if "fewest failures" in one)
 
-    assert said.endswith("Of the libraries the fewest are those of box2d:shipped (2).")
+    assert said.endswith("Of the libraries, the fewest are those of box2d:shipped (2).")
