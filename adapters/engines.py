@@ -1,4 +1,5 @@
-"""The table of engines: a row an engine and profile. To add one, write its file and its row."""
+"""The table of engines: a row for each engine and profile. To add one, write its file and its
+row."""
 
 from __future__ import annotations
 

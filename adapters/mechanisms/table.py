@@ -100,7 +100,7 @@ def mechanisms_of(
 
 
 def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
-    """The reference with those of these mechanisms for which it has parameters."""
+    """The ablated reference with these mechanisms, as far as it has parameters for them."""
     parameters = dict(END_OF_STEP)
     for mechanism in mechanisms:
         parameters |= mechanism.parameters

@@ -112,7 +112,7 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     if not alone:
         refuse(
             [
-                "--resume goes on with a run as it was begun: it takes no scenarios, and none of"
+                "--resume continues a run as it was started: it takes no scenarios, and none of"
                 " --engine, --dt, --full, --seed, --timings and --out"
             ]
         )

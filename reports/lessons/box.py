@@ -70,7 +70,8 @@ def show_box(settings: Settings) -> Shown:
 
 
 def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
-    """What the energy does in flight and at collisions, and how near an event-driven engine is."""
+    """How the energy changes in flight and at collisions, and how near an event-driven engine
+    is."""
     assert played.truth is not None
     scene, dt = played.scenario.scene, played.scenario.dt(settings["k"])
     flight = played.truth.t < played.first_collision

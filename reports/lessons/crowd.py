@@ -1,4 +1,4 @@
-"""Lessons 5 and 7: what many disks cost, and why their trajectories stop being comparable."""
+"""Lesson 5, the cost of many disks, and lesson 7, why trajectories stop being comparable."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def crowd(count: int, fill: float) -> Scenario:
 
 
 def cost(name: str, scenario: Scenario) -> float:
-    """µs a step, the least of some rounds: what disturbs a measurement only ever makes it
+    """µs a step, the least of some rounds, because a disturbance can only make a measurement
     longer."""
     steps = scenario.intervals * SUBSTEPS
     return (

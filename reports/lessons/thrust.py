@@ -51,7 +51,7 @@ THRUST_NAMES = (
 
 
 def show_thrust(settings: Settings) -> Shown:
-    """Who is ahead of the parabola and who is behind, and the formula for it."""
+    """Which engines are ahead of the parabola and which are behind, and the formula for it."""
     acceleration = settings["a"]
     scenario = thrust_ship(acceleration)
     shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
@@ -84,7 +84,7 @@ def show_thrust(settings: Settings) -> Shown:
 
 
 def thrust_claims(laws: Mapping[str, float]) -> list[Claim]:
-    """What the order of a step does to the place, and does not do to the velocity; laws: engine ->
+    """The effect of the order of a step on the position, and none on the velocity; laws: engine ->
     mm that it ends ahead."""
     # Box2D's float32 rounds a place of up to 16 m by 1 um in each of up to 1024 steps, and seldom
     # up as often as down.

@@ -268,8 +268,8 @@ def said_of(comparison: Comparison, drawn: Drawn) -> str:
     line = "the path" if drawn.axes == "path" else f"{named} over time"
     if moving > FEW:
         who = (
-            f"{line} of disk {drawn.disks[0]}, one of {moving}: in most engines it is the"
-            " farthest from its place"
+            f"{line} of disk {drawn.disks[0]} of {moving}, the disk with the largest error in most"
+            " engines"
         )
     else:
         who = f"{line} of {'the disk' if moving == 1 else 'each disk'}"

@@ -42,8 +42,8 @@ class BudgetTable(NamedTuple):
 
 
 def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
-    """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and
-    all."""
+    """Root mean squares in radii, a row for each engine: engine, the residual, the contributions,
+    sum and all."""
     here = budget[budget.scenario == scenario]
     contributions = [
         contribution

@@ -85,8 +85,8 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
 
 
 def middle_scores(results: Results) -> pd.DataFrame:
-    """A row an engine and scene, at the middle of the step sizes measured: `situations.COLUMNS`;
-    angles are not measured here."""
+    """A row for each engine and scene, at the middle of the step sizes measured:
+    `situations.COLUMNS`; angles are not measured here."""
     points = results.points
     sizes = points.groupby("scenario").step_size.unique()
     middle = points.scenario.map({name: sorted(k)[len(k) // 2] for name, k in sizes.items()})

@@ -64,7 +64,7 @@ def show_cone(settings: Settings) -> Shown:
 
 
 def cone_claims(mu: float, whole: bool, dt: float) -> list[Claim]:
-    """What the normal impulse is, and what friction each gives."""
+    """The normal impulse, and the friction that each engine gives."""
     narrow = mu / (1 + STATED)
     ablated = np.full(len(STATED), mu) if whole else narrow
 

@@ -52,7 +52,7 @@ def show_position_correction(settings: Settings) -> Shown:
 
 
 def correction_claims(share: float, slop: float) -> list[Claim]:
-    """What is left of 200 mm after a step, and in the end; slop in mm."""
+    """The overlap that remains of 200 mm after a step, and in the end; slop in mm."""
     own = 2.5  # mm, the slop of Box2D in a scene of metres
     single = 1e3 * 72 * FLOAT32  # mm: 24 steps, three corrections each, of coordinates up to 1 m
     left = np.array(box2d_overlaps(200.0, own, 24))

@@ -29,7 +29,7 @@ ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed af
 
 
 def show_gravity(settings: Settings) -> Shown:
-    """Height of a ball that should bounce for ever."""
+    """The height of a ball that should bounce for ever."""
     scenario, k = bouncing_ball_e1(), settings["k"]
     names = ["box2d:matched", "pymunk:matched"]
     ablated = AblatedReference(order=ORDERS[settings["order"]])

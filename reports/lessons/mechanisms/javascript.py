@@ -54,7 +54,7 @@ def show_javascript(settings: Settings) -> Shown:
 
 
 def claim_of(e: float, curve: Curve) -> Claim:
-    """Up to which speed an engine cuts the bounce, and what it gives above."""
+    """The speed up to which an engine reduces the bounce, and the e that it gives above."""
     name = curve.name
     speed, ratio = np.asarray(curve.x, float), np.asarray(curve.y, float)
     stuck = ratio < STUCK * e

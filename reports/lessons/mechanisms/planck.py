@@ -54,7 +54,7 @@ def run_of(engine: str, profile: str, name: str, substeps: int) -> Run:
 
 
 def whole(run: Run) -> Trajectory | None:
-    """What was played; None if that does not go to the end of the scene."""
+    """The trajectory of a run; None if it does not reach the end of the scene."""
     return run.trajectory if run.status == "ok" else None
 
 

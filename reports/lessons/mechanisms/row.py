@@ -88,7 +88,7 @@ def overlapping(n: int) -> Array:
 
 
 def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
-    """Who gets what of 5 m/s."""
+    """How the 5 m/s are shared among the disks."""
     last, thrown = np.append(np.zeros(n), 5.0), overlapping(n)
     # 8 iterations over up to 5 contacts, at 5 m/s.
     single = 8 * n * 5 * FLOAT32

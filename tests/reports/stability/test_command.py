@@ -156,7 +156,7 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
         (["--engine", "bullet"], "engine 'bullet' is not known"),
         (
             ["slow_collision", "--engine", "../solvers/correct/plain.py"],
-            "a solver of the exercise is not driven to its limits: crosscheck check",
+            "it does not test a solver of the exercise: crosscheck check",
         ),
         (
             ["scenes/still.toml", "--vary", "mass_ratio"],
