@@ -194,10 +194,8 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
     if cases < 2 or not any(fails.values()):
         return []
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
-    said = (
-        f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most those of"
-    )
-    said += f" {engines_with(fails, max)}; a refusal counts as one."
+    said = f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most are"
+    said += f" those of {engines_with(fails, max)}. A refusal counts as a failure."
     libraries = {engine: fails[engine] for engine in grouped(fails).get(ENGINE, [])}
     if libraries and min(libraries.values()) > min(fails.values()):
         said += f" Of the libraries, the fewest are those of {engines_with(libraries, min)}."

@@ -63,7 +63,7 @@ def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
 def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
     if not len(scenario.scene.walls):
         return None
-    through = np.flatnonzero(laws.through_walls(played, scenario.scene))
+    through = np.flatnonzero(laws.tunnelled(played, scenario.scene))
     event = f"disk {through[0]} goes through a wall" if len(through) else ""
     return Reading(
         2.0 * len(through),

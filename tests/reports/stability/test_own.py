@@ -146,7 +146,7 @@ def test_a_scene_in_which_nothing_can_go_wrong_has_limits_all_the_same():
 
 
 def test_every_change_is_tried_on_somebody():
-    """None is left over."""
+    """None is left out."""
     engines = (
         "reference:exercise",
         "pymunk:shipped",
