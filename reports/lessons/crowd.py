@@ -126,7 +126,7 @@ def cost_claims(sizes: tuple[int, ...]) -> list[Claim]:
         return [
             Claim(
                 f"From {few} to {many} disks there are {number(pairs, 2)} times as many pairs. The"
-                " cost of testing each of them grows less than a quarter as much: with few disks"
+                " cost of testing all of them grows less than a quarter as much: with few disks"
                 " the call takes most of the time of a step.",
                 lambda shown: growth_of(shown.curve(EVERY_PAIR)) < pairs / 4,
             ),
@@ -141,7 +141,7 @@ def cost_claims(sizes: tuple[int, ...]) -> list[Claim]:
     return [
         Claim(
             f"From {few} to {many} disks, {many // few} times as many, there are"
-            f" {number(pairs, 2)} times as many pairs. Testing each of them costs at least 20 times"
+            f" {number(pairs, 2)} times as many pairs. Testing all of them costs at least 20 times"
             " as much.",
             lambda shown: growth_of(shown.curve(EVERY_PAIR)) >= 20,
         ),
