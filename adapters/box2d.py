@@ -106,7 +106,7 @@ SEARCHED = Searched(
 
 class Box2DEngine:
     """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default,
-    also the friction of a scene that states none.
+    including the friction of a scene that states none.
 
     `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of
     time as inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The

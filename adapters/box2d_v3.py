@@ -102,7 +102,7 @@ def in_its_unit(method: Callable[..., None]) -> Callable[..., None]:
 
 class Box2DV3:
     """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default,
-    also the friction of a scene that states none.
+    including the friction of a scene that states none.
 
     `matched`: no sleep, continuous collision, restitution threshold or speed cap. The
     length unit is half of the smallest radius: slop and speculative margin are fractions of it. A

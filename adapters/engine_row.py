@@ -77,7 +77,7 @@ class EngineRow:
         shape: in place of that of `mark`, where an open and a filled one do not tell all profiles
             of the engine apart; "": that of `mark`.
         work: its `AccuracyParameter`; None if it has none.
-        options: a change of one feature, in a few words -> parameters of `make`; `crosscheck speed`
+        options: a change of one setting, in a few words -> parameters of `make`; `crosscheck speed`
             measures what it costs and breaks.
         variants: name, used after a "+" -> a changed engine with which `crosscheck stability` tests
             a cause.

@@ -1,4 +1,5 @@
-"""The table of engines: a row an engine and profile. To add one, write its file and its row."""
+"""The table of engines: a row for each engine and profile. To add one, write its file and its
+row."""
 
 from __future__ import annotations
 
@@ -158,14 +159,14 @@ _BULLETS = "continuous collision, moving disks are bullets"
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
         _exercise,
-        "hand-written, exercise 11: symplectic Euler; 171 lines, asks every pair",
+        "hand-written, exercise 11: symplectic Euler; 171 lines, tests every pair",
         1.0,
         FLOAT64,
         options={"kept in float32": {"precision": np.float32}},
     ),
     "reference:neighbours": _Reference(
         _neighbours,
-        "reference:exercise to the bit, sooner: 636 lines, no pair asked that is far",
+        "same bits as reference:exercise in less time: 636 lines, no pair tested that is far",
         1.0,
         FLOAT64,
         dash=(7, 5),
@@ -174,14 +175,14 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:lesson": _Reference(
         _lesson,
-        "hand-written, the lesson: explicit Euler; 127 lines, asks every pair",
+        "hand-written, the lesson: explicit Euler; 127 lines, tests every pair",
         0.0,
         FLOAT64,
         dash=(2, 3),
     ),
     "reference:coulomb": _Reference(
         _coulomb,
-        "hand-written: the exercise with friction; 79 lines, asks every pair",
+        "hand-written, the exercise with friction; 79 lines, tests every pair",
         1.0,
         FLOAT64,
         dash=(12, 3),
@@ -191,7 +192,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "reference:ordered": _Reference(
         _ordered,
-        "hand-written: exact flight, collisions in order, friction; 541 lines, no projection",
+        "hand-written: exact flight, time-of-impact ordering, friction; 541 lines, no projection",
         0.5,
         FLOAT64,
         dash=(9, 3, 2, 3),
@@ -200,7 +201,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "pymunk:shipped": _Pymunk(
         partial(_pymunk, "shipped"),
-        "pymunk 7.3 (float64) as it comes: elasticity e on every shape",
+        "pymunk 7.3 (float64), own defaults: elasticity e on every shape",
         0.0,
         FLOAT64,
         dash=SHIPPED,
@@ -226,7 +227,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d:shipped": _Box2D(
         partial(_box2d, "shipped"),
-        "box2d-py 2.3.8 (float32) as it comes: friction, sleep, threshold 1 m/s",
+        "box2d-py 2.3.8 (float32), own defaults: friction, sleep, threshold 1 m/s",
         1.0,
         FLOAT32,
         dash=SHIPPED,
@@ -254,7 +255,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d_v3:shipped": _Box2DV3(
         partial(_box2d_v3, "shipped"),
-        "Box2D 3.1 (pyb2d3, float32) as it comes: friction, sleep, threshold 1 m/s",
+        "Box2D 3.1 (pyb2d3, float32), own defaults: friction, sleep, threshold 1 m/s",
         0.625,
         FLOAT32,
         dash=SHIPPED,
@@ -279,7 +280,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "event_driven:float64": EngineRow(
         _event_driven,
-        "event by event without steps: parabolas and contact times, in float64",
+        "event-driven, without steps: parabolas and contact times, in float64",
         0.5,
         FLOAT64,
         mark=Mark("#6a5a10", "#e6c918", "star"),
@@ -299,7 +300,7 @@ VERLET = 2.0**-36
 FETCHED: dict[str, EngineRow] = {
     "planck:shipped": _Planck(
         partial(_javascript, "planck", "shipped"),
-        "planck 1.5 as it comes: Box2D 2.3 in JavaScript and float64",
+        "planck 1.5, own defaults: Box2D 2.3 in JavaScript and float64",
         1.0,
         FLOAT64,
         dash=SHIPPED,
@@ -312,7 +313,7 @@ FETCHED: dict[str, EngineRow] = {
     ),
     "matter:shipped": _Matter(
         partial(_javascript, "matter", "shipped"),
-        "matter-js 0.20 (float64) as it comes: 100 pixels a metre, disks are polygons, air brakes",
+        "matter-js 0.20 (float64), own defaults: 100 pixels a metre, disks are polygons, air",
         1.0,
         VERLET,
         dash=SHIPPED,
@@ -329,7 +330,7 @@ FETCHED: dict[str, EngineRow] = {
     ),
     "rapier2d:shipped": _Rapier(
         partial(_javascript, "rapier2d", "shipped", float32=True),
-        "Rapier 0.21 (WebAssembly, float32) as it comes: friction, sleep, length unit 1 m",
+        "Rapier 0.21 (WebAssembly, float32), own defaults: friction, sleep, length unit 1 m",
         0.625,
         FLOAT32,
         dash=SHIPPED,

@@ -24,8 +24,8 @@ def must_fit(**quantities: Array) -> None:
 
 
 def must_not_be_cut(what: str, values: Array, cap: float, unit: str, because: str = "") -> None:
-    """Raise `Unsupported` if the engine has cut `values` to its cap: a scene is played as it is or
-    not at all. `because`: where the cap comes from, the end of the sentence."""
+    """Raise `Unsupported` if the engine has reduced `values` to its cap: an engine plays a scene as
+    stated or refuses it. `because`: where the cap comes from, the end of the sentence."""
     # in float32 a cut value is a little below the cap
     if np.abs(values).max() > cap * (1 - 1e-5):
         raise Unsupported(

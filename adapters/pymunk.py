@@ -62,7 +62,7 @@ SEARCHED = Searched(
         "pre_solve callbacks": "Python code in place of the engine's own collision law",
         "friction": "its root on every shape: the engine multiplies two",
         "damping, sleep_time_threshold": "1 and none by default: as the scene states",
-        "use_spatial_hash, threads": "change the time alone: see the features of crosscheck speed",
+        "use_spatial_hash, threads": "change only the time: see the options of crosscheck speed",
     },
 )
 

@@ -79,7 +79,7 @@ def holds_more(pid: int, most: int) -> bool:
 
 
 def write_no_core() -> None:
-    """Switch off core dumps of this process."""
+    """Disable core dumps of this process."""
     if KERNEL:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 

@@ -39,7 +39,7 @@ Engines = Annotated[
     typer.Option(
         "--engine",
         metavar="NAME[:PROFILE]|FILE",
-        help="Only this engine, or your solver's or engine's file; may be given again.",
+        help="Play only this engine: a name, or a file of your own. Repeatable.",
     ),
 ]
 Dts = Annotated[
@@ -47,7 +47,7 @@ Dts = Annotated[
     typer.Option(
         "--dt",
         metavar="S",
-        help="This step size instead of the scene's own ones; may be given again.",
+        help="Play this step size instead of those of the scene. Repeatable.",
     ),
 ]
 Full = Annotated[bool, typer.Option("--full", help="Add two finer step sizes to every scene.")]
@@ -83,8 +83,8 @@ Timeout = Annotated[
         max=1e6,
         metavar="S",
         help=(
-            "Time limit of each cell, also inside an engine's C code; and of each exact answer,"
-            " which then ends earlier."
+            "Time limit of each cell and of each exact answer. A cell is stopped even in C code; an"
+            " exact answer ends earlier."
         ),
     ),
 ]
@@ -106,20 +106,23 @@ Timings = Annotated[
         min=0,
         max=3600,
         metavar="SECONDS",
-        help="Time limit of the timing pass after the run, doubled with JavaScript engines;"
+        help="Time limit of the timing pass after the run; it doubles with JavaScript engines."
         " 0: no timing pass.",
     ),
 ]
 Resume = Annotated[
     Path | None,
     typer.Option(
-        metavar="OUT", help="Go on with the run in OUT: play what is missing or has changed."
+        metavar="OUT", help="Continue the run in OUT: play what is missing or has changed."
     ),
 ]
 Port = Annotated[
     int,
     typer.Option(
-        min=1, max=65535, metavar="N", help="Port on this machine; if taken, the next free one."
+        min=1,
+        max=65535,
+        metavar="N",
+        help="Port on this machine; if it is in use, the next free one.",
     ),
 ]
 Opens = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
@@ -323,7 +326,7 @@ def check(
         typer.Option(
             metavar="TASKS.toml",
             parser=place,
-            help="Points of each task or question.  [default: 20 for the two tasks]",
+            help="File with the points of each task or question.  [default: 20 in all]",
         ),
     ] = None,
     id_pattern: Annotated[
@@ -435,7 +438,7 @@ def speed(
     full: Annotated[
         bool,
         typer.Option(
-            "--full", help="All scenarios, finer steps, more rounds, up to 100 000 disks."
+            "--full", help="Measure all scenarios, finer steps, more rounds, up to 100 000 disks."
         ),
     ] = False,
     resume: GoOn = False,
@@ -499,20 +502,20 @@ def stability(
         list[str] | None,
         typer.Option(
             metavar="WHAT",
-            help=f"What to vary in FILE.toml: {VARIED}; may be given again. Default: each of them.",
+            help=f"What to vary in FILE.toml: {VARIED}. Repeatable. Default: each of them.",
         ),
     ] = None,
     engine: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME[:PROFILE]|FILE",
-            help="Only this engine, or your engine's file; may be given again.",
+            help="Play only this engine: a name, or a file of your own. Repeatable.",
         ),
     ] = None,
     full: Annotated[
         bool,
         typer.Option(
-            "--full", help="All runs at every value, more values, brackets of 1 % instead of 5 %."
+            "--full", help="Play all runs at more values, to brackets of 1 % instead of 5 %."
         ),
     ] = False,
     resume: GoOn = False,

@@ -206,7 +206,7 @@ def test_nothing_of_it_is_in_the_source_itself():
 
 @pytest.mark.slow
 def test_all_that_is_added_is_known_everywhere(grown: Path):
-    """Tables, colour, version, feature, variant, error budget and lesson; and nothing else has
+    """Tables, colour, version, option, variant, error budget and lesson; and nothing else has
     changed its look."""
     code = """
 import json

@@ -44,7 +44,7 @@ class Finding:
 
 def conform(name: str, row: EngineRow) -> list[Finding]:
     """One finding for each probe, in the order of `PROBES`; only the finding "make" if the engine
-    cannot be made, or its file not loaded: no probe would say more.
+    cannot be made or its file cannot be loaded.
 
     Every exception becomes a finding: a refusal (`Unsupported`) counts as not asked, any other
     exception as a failed probe.

@@ -1,7 +1,7 @@
 """What each engine does with e, as measured by the probes: a row for each engine, kept in
 impact_table.csv.
 
-`uv run --extra js python -m adapters.conformance.impact_table` asks all engines anew, and writes
+`uv run --extra js python -m adapters.conformance.impact_table` asks all engines again, and writes
 the file, the table of adapters/README.md and the short one of README.md; it takes half a minute.
 """
 
@@ -170,7 +170,7 @@ def asked(read: Callable[[EngineRow], float], row: EngineRow) -> float:
 
 
 def table_of(rows: Mapping[str, EngineRow]) -> pd.DataFrame:
-    """A row an engine: engine, numbers, date, versions, then `COLUMNS`."""
+    """A row for each engine: engine, numbers, date, versions, then `COLUMNS`."""
     return pd.DataFrame([row_of_table(name, row) for name, row in rows.items()])
 
 

@@ -1,1 +1,1 @@
-"""The event-driven engine: no steps, event by event, in float64."""
+"""The event-driven engine in float64: it has no steps and goes from event to event."""

@@ -1,4 +1,4 @@
-"""The event-driven engine in float64: event by event, read at the end of each step."""
+"""The event-driven engine in float64. Its states are read at the end of each step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenarios.no_truth import NoTruth
 
 
 class EventDriven:
-    """Plays exactly but for rounding. dt sets only when states are read, and how long a force
+    """Plays exactly, except for rounding. dt only sets when states are read and how long a force
     acts."""
 
     # It needs its list of collisions anyway: not reporting them would save no time.

@@ -54,7 +54,7 @@ WIDER = 1 + 1e-9
 
 
 class EventEngine:
-    """Plays a scene exactly, but for the rounding of float64.
+    """Plays a scene exactly, except for the rounding of float64.
 
     torus: (2, 2) m, low and high corner of a periodic box in place of walls. cell: m, the least
     side of a grid cell; it changes the speed only. Raises `NoTruth` for an invalid

@@ -164,7 +164,7 @@ class JavaScriptEngine:
         return rows.reshape(shape)
 
     def read(self) -> State:
-        """All disks in one exchange; what is static stays as the scene has it."""
+        """All disks in one exchange; static disks stay as the scene states them."""
         rows, scene = self.look(), self.scene
         still = scene.static
         return State(

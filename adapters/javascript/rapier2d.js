@@ -62,7 +62,7 @@
         throw new Refused(`a disk reaches a ${what} of ${+caps[what].toPrecision(6)} ${unit}, ${why[what]}`);
       }
     }
-    const pushed = new Set();
+    const forced = new Set();
     // It keeps cos and sin: the angle is the one nearest to where the mean spin since the last reading would have
     // brought it.
     const turned = scene.angle.map((angle, i) => ({ angle, spin: scene.spin[i], step: 0 }));
@@ -81,17 +81,17 @@
             hear(index.get(event.collider1()), index.get(event.collider2()), event.totalForceMagnitude() * dt);
           });
         }
-        for (const i of pushed) {
+        for (const i of forced) {
           bodies[i].resetForces(true);
           bodies[i].resetTorques(true);
         }
-        pushed.clear();
+        forced.clear();
         steps++;
       },
       force(i, x, y, torque) {
         bodies[i].addForce({ x, y }, true);
         bodies[i].addTorque(torque, true);
-        pushed.add(i);
+        forced.add(i);
       },
       read(i) {
         const { x, y } = bodies[i].translation(), v = bodies[i].linvel();

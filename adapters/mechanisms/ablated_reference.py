@@ -101,7 +101,7 @@ class Parameters(NamedTuple):
     carried: bool = False  # of `soften`: contact points turn with their disks
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
-    push_speed: float = 0.0  # m/s, cap of the position correction
+    correction_speed: float = 0.0  # m/s, cap of the position correction
 
 
 @compiled
@@ -397,13 +397,13 @@ def soften(
         target, share, memory = 0.0, 1.0, 0.0
         if gap > 0.0:
             target = -gap / h
-        elif biased and on.push_speed > 0.0:
+        elif biased and on.correction_speed > 0.0:
             rigid = contact.j < 0 or disks.mass[contact.i] == inf or disks.mass[contact.j] == inf
             omega = 2.0 * pi * min(on.hertz, 0.125 / h) * (2.0 if rigid else 1.0)
             stiff = 2.0 * on.damping + h * omega
             memory = 1.0 / (1.0 + h * omega * stiff)
             share = 1.0 - memory
-            target = min(-omega / stiff * gap, on.push_speed)
+            target = min(-omega / stiff * gap, on.correction_speed)
         drive_to_target(disks, contact, target, share, memory)
         if on.rub_biased or not biased:
             rub(disks, contact, world.friction, on.lever)

@@ -46,7 +46,7 @@ NAMES = (
     AIR,
     SIDES,
 ) = NAMES
-MANY_SIDES = 800  # of matter's disks, which are polygons: what is left of them is residual
+MANY_SIDES = 800  # of matter's disks, which are polygons: their effect is in the residual
 # Exact flight; bodies that overlap at the end of a step exchange their impulse there; nothing is
 # moved out of overlap.
 END_OF_STEP: dict[str, Any] = {
@@ -100,7 +100,7 @@ def mechanisms_of(
 
 
 def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
-    """The reference with those of these mechanisms for which it has parameters."""
+    """The ablated reference with these mechanisms, as far as it has parameters for them."""
     parameters = dict(END_OF_STEP)
     for mechanism in mechanisms:
         parameters |= mechanism.parameters
@@ -234,7 +234,7 @@ def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Me
     }
     return [
         Mechanism(IMPULSE, impulse),
-        Mechanism(POSITION_CORRECTION, {"push_speed": chosen["push_speed"]}, (IMPULSE,)),
+        Mechanism(POSITION_CORRECTION, {"correction_speed": chosen["push_speed"]}, (IMPULSE,)),
     ]
 
 
@@ -334,7 +334,7 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
         "fattened": float(np.float32(0.04) * np.float32(unit)),
     }
     # normalized_max_corrective_velocity: 3 units of length in a second
-    correction = {"push_speed": 3.0 * unit}
+    correction = {"correction_speed": 3.0 * unit}
     swept = made(continuous_steps=0, **({"sleeping": False} if profile == "shipped" else {}))
     rubbed = _box2d_v3_friction(reported, None if scene.friction else made(friction=0.0))
     return [
@@ -350,7 +350,7 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
 def _matter(
     _reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str
 ) -> list[Mechanism]:
-    """The mechanisms that matter can switch off, one after the other; the reference has none of
+    """The mechanisms that can be disabled in matter, one after the other; the reference has none of
     them.
 
     Its disks are polygons, so that an impulse acts at a corner and turns them; without friction

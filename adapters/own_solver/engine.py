@@ -24,7 +24,7 @@ BEGIN_LIMIT = 2.0  # s that initScene may take
 
 
 class Student:
-    """Plays the text of a file in a separate process, whatever happens to the file.
+    """Plays the text of a file in a separate process; later changes of the file do not matter.
 
     A file with `advance` is played with it, in all scenes of the reference solver. For any other
     file `integrate` is called for all spheres, `sphereSphereCollisionHandling` for every pair i <

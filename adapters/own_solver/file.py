@@ -1,6 +1,6 @@
 """Reads a solver's file as text, and says in a sentence why it cannot be one.
 
-It is read once: this text is played, checked and hashed, whatever is saved meanwhile.
+A file is read once. This text is played, checked and hashed; what is saved later does not matter.
 """
 
 from __future__ import annotations

@@ -207,12 +207,12 @@ def plainly(what: str) -> str:
     if "Maximum call stack" in what:
         return "calls itself without end (maximum call stack size exceeded)"
     if "Array buffer allocation failed" in what or "Invalid array length" in what:
-        return f"wants more memory than it is given ({what})"
+        return f"needs more memory than it may use ({what})"
     missing = re.match(r"ReferenceError: (\w+) is not defined", what)
     if missing and missing[1] in NAMES:
         return f"{what}: {where_to()}"
     if missing and missing[1] in OUTSIDE:
-        return f"{what}: a solver is run without page, network and clock"
+        return f"{what}: a solver runs without page, network and clock"
     if missing and missing[1] in ("module", "exports", "require"):
         return f"{what}: {SCRIPT}"
     if re.match(r"SyntaxError: (?:Unexpected token 'export'|Cannot use import statement)", what):

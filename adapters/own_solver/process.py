@@ -25,7 +25,7 @@ from scenarios.truth.cache import folder
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
 WORK = "from adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
-TOO_LARGE = "wants more memory than it is given, and its process was ended"
+TOO_LARGE = "needs more memory than it may use, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
 Request = tuple[str, Any, float]

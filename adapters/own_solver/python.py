@@ -126,7 +126,7 @@ class PythonSolver:
         if isinstance(error, RecursionError):
             what = "calls itself without end (maximum recursion depth exceeded)"
         elif isinstance(error, MemoryError):
-            return SolverFailed("memory", f"wants more memory than it is given {when}")
+            return SolverFailed("memory", f"needs more memory than it may use {when}")
         elif isinstance(error, SystemExit):
             what = f"ends the process (SystemExit: {error})"
         else:

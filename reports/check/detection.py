@@ -187,8 +187,8 @@ def touch(answer: SolverAnswer) -> CheckRow:
 
 
 def same_centre(answer: SolverAnswer, others_fail: bool) -> CheckRow:
-    """Two spheres at one place have no normal, and the exercise does not define the result; but the
-    call must return. `others_fail`: it fails for other pairs, too."""
+    """Two spheres at the same position have no normal, and the exercise does not define the result;
+    but the call must return. `others_fail`: it fails for other pairs, too."""
     asked = "What happens to two spheres whose centres coincide?"
     if answer.failed and answer.failed.kind == "timeout" and not others_fail:
         cause = f"for two spheres at the same place the function {answer.failed}"

@@ -73,7 +73,7 @@ class RowItem(pytest.Item):
     def repr_failure(
         self, excinfo: pytest.ExceptionInfo[BaseException], *given: Any, **named: Any
     ) -> str:
-        """The row in words; a traceback would not be that of the solver."""
+        """The row in words, because a traceback would show this program and not the solver."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))
         from reports.check.evidence import evidence

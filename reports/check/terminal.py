@@ -94,7 +94,7 @@ def print_tasks(console: Console, one: FileCheck) -> None:
 
 
 def shown(count: int) -> str:
-    """A count in a table; nothing for none, so that what is wrong stands out."""
+    """A count in a table; 0 is left empty, so that faults are easy to see."""
     return str(count or "")
 
 

@@ -32,7 +32,7 @@ def write_engine(path: Path) -> None:
     Console().print(
         f"{path} is an engine that works: put yours in its place. To judge it:\n"
         f"crosscheck run bouncing_ball_e09 box_billiard --engine {shown} --engine pymunk --out mine"
-        f"\nWhat its functions are given and asked: adapters/README.md",
+        f"\nadapters/README.md explains its functions.",
         highlight=False,
         soft_wrap=True,
     )

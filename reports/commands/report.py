@@ -47,7 +47,7 @@ def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
     if scenes and not printed:
         refuse([f"{' '.join(scenes)}: to print scenes with the page, name them after --print"])
     if printed and not scenes:
-        refuse(["--print: name the scenes that are to be on paper; the overview always is"])
+        refuse(["--print: name the scenes to print; the overview is always printed"])
     with refusing(str(out)), Progress() as progress:
         folder = found(out)
         played = sorted({record["scenario"] for record in Archive.read(folder).records})
@@ -112,12 +112,9 @@ def title_of(scenes: int, rough: bool = False) -> str:
     """The title of the summary; `rough`: of scenes with friction."""
     kind = " with friction" if rough else ""
     if scenes == 1:
-        return (
-            f"Largest error in the scene{kind}, at the middle one of its step sizes; lower is"
-            " better"
-        )
+        return f"Largest error in the scene{kind}, at its middle step size; lower is better"
     return (
-        f"Largest error in a scene, at the middle one of its step sizes: median of {scenes} scenes"
+        f"Largest error in a scene, at its middle step size: median of {scenes} scenes"
         f"{kind}; lower is better"
     )
 

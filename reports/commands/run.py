@@ -91,8 +91,8 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
     if 0 < memory < LEAST_MEMORY:
         refuse(
             [
-                f"--memory {memory}: a worker takes {LEAST_MEMORY} MB before it has played"
-                " anything; allowed is more"
+                f"--memory {memory}: a worker needs {LEAST_MEMORY} MB before it plays"
+                " anything; must be more"
             ]
         )
     if scheduler:
@@ -112,7 +112,7 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
     if not alone:
         refuse(
             [
-                "--resume goes on with a run as it was begun: it takes no scenarios, and none of"
+                "--resume continues a run as it was started: it takes no scenarios, and none of"
                 " --engine, --dt, --full, --seed, --timings and --out"
             ]
         )

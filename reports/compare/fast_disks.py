@@ -32,8 +32,8 @@ def passing(scenario: Scenario, fastest: Array) -> list[str]:
         return []
     return [
         f"In a step of {dt:.4g} s two disks, or a disk and a wall, can approach by"
-        f" {ratio:.2g} times the distance at which they touch: an engine that looks for overlap at"
-        " the end of a step can let one pass through the other. With steps of"
+        f" {ratio:.2g} times the distance at which they touch. In an engine that tests for overlap"
+        " at the end of a step one can pass through the other (tunnelling). With steps of"
         f" {rounded_down(dt / ratio):g} s it cannot."
     ]
 

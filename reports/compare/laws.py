@@ -134,7 +134,7 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
     return start + along[:, None] * (end - start)
 
 
-def through_walls(trajectory: Trajectory, scene: Scene) -> np.ndarray:
+def tunnelled(trajectory: Trajectory, scene: Scene) -> np.ndarray:
     """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line.
     If a sample lies on the wall itself, the side of the sample before it counts."""
     through = np.zeros(scene.n, dtype=bool)

@@ -122,11 +122,11 @@ def penetration_radii(view: View) -> Value | None:
     return _largest(laws.penetration(view.played, view.scenario.scene), view)
 
 
-def disks_through_walls(view: View) -> Value | None:
+def disks_tunnelled(view: View) -> Value | None:
     """Number of disks whose centre has crossed a wall (tunnelling)."""
     if not len(view.scenario.scene.walls):
         return None
-    through = np.flatnonzero(laws.through_walls(view.played, view.scenario.scene))
+    through = np.flatnonzero(laws.tunnelled(view.played, view.scenario.scene))
     return Value(len(through), int(through[0]) if len(through) else -1)
 
 
@@ -285,8 +285,8 @@ METRICS: dict[str, Metric] = {
         collisions.restitution_error, "1", (ITSELF,), title="Restitution, largest error"
     ),
     "penetration_radii": Metric(penetration_radii, "radii", (ITSELF,), title="Deepest overlap"),
-    "disks_through_walls": Metric(
-        disks_through_walls, "disks", (ITSELF,), title="Disks through walls"
+    "disks_tunnelled": Metric(
+        disks_tunnelled, "disks", (ITSELF,), title="Disks that tunnelled through a wall"
     ),
     "collision_count_error": Metric(
         collisions.collision_count_error,

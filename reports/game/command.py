@@ -80,7 +80,7 @@ def try_out(engine: Engine, restitution: float) -> None:
 
 
 def read_flight(path: Path) -> Scenario:
-    """The scenario in a scene file; exits 2 with a line a fault."""
+    """The scenario in a scene file; exits 2 with a line for each fault."""
     if path.suffix.lower() in KINDS:
         refuse(
             [f"{path}: is a solver, not a flight; fly it with --engine {shlex.quote(str(path))}"]

@@ -89,8 +89,8 @@ class Touches:
         return collision.step - before > 1 or size > self.weight
 
     def begin_again(self, disk: int) -> None:
-        """The engine counts its steps anew, and `disk` is where it began: nothing has struck it
-        yet."""
+        """The engine counts its steps from 0 again, and `disk` is at its start: nothing has struck
+        it yet."""
         self.step.clear()
         self.frame[disk] = -WAIT
         self.last.pop(disk, None)

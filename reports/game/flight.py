@@ -36,8 +36,8 @@ SLOW, SLOW_SPIN = 0.1, 0.1
 def field_scenario(
     seed: int = 0, asteroids: int = 20, restitution: float = 0.9, substeps: int = 16
 ) -> Scenario:
-    """A field that nobody has flown yet, as a scenario of the longest flight, its step in the
-    middle of the ladder."""
+    """A field before the first flight, as a scenario of the longest flight, its step in the middle
+    of the ladder."""
     return Scenario(
         name=f"flight-{seed}",
         asks=f"Do the engines carry a ship through {asteroids} asteroids as its pilot flew it?",

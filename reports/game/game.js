@@ -17,10 +17,10 @@ class Game {
 
   connect() {
     this.socket = new WebSocket(`ws://${location.host}/fly`);
-    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines; the first time they are compiled, which takes a while …"); if (this.field) this.begin(); };
+    this.socket.onopen = () => { this.say(this.field ? "" : "Starting the engines. The first start compiles them, which takes a while …"); if (this.field) this.begin(); };
     this.socket.onmessage = (event) => this.hear(JSON.parse(event.data));
     this.socket.onclose = (event) => {
-      this.say(`${event.reason || "The server is not there"}. Trying again …`);
+      this.say(`${event.reason || "The server does not answer"}. Trying again …`);
       this.waiting = 0;
       setTimeout(() => this.connect(), 2000);
     };
@@ -169,7 +169,7 @@ class Game {
     const share = (b[2] - a[2]) / ((b[0] - a[0]) / 1000);
     const rate = (this.drawn.length - 1) / ((this.drawn.at(-1)[0] - this.drawn[0][0]) / 1000);
     const slowed = !this.paused && share > 0 && share < 0.95 ? `; the flight is slowed to ${(100 * share).toFixed(0)} %` : "";
-    by("pace").textContent = `${rate.toFixed(0)} pictures a second, ${mean(this.drawn).toFixed(1)} ms to draw one; the engines take ${mean(this.pace).toFixed(1)} ms a frame, of ${(this.field.interval * 1000).toFixed(1)} ms${slowed}`;
+    by("pace").textContent = `${rate.toFixed(0)} frames a second, ${mean(this.drawn).toFixed(1)} ms to draw one; the engines take ${mean(this.pace).toFixed(1)} ms a frame, of ${(this.field.interval * 1000).toFixed(1)} ms${slowed}`;
   }
 
   say(text) { clearTimeout(this.timer); this.message = text; this.tell(""); }

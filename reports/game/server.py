@@ -92,7 +92,7 @@ class Game:
 
 
 def same_origin(socket: WebSocket) -> bool:
-    """Whether the page that opens the socket comes from this very server: no other may drive it."""
+    """Whether the page that opens the socket comes from this server; no other page may use it."""
     host = socket.headers.get("host", "")
     return (
         urlsplit(f"//{host}").hostname in NAMES and socket.headers.get("origin") == f"http://{host}"

@@ -70,7 +70,8 @@ def show_box(settings: Settings) -> Shown:
 
 
 def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
-    """What the energy does in flight and at collisions, and how near an event-driven engine is."""
+    """How the energy changes in flight and at collisions, and how near an event-driven engine
+    is."""
     assert played.truth is not None
     scene, dt = played.scenario.scene, played.scenario.dt(settings["k"])
     flight = played.truth.t < played.first_collision
@@ -92,7 +93,7 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
         claims.insert(
             0,
             Claim(
-                "Until the first collision the exact energy is level. Explicit Euler"
+                "Until the first collision the exact energy is constant. Explicit Euler"
                 f" (reference:lesson) gains m g² dt / 2 in a second, {number(gain)} J for all"
                 " disks; symplectic Euler (reference:exercise) loses as much. Under a constant"
                 " force neither is better. In a motion that repeats, such as an orbit or a"
@@ -117,7 +118,7 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
     if settings["e"] == 1.0:
         claims.append(
             Claim(
-                "With e = 1 the exact energy stays level through every collision.",
+                "With e = 1 the exact energy stays constant through every collision.",
                 lambda shown: np.ptp(shown.y(TRUTH)) < 1e-9 * shown.y(TRUTH)[0],
             )
         )
@@ -141,11 +142,11 @@ BOX = Lesson(
     asks="Where does the energy go?",
     text=(
         (
-            "Small disks start from random places with random velocities and fall. In a collision"
-            " of a disk with a wall, or with another disk, the relative velocity along the normal"
-            " becomes <code>v' = −e v</code>, which leaves <code>e²</code> of the energy of this"
-            " part of the motion. Nothing else may take energy. Between two collisions the sum of"
-            " <code>m v²/2 + m g y</code> must be level."
+            "Small disks start from random positions with random velocities and fall. In a"
+            " collision of a disk with a wall, or with another disk, the relative velocity along"
+            " the normal becomes <code>v' = −e v</code>, which leaves <code>e²</code> of the"
+            " energy of the relative motion along the normal. Nothing else may take energy. Between"
+            " two collisions the sum of <code>m v²/2 + m g y</code> must stay constant."
         ),
         (
             "The exact answer ends where float64 can no longer follow the motion, or where a disk"

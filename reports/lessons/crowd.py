@@ -1,4 +1,4 @@
-"""Lessons 5 and 7: what many disks cost, and why their trajectories stop being comparable."""
+"""Lesson 5, the cost of many disks, and lesson 7, why trajectories stop being comparable."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def crowd(count: int, fill: float) -> Scenario:
 
 
 def cost(name: str, scenario: Scenario) -> float:
-    """µs a step, the least of some rounds: what disturbs a measurement only ever makes it
+    """µs a step, the least of some rounds, because a disturbance can only make a measurement
     longer."""
     steps = scenario.intervals * SUBSTEPS
     return (
@@ -126,12 +126,12 @@ def cost_claims(sizes: tuple[int, ...]) -> list[Claim]:
         return [
             Claim(
                 f"From {few} to {many} disks there are {number(pairs, 2)} times as many pairs. The"
-                " cost of asking each grows less than a quarter as much: among few disks a step is"
-                " mostly the call itself.",
+                " cost of testing all of them grows less than a quarter as much: with few disks"
+                " the call takes most of the time of a step.",
                 lambda shown: growth_of(shown.curve(EVERY_PAIR)) < pairs / 4,
             ),
             Claim(
-                "With so few disks and so few steps in a call a list of neighbours saves little:"
+                "With so few disks and so few steps in a call a neighbour list saves little:"
                 f" {LISTED} takes a third to three times as long.",
                 lambda shown: all(
                     1 / 3 < ratio < 3 for ratio in shown.y(LISTED) / shown.y(EVERY_PAIR)
@@ -141,12 +141,12 @@ def cost_claims(sizes: tuple[int, ...]) -> list[Claim]:
     return [
         Claim(
             f"From {few} to {many} disks, {many // few} times as many, there are"
-            f" {number(pairs, 2)} times as many pairs. Asking each of them costs at least 20 times"
+            f" {number(pairs, 2)} times as many pairs. Testing all of them costs at least 20 times"
             " as much.",
             lambda shown: growth_of(shown.curve(EVERY_PAIR)) >= 20,
         ),
         Claim(
-            f"{LISTED} asks neighbours only. Its cost grows less than half as much, and with"
+            f"{LISTED} tests near pairs only. Its cost grows less than half as much, and with"
             f" {many} disks it costs less than a fifth.",
             lambda shown: (
                 growth_of(shown.curve(LISTED)) < growth_of(shown.curve(EVERY_PAIR)) / 2
@@ -160,18 +160,18 @@ COST = Lesson(
     name="crowd",
     number="5",
     title="Many disks",
-    asks="What does it cost to look at every pair?",
+    asks="What does it cost to test every pair?",
     text=(
         (
-            "Among n disks there are <code>n (n − 1) / 2</code> pairs. The exercise asks each of"
-            " them in every step. An engine that first sorts the disks into cells or a tree asks"
-            " neighbours only. So does <code>reference:neighbours</code>, which otherwise is"
-            " <code>reference:exercise</code>: both give the same numbers, to the last bit."
+            "Among n disks there are <code>n (n − 1) / 2</code> pairs. The exercise tests each of"
+            " them in every step. An engine that first sorts the disks into cells or a tree tests"
+            " near pairs only. <code>reference:neighbours</code> is <code>reference:exercise</code>"
+            " with a <b>neighbour list</b>: both give the same numbers, to the last bit."
         ),
         (
-            "The event-driven engine has no steps; it uses cells too, and its time is divided by"
+            "The event-driven engine uses cells, too. It has no steps, so its time is divided by"
             f" the number of steps of the others. A time is the shortest of {ROUNDS} runs on this"
-            " machine, and it is longer on a busy one."
+            " machine, and it is longer on a busy machine."
         ),
     ),
     sliders=(
@@ -238,8 +238,8 @@ def horizon_claims(played: Simulation, restitution: float, kept: Sequence[float]
     factor = growth(played)
     claims = [
         Claim(
-            f"The exact answer ends at {number(end)} s. By then the event-driven engine, which"
-            " rounds and does nothing else wrong, is less than 1 nm off.",
+            f"The exact answer ends at {number(end)} s. Until then the event-driven engine, whose"
+            " only error is rounding, is less than 1 nm off.",
             lambda shown: (
                 shown.x("event_driven:float64")[-1] == end
                 and shown.y("event_driven:float64").max() < 1e-9

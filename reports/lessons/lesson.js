@@ -50,7 +50,7 @@ class Lesson {
         if (!shown.fault) await this.show(shown);
       } while (at !== this.at);
     } catch {
-      fault.textContent = "The server is not there: start it again with crosscheck lesson.";
+      fault.textContent = "The server does not answer: start it again with crosscheck lesson.";
     }
     document.querySelector(".stage-lesson").classList.remove("busy");
   }

@@ -261,11 +261,11 @@ LIMITS = Lesson(
     asks="How harsh may a scene be before a method breaks?",
     text=(
         (
-            "Every method works in gentle scenes. Make one thing harsher, a speed, a distance, a"
-            " size, and a method may have a value from which on it <b>fails</b>: it misses a"
+            "Every method works in gentle scenes. If one parameter gets harsher, such as a speed, a"
+            " distance or a size, a method may <b>fail</b> from some value on: it misses a"
             " collision, limits a spin, or loses a position to rounding. The search tries values"
-            " from gentle to harsh, a collision at several moments of its step, and stops at the"
-            " first value that fails. Then it halves the gap to the last value that works until"
+            " from gentle to harsh, with the collision at several moments of its step. It stops at"
+            " the first value that fails. Then it halves the gap to the last value that works until"
             " the two are at"
             f" most {QUICK.ratio - 1:.0%} apart."
         ),
@@ -276,10 +276,10 @@ LIMITS = Lesson(
             " [threshold] and [digits] explain two of the reasons."
         ),
         (
-            "<b>Continuous collision detection</b> (CCD) looks for a contact along the whole way of"
-            " a disk in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk"
-            " against walls and static disks, and against moving disks only if it is marked as a"
-            " <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, as does Box2D 2.3 where"
+            "<b>Continuous collision detection</b> (CCD) looks for a contact along the whole path"
+            " of a disk in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a"
+            " disk against walls and static disks, and against moving disks only if it is marked as"
+            " a <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, as does Box2D 2.3 where"
             " e = 1 and there is no gravity. A name with a + is an engine with one change: "
             + "; ".join(f"<code>+{name}</code>, {change}" for name, change in CHANGES.items())
             + "."

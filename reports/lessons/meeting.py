@@ -1,5 +1,5 @@
-"""Lesson 4: two disks meet, with the numbers of this very collision filled into every line of the
-solver."""
+"""Lesson 4: two disks meet. Every line of the solver is shown with the numbers of this
+collision."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
 
 
 def or_rounding(value: float, digits: int) -> str:
-    """A number of the order of 1, or that it is 0 but for its last digits."""
+    """A number of the order of 1, or "0 to rounding"."""
     return number(value, digits) if abs(value) > ROUNDING else "0 to rounding"
 
 
@@ -151,7 +151,7 @@ def show_meeting(settings: Settings) -> Shown:
 
 
 def meeting_claims(settings: Settings) -> list[Claim]:
-    """Off the centre line a late normal is a wrong one, on it every normal is the same."""
+    """Off the centre line a late normal is wrong; on the centre line every normal is the same."""
     offset, restitution, k = settings["offset"], settings["e"], settings["k"]
     # A velocity below 3 m/s that is rounded a few times: by Box2D in float32, by the others in
     # float64.
@@ -222,8 +222,8 @@ MEETING = Lesson(
             " conserved."
         ),
         (
-            "The normal is the line of centres at the time at which the collision is detected, not"
-            " at the time at which it happens."
+            "The normal is the line of centres when the collision is detected, not when the disks"
+            " touch."
         ),
     ),
     sliders=(

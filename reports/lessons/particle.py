@@ -124,7 +124,7 @@ def with_gravity(played: Simulation) -> list[Claim]:
     return [
         Claim(
             "Until the first bounce explicit Euler (reference:lesson) is g dt t / 2 above the exact"
-            f" parabola, {number(late)} mm in the end, and symplectic Euler (reference:exercise) as"
+            f" parabola, {number(late)} mm in the end. Symplectic Euler (reference:exercise) is as"
             " far below it.",
             lambda shown: all(
                 np.abs(above(shown, name)[flight] - sign * offset).max() < ROUNDING
@@ -132,8 +132,7 @@ def with_gravity(played: Simulation) -> list[Claim]:
             ),
         ),
         Claim(
-            "Explicit Euler rises higher than the exact answer ever does, symplectic Euler less"
-            " high.",
+            "Explicit Euler rises higher than the exact answer, symplectic Euler less high.",
             lambda shown: (
                 shown.y("reference:lesson").max()
                 > shown.y(TRUTH).max()
@@ -142,8 +141,8 @@ def with_gravity(played: Simulation) -> list[Claim]:
         ),
         Claim(
             f"From the largest step to the smallest, {STEPS[0] // STEPS[-1]} times smaller, both"
-            " errors fall to less than a tenth. Not every halving of the step helps, because how"
-            " late a bounce is found depends on where in a step it happens.",
+            " errors fall to less than a tenth. Not every halving of the step reduces the error,"
+            " because the detection delay of a bounce depends on where in a step it happens.",
             lambda shown: (
                 all(10 * shown.y(name, 2)[0] < shown.y(name, 2)[-1] for name in METHODS)
                 and any((np.diff(shown.y(name, 2)) < 0).any() for name in METHODS)
@@ -210,15 +209,15 @@ PARTICLE = Lesson(
     text=(
         (
             "A particle is a position, a velocity and a radius. A step of <code>dt</code> moves it"
-            " by <code>v dt</code>. Between two walls it plays ping-pong: at a wall its velocity is"
-            " turned round."
+            " by <code>v dt</code>. The particle bounces between two walls: at a wall its velocity"
+            " is reversed."
         ),
         (
             "Then a force acts. <b>Explicit Euler</b> (<code>reference:lesson</code>) moves with"
             " the old velocity and then changes it. <b>Symplectic Euler</b>"
             " (<code>reference:exercise</code>) changes the velocity first and moves with the new"
-            " one. At last the particle is so fast that a step may be longer than its radius, and"
-            " it may pass through a wall: this is <b>tunnelling</b>."
+            " one. In the last part a step may be longer than the radius of the particle. Then it"
+            " may pass through a wall: this is <b>tunnelling</b>."
         ),
     ),
     sliders=(

@@ -25,7 +25,7 @@ function saveText(name, text) {
   link.click();
 }
 
-// A row a point of each curve.
+// A row for each point of each curve.
 function numbersOf(chart) {
   const quoted = (value) => `"${String(value ?? "").replaceAll("\"", "\"\"")}"`;
   const rows = [["curve", chart.x, chart.y].map(quoted)];

@@ -51,7 +51,7 @@ THRUST_NAMES = (
 
 
 def show_thrust(settings: Settings) -> Shown:
-    """Who is ahead of the parabola and who is behind, and the formula for it."""
+    """Which engines are ahead of the parabola and which are behind, and the formula for it."""
     acceleration = settings["a"]
     scenario = thrust_ship(acceleration)
     shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
@@ -84,7 +84,7 @@ def show_thrust(settings: Settings) -> Shown:
 
 
 def thrust_claims(laws: Mapping[str, float]) -> list[Claim]:
-    """What the order of a step does to the place, and does not do to the velocity; laws: engine ->
+    """The effect of the order of a step on the position, and none on the velocity; laws: engine ->
     mm that it ends ahead."""
     # Box2D's float32 rounds a place of up to 16 m by 1 um in each of up to 1024 steps, and seldom
     # up as often as down.
@@ -97,9 +97,9 @@ def thrust_claims(laws: Mapping[str, float]) -> list[Claim]:
     return [
         Claim(
             "After a thrust of T seconds every engine that plays to the end is (α − ½) a dt T"
-            " ahead of the exact answer, or behind it where this is negative; the table below has"
-            " the numbers. Box2D, which computes in single precision, is within"
-            f" {place} mm of it, all others to rounding.",
+            " ahead of the exact answer, or behind it where this is negative. The table below has"
+            " the numbers. Box2D, which computes in single precision, agrees with this formula"
+            f" within {place} mm, all others to rounding.",
             lambda shown: all(
                 abs(shown.y(name)[-1] - law) <= (place if "box2d" in name else 1e-9)
                 for name, law in laws.items()
@@ -121,8 +121,8 @@ def thrust_claims(laws: Mapping[str, float]) -> list[Claim]:
             lambda shown: all(shown.gap(name, chart=1) <= speed for name in laws),
         ),
         Claim(
-            "The engines with α = 1 end ahead of the exact answer, those with α = 0 as far behind"
-            " it.",
+            "The engines with α = 1 end ahead of the exact answer. Those with α = 0 end as far"
+            " behind it.",
             lambda shown: all(
                 abs(shown.y(name)[-1] + (1 - 2 * ENGINES[name].alpha) * abs(law)) <= place
                 and np.sign(shown.y(name)[-1]) == np.sign(law)
@@ -146,10 +146,10 @@ THRUST = Lesson(
     asks="Does a force move the ship equally far in every engine?",
     text=(
         (
-            "A force changes the velocity by <code>F/m dt</code> in a step. How far it carries the"
-            " ship depends on the order of a step. Write the step as <code>x' = x + v dt + α a"
-            " dt²</code>: velocity first is <code>α = 1</code>, position first is <code>α ="
-            " 0</code>, the exact parabola is <code>α = ½</code>. [order] does this with gravity."
+            "A force changes the velocity by <code>F/m dt</code> in a step. How far the ship moves"
+            " depends on the order of updates in a step. Write the step as <code>x' = x + v dt + α"
+            " a dt²</code>: velocity first is <code>α = 1</code>, position first is <code>α ="
+            " 0</code>, the exact parabola is <code>α = ½</code>. [order] shows this for gravity."
         ),
     ),
     sliders=(

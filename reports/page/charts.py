@@ -87,8 +87,8 @@ def momentum(comparison: Comparison) -> Drawing:
     """The error of momentum; if walls take up momentum, its deviation from the truth."""
     if violations.knows_impulses(comparison.scenario):
         caption = (
-            "Distance of the momentum from P(0) and what weight and thrusts have added since, over"
-            " the Σ m|v| at hand. Lower is better."
+            "Difference between the momentum and P(0) plus the impulses of weight and thrusts since"
+            " then, divided by the Σ m|v| at hand. Lower is better."
         )
         lines = lines_over_time(views(comparison, None), violations.momentum)
         return Drawing(
@@ -104,8 +104,8 @@ def momentum(comparison: Comparison) -> Drawing:
     for run, view in views(comparison, comparison.truth):
         lines.append(ChartLine(run, view.played.t, view.momentum_deviation / scale))
     caption = (
-        "Walls and static disks take up momentum, so that it is not conserved. Shown is how far it"
-        f" is from the truth's, divided by the Σ m|v| at hand. {DELAY}"
+        "Walls and static disks take up momentum, so it is not conserved. The chart shows its"
+        f" distance from the exact momentum, divided by the Σ m|v| at hand. {DELAY}"
     )
     return Drawing(
         "Momentum deviation from the truth",
@@ -115,8 +115,7 @@ def momentum(comparison: Comparison) -> Drawing:
 
 
 DELAY = (
-    "A collision up to three steps late or early is no error here; its delay has a metric of its"
-    " own."
+    "A collision up to three steps late or early is no error here; the delay has its own metric."
 )
 
 
@@ -131,7 +130,7 @@ def energy(comparison: Comparison) -> Drawing:
     against = (
         "its value at the start (at e = 1 collisions take no energy)"
         if conserved
-        else "the truth's"
+        else "the exact energy"
     )
     caption = (
         f"Distance of the energy from {against}, divided by the energy at hand."
@@ -179,8 +178,8 @@ def deviation(comparison: Comparison) -> Drawing:
             "Trajectory deviation", caption, over_time(comparison, lines, "off the truth (radii)")
         )
     caption = (
-        f"There is no exact answer. Shown is the distance from the disks of {held.name}, which may"
-        " be wrong as well."
+        f"There is no exact answer. The chart shows the distance from the disks of {held.name},"
+        " which may be wrong, too."
     )
     deviation = f"deviation from {held.name}"
     return Drawing(
@@ -210,8 +209,9 @@ def convergence(comparison: Comparison) -> Drawing:
     guide = first_order(lines, steps)
     figure = figure_of(lines, dt_axis, "position error (radii)", guide=guide, markers=len(steps))
     caption = (
-        "Largest position error at every step size. The dotted line falls as dt does (first order):"
-        " a steeper run is of higher order, a flat one has an error that no smaller step removes."
+        "Largest position error at every step size. The dotted line is first order: it falls as dt"
+        " does. A steeper line is of higher order. A flat line has an error that no smaller step"
+        " removes."
     )
     return Drawing(title, caption, figure)
 

@@ -44,9 +44,12 @@ def unbeaten(table: pd.DataFrame) -> str:
         f" {', '.join(best)}."
     )
     if len(rest) < len(rows) and others:
-        said += f" Of those that are not right to a millionth of a radius: {', '.join(others)}."
+        said += (
+            " Among the engines that are not right to a millionth of a radius, the same is true of"
+            f" {', '.join(others)}."
+        )
     if names := list(dict.fromkeys([*joining, *joining_others])):
-        said += f" If calls from Python cost nothing, {', '.join(names)} would be unbeaten as well."
+        said += f" If calls from Python cost nothing, it is also true of {', '.join(names)}."
     return said
 
 
@@ -88,17 +91,17 @@ def cheapest(found: pd.DataFrame) -> str:
         return f"No engine keeps within {NEAR:g} radii in any of {counted(len(scenes), 'scene')}."
     of = f"Of {counted(len(scenes), 'scene')}"
     if not wins:
-        return f"{of}, in none one engine is clearly the cheapest within {NEAR:g} radii."
+        return f"In none {of.lower()} one engine is clearly the cheapest within {NEAR:g} radii."
     parts = [
         f"{name} in {len(costs)} ({style.number(middle_half(np.array(costs)), 2)} µs)"
         for name, costs in sorted(wins.items(), key=lambda item: -len(item[1]))
     ]
-    parts += [f"none clearly in {even}"] if even else []
+    parts += [f"in {even} none is clearly the cheapest"] if even else []
     nowhere = len(scenes) - even - sum(map(len, wins.values()))
-    parts += [f"none reaches that in {nowhere}"] if nowhere else []
+    parts += [f"in {nowhere} none has so small an error"] if nowhere else []
     return (
         f"{of}, the cheapest engine with an error of at most {NEAR:g} radii is {', '.join(parts)}."
-        " Without the cost of calls from Python these are the same."
+        " It is the same engine if calls from Python cost nothing."
     )
 
 
@@ -159,7 +162,7 @@ def halving(table: pd.DataFrame, timed: bool) -> str:
     if not nearer:
         return f"Smaller steps {lost.format('')}"
     costs = f"multiplies the time by {span(dearer)} and " if timed else ""
-    said = f"On average half the step {costs}divides the error by {span(nearer)}"
+    said = f"On average, halving the step {costs}divides the error by {span(nearer)}"
     return (
         f"{said}; it {lost.format('s')}" if stuck else f"{said}, for every engine that takes steps."
     )

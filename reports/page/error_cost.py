@@ -80,23 +80,20 @@ def caption(scenes: int, clock: RunTimes) -> str:
     """The caption."""
     said = "A point is an engine at one step size"
     if scenes > 1:
-        said += (
-            f", over {scenes} scenes that need different things: the geometric mean without the"
-            " best and the worst quarter"
-        )
+        said += f": the geometric mean over {scenes} scenes, without the best and the worst quarter"
     left = "fewer steps" if clock.fault else "cheaper"
     said += (
         f". Lower is nearer to the exact answer, further left is {left}. A dotted line that ends in"
-        " a cross: smaller steps bring this engine no nearer, so an error below it is not reached"
-        " at any step size."
+        " a cross means that smaller steps bring this engine no nearer: no step size has an error"
+        " below the cross."
     )
     if clock.fault:
         return said
     least, most = int(clock.table.rounds.min()), int(clock.table.rounds.max())
     rounds = f"{least} to {most} interleaved rounds" if least < most else counted(most, "round")
     return (
-        f"{said} The light mark left of a point is the cost without the calls from Python: the cost"
-        " of as many steps in a world in which nothing moves is taken off. Times are medians of"
-        f" {rounds}; an engine timed twice differs from itself by"
+        f"{said} The light mark left of a point is the cost without the calls from Python, which is"
+        " measured as the cost of as many steps in a world in which nothing moves. Times are"
+        f" medians of {rounds}. Two timings of the same engine differ by"
         f" {style.number(100 * clock.noise.floor, 2)}\u00a0%."
     )

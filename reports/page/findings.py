@@ -73,8 +73,8 @@ def early_ends(comparisons: Sequence[Comparison]) -> list[str]:
 def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFrame:
     """The columns of `position_errors` of the ranked engines: all but the reader's own solver and
     solvers with time-of-impact ordering. If nothing else was played, these."""
-    apart = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
-    return off if len(apart) == off.shape[1] else off.drop(columns=apart)
+    unranked = [name for group in (YOURS, EXACT) for name in groups.get(group, [])]
+    return off if len(unranked) == off.shape[1] else off.drop(columns=unranked)
 
 
 def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
@@ -175,15 +175,16 @@ def closest(off: pd.DataFrame) -> str:
     # within 1 % counts as equal
     wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     return (
-        f"Closest to the exact answers, by the largest deviation in radii,"
-        f" median of {len(off)} scenes: {best}, unbeaten in {wins}{ranking}."
+        "Closest to the exact answers, by the largest deviation in radii as a median over"
+        f" {len(off)} scenes: {best}{ranking}. In {counted(wins, 'scene')} no engine is more than"
+        f" 1 % closer than {medians.index[0]}."
     )
 
 
 def worth_of_settings(off: pd.DataFrame) -> str:
     """How much matched settings reduce the deviation of an engine."""
     if off.empty:
-        return "What settings are worth cannot be said without an exact answer."
+        return "Without an exact answer the effect of settings is not known."
     moved = {}  # engine -> the number of scenes in which it gets closer, and farther
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"
@@ -193,15 +194,16 @@ def worth_of_settings(off: pd.DataFrame) -> str:
             moved[engine] = closer, farther
     if not moved:
         return (
-            "No engine was played in both profiles, so the worth of settings is not known from this"
-            " run."
+            "No engine was played in both profiles, so this run does not show the effect of"
+            " settings."
         )
     if len(off) == 1:
         return worth_in_one_scene(str(off.index[0]), moved)
-    parts = [
-        f"{engine} closer in {near} (farther in {far})" for engine, (near, far) in moved.items()
-    ]
-    return f"Matching an engine to the scene brings {', '.join(parts)} of {len(off)} scenes."
+    parts = [f"{engine} in {near} (farther in {far})" for engine, (near, far) in moved.items()]
+    return (
+        "The matched settings bring an engine closer to the exact answer than the shipped ones:"
+        f" {', '.join(parts)} of {len(off)} scenes."
+    )
 
 
 def worth_in_one_scene(scene: str, moved: Mapping[str, tuple[int, int]]) -> str:
@@ -235,13 +237,13 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     counts = lost.sum().sort_values(ascending=False, kind="stable")
     if len(off) == 1:
         who = ", ".join(str(name) for name, count in counts.items() if count)
-        return f"More than a whole radius off, or without a result: {who}; {cells}"
+        return f"More than one radius off, or without a result: {who}; {cells}"
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     return (
-        f"More than a whole radius off, or without a result: {who} of"
-        f" {len(off)} scenes; the hardest is {defeated.idxmax()}, too much for"
-        f" {defeated.max()} of {lost.shape[1]}; {cells}"
+        f"More than one radius off, or without a result: {who} of {len(off)} scenes. In the hardest"
+        f" scene, {defeated.idxmax()}, {defeated.max()} of {counted(lost.shape[1], 'engine')} fail;"
+        f" {cells}"
     )
 
 

@@ -31,13 +31,13 @@ PAGES = {
     "report": Place("Report", "every scene, engine by engine", "crosscheck", "latest/report.html"),
     "speed": Place(
         "Speed",
-        "what an accuracy costs, measured with care",
+        "the cost of an accuracy, and what each error is made of",
         "crosscheck speed",
         "speed/speed.html",
     ),
     "stability": Place(
         "Limits",
-        "how fast, how dense, how far until an engine fails",
+        "the speed, density or distance at which an engine fails",
         "crosscheck stability",
         "stability/stability.html",
     ),

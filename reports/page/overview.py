@@ -140,7 +140,7 @@ def values(comparison: Comparison) -> Found:
 
 
 def failures(comparison: Comparison) -> list[FailedRuns]:
-    """Every run that is not "ok", those of one engine and reason together."""
+    """Every run that is not "ok", grouped by engine and reason."""
     steps: dict[tuple[str, str, str], list[str]] = {}
     for run in comparison.runs:
         if run.status != "ok":

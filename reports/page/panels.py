@@ -62,7 +62,7 @@ class Drawn:
         titles: of the two axes, with units.
         box: left, bottom, right, top of the axes, in these units.
         until: s, where the exact answer ends.
-        apart: engine -> its largest error as a fraction of the extent of the panel.
+        off_by: engine -> its largest error as a fraction of the extent of the panel.
     """
 
     disks: Sequence[int]
@@ -70,7 +70,7 @@ class Drawn:
     titles: tuple[str, str]
     box: Sequence[float]
     until: float
-    apart: Mapping[str, float]
+    off_by: Mapping[str, float]
 
 
 def panels(
@@ -124,8 +124,8 @@ def priority(
     """The sort key of the scene to show first: it has an exact answer, the number of engines that
     play it, it has costs, and how well it separates engines: the smaller of the numbers visibly off
     and not."""
-    off = sum(share > VISIBLE for share in drawn.apart.values())
-    played_by = len(drawn.apart)
+    off = sum(share > VISIBLE for share in drawn.off_by.values())
+    played_by = len(drawn.off_by)
     exact, timed = comparison.truth is not None, comparison.scenario.name in costs
     return exact, played_by, timed, min(off, played_by - off)
 
@@ -164,7 +164,7 @@ def drawn_of(comparison: Comparison) -> Drawn:
         titles=titles_of(axes, scenario),
         box=box.tolist(),
         until=until,
-        apart={
+        off_by={
             run.name: float(deviation(run.trajectory, centre, scenario.scene)[:, disks].max())
             / float((box[2:] - box[:2]).max() if axes == "path" else box[3] - box[1])
             for run in runs
@@ -268,8 +268,8 @@ def said_of(comparison: Comparison, drawn: Drawn) -> str:
     line = "the path" if drawn.axes == "path" else f"{named} over time"
     if moving > FEW:
         who = (
-            f"{line} of disk {drawn.disks[0]}, one of {moving}: in most engines it is the"
-            " farthest from its place"
+            f"{line} of disk {drawn.disks[0]} of {moving}, the disk with the largest error in most"
+            " engines"
         )
     else:
         who = f"{line} of {'the disk' if moving == 1 else 'each disk'}"

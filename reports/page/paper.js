@@ -37,7 +37,7 @@ function onPaper(text, plot) {
   return { data: figure.data, layout: layoutOf(figure, "paper-") };
 }
 
-// A row a point of what is shown: the number itself, where the chart draws it below a break of its axis; the column of
+// A row for each point of what is shown: the number itself, where the chart draws it below a break of its axis; the column of
 // a chart that has columns; and what a point says of itself.
 function numbersOf(plot) {
   const { data, layout } = withoutHidden(JSON.parse(drawn.get(plot)), plot);

@@ -25,13 +25,13 @@ FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION = (
 )
 ALL = "All scenes"
 SITUATIONS = {
-    FLIGHT: "nothing collides, in the exact answer",
+    FLIGHT: "no collisions in the exact answer",
     SINGLE: "at most two disks move, or no disk meets two others",
     ROWS: "two or more disks on one line, and a third body",
-    STACKS: "weight and e = 0: contacts that last",
+    STACKS: "gravity and e = 0: contacts that last",
     CROWDS: "disks that meet many others",
-    SPIN: "a disk turns; these scenes count above as well",
-    ALL: "of all situations above",
+    SPIN: "a disk turns; these scenes also count above",
+    ALL: "all situations above",
     FRICTION: "with friction; these scenes count in no other row",
 }
 YOURS, ENGINE = "Your solver", "Engines"

@@ -17,21 +17,21 @@ def how_far_to_trust(comparisons: Sequence[Comparison]) -> dict[str, str]:
         "Exact answers": exact_answers(comparisons),
         "How far they hold": how_far_they_hold(comparisons),
         "Measured": (
-            "Everything else is measured in this run: each engine is played with the settings that"
-            " are shown, and what failed stays in the tables. A number that too few samples carry"
-            " is not judged, and says so."
+            "Everything else is measured in this run. Each engine is played with the settings that"
+            " this page shows. Failures stay in the tables. A number from too few samples is marked"
+            " as not judged."
         ),
         "Checked from outside": (
-            "A simulation of all pairs in 420 bits, plain scripts for each engine, and metrics"
-            " computed again from the trajectories share no code with what they check: uv run"
-            " pytest -m independent repeats them, and tests/independent/README.md lists what has"
-            " not been checked."
+            "Three checks share no code with what they check: a simulation of all pairs in 420"
+            " bits, plain scripts for each engine, and metrics computed again from the"
+            " trajectories. uv run pytest -m independent repeats them, and"
+            " tests/independent/README.md lists what has not been checked."
         ),
         "Our own engines": (
-            "reference and event_driven are this project's, and it also judges them. So the exact"
-            " answers import none of their code, which a test keeps so; the settings of every"
-            " engine are searched by the same command, on scenes that are not scored; and solvers"
-            " that stand still, gain energy or double their speed must be caught in every scene in"
+            "reference and event_driven belong to this project, which also judges them. So the"
+            " exact answers import none of their code; a test checks this. The same command"
+            " searches the settings of every engine, on scenes that are not scored. Solvers that"
+            " stand still, gain energy or double their speed must be caught in every scene in"
             " which something moves."
         ),
     }
@@ -58,8 +58,8 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
             else "computed at two precisions that agree"
         )
         parts.append(
-            f"{event_driven} {'is' if event_driven == 1 else 'are'} computed event by event in"
-            f" many digits, {how}, and off by at most {number(bound)} m"
+            f"{event_driven} {'is' if event_driven == 1 else 'are'} computed from collision to"
+            f" collision in many digits, {how}, and off by at most {number(bound)} m"
         )
     if none:
         parts.append(
@@ -82,7 +82,7 @@ def how_far_they_hold(comparisons: Sequence[Comparison]) -> str:
         f"{name} to {number(until)} s of {number(whole)} s" for name, (until, whole) in ends.items()
     )
     return (
-        f"{listed}: later samples have no score. There a rounding of the start has grown to a"
-        " billionth of a radius, or the motion has no single answer; the scene says which. All"
-        " others hold to their end."
+        f"{listed}: later samples have no score, because a rounding of the start has grown to a"
+        " billionth of a radius, or the motion has no single answer. The section of the scene says"
+        " which. All other exact answers hold to the end of their scene."
     )

@@ -114,8 +114,8 @@ def difference(before: Path, after: Path) -> Difference:
     )
     busy = [archive for archive in (one, other) if archive.timings and is_busy(archive)]
     warnings += [
-        f"{archive.folder}: its times are not compared: an engine against itself read"
-        f" {1 + noise_floor(archive).floor:.2f}"
+        f"{archive.folder}: its times are not compared: two timings of the same engine"
+        f" differ by a factor of {1 + noise_floor(archive).floor:.2f}"
         for archive in busy
     ]
     timed = timings_of(one, other, *cells) if like and not busy else []

@@ -67,8 +67,8 @@ def may_be_part(part: Path, out: Path, kind: FolderKind, option: str = "--out") 
     may_write(part, kind, option)
     if not is_interrupted(part, out):
         raise FolderTaken(
-            f"{option} {out}: {part} is needed while it is made, and holds a finished result; move"
-            " that elsewhere, or name another folder"
+            f"{option} {out}: {part} is for unfinished results, but holds a finished one; move it"
+            " elsewhere, or name another folder"
         )
 
 

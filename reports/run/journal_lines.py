@@ -111,7 +111,7 @@ class Kinds(NamedTuple):
 
     models: Mapping[str, type[Line]]
     missed: str
-    asked: str = "without it the request is not known: name another --out"
+    asked: str = "without it the plan of the run is not known: name another --out"
 
 
 def checked_lines(folder: Path, kinds: Kinds) -> Iterator[tuple[int, str, dict[str, Any]]]:

@@ -187,7 +187,7 @@ def may_write(target: Path, kind: FolderKind, option: str = "--out") -> None:
     """
     if target == Path.cwd() or target in Path.cwd().parents:
         raise FolderTaken(
-            f"{option} {target}: is where you are, or above it; name another folder, or go"
+            f"{option} {target}: is the current folder, or above it; name another folder, or go"
             " elsewhere"
         )
     if not os.path.lexists(target):
@@ -197,9 +197,7 @@ def may_write(target: Path, kind: FolderKind, option: str = "--out") -> None:
     if not target.is_dir():
         raise FolderTaken(f"{option} {target}: is a file; name a folder that does not exist yet")
     if os.path.ismount(target):
-        raise FolderTaken(
-            f"{option} {target}: is where a disk is mounted, and stays there; name a folder in it"
-        )
+        raise FolderTaken(f"{option} {target}: is a mount point, which stays; name a folder in it")
     if foreign := foreign_file_in(target, kind):
         raise FolderTaken(
             f"{option} {target}: {foreign}; name another folder, or move it elsewhere"

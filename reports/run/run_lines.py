@@ -191,6 +191,6 @@ KINDS = Kinds(
         "beside": BesideLine,
         "footer": RunFooterLine,
     },
-    "delete that line, and run --resume plays what it was of",
-    "without it the request is not known: play it again into another --out",
+    "delete that line; run --resume then plays its cell again",
+    "without it the plan of the run is not known: play it again into another --out",
 )

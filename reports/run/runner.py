@@ -122,17 +122,13 @@ def affordable(workers: int) -> int:
     memory: int = psutil.virtual_memory().total // 1_000_000
     files = most_files()
     most = {
-        f"memory of {memory} MB, of which each takes {LEAST_MEMORY}": max(
-            1, memory // LEAST_MEMORY
-        ),
-        f"limit of {files} open files, of which each takes {LINES}": max(
-            1, (files - OTHERS) // LINES
-        ),
+        f"memory of {memory} MB, each needs {LEAST_MEMORY}": max(1, memory // LEAST_MEMORY),
+        f"limit of {files} open files, each needs {LINES}": max(1, (files - OTHERS) // LINES),
     }
     why = min(most, key=lambda what: most[what])
     if workers <= most[why]:
         return workers
-    say(f"{workers} workers are more than can start here ({why}): {most[why]} do")
+    say(f"{workers} workers are more than can start here ({why}): {most[why]} are started")
     return most[why]
 
 
@@ -173,7 +169,7 @@ def cluster(scheduler: str) -> Any:
         from distributed import Client
     except ImportError as missing:
         raise NoScheduler(
-            f"--scheduler {scheduler}: many machines take the package {missing.name}, which is not"
+            f"--scheduler {scheduler}: it needs the package {missing.name}, which is not"
             " installed; uv sync --extra cluster, or pip install crosscheck2d[cluster]"
         ) from missing
     # important faults are raised; each logger of distributed has its own level

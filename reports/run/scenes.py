@@ -36,7 +36,7 @@ def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
     scenario = open_scene(scene, record["seed"])
     if scene_hash(scenario) != record["scene_hash"]:
         raise Unusable(
-            f"{scenario.name} is not the scene any more that was played; crosscheck run --resume"
+            f"{scenario.name} has changed since it was played; crosscheck run --resume"
             " plays it again"
         )
     must_fit(folder, scenario, record)
@@ -79,7 +79,7 @@ def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario
     for dt in dts:
         if dt > 0 and interval / dt > most + 0.5:  # the nearest whole number is more
             raise ValueError(
-                f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: allowed is "
+                f"--dt {dt:g} gives {scenario.name} more than {MOST_STEPS} steps: must be "
                 f"{interval / most:.12g} s or more"
             )
         k = round(interval / dt) if dt > 0 else 0
@@ -87,7 +87,7 @@ def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario
             # Twelve digits: fewer digits may name another step size, which would be refused as
             # this one is.
             raise ValueError(
-                f"--dt {dt:.12g} does not fit {scenario.name}: allowed is its sample interval "
+                f"--dt {dt:.12g} does not fit {scenario.name}: must be its sample interval "
                 f"{interval:.12g} s divided by a whole number, e.g. {scenario.dt(ladder[-1]):.12g}"
             )
     if dts:

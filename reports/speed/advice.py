@@ -179,7 +179,7 @@ def advise(
     found = [(ladder, those_that_keep(ladder, bound)) for ladder in by_engine(tried)]
     keeping = [kept[0] for _, kept in found if kept]
     changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
-    priced, apart, busy = timed(scene, seed, [*keeping, *changed], progress)
+    priced, differences, busy = timed(scene, seed, [*keeping, *changed], progress)
     plain = {one.name: one for one in priced if one.change == PLAIN}
     short = [min(ladder, key=smallest) for ladder, kept in found if not kept]
     return Advice(
@@ -190,7 +190,7 @@ def advise(
         sorted(plain.values(), key=lambda one: one.cost),
         reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
         [ChangedOption(plain[one.name], one) for one in priced if one.change != PLAIN],
-        float(np.percentile([*apart.values()], 75)) if apart else nan,
+        float(np.percentile([*differences.values()], 75)) if differences else nan,
         busy,
     )
 
@@ -285,13 +285,13 @@ def timed(
         raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
     times = summed_up(pd.DataFrame(samples), ["key"])
     cost = dict(zip(times.key, times.cost))
-    apart = {
+    differences = {
         (who[0], k): abs(log(cost[who, k, 1] / cost[who, k, 0]))
         for who, k, copy in cost
         if copy == 1
     }
     priced = [replace(one, cost=cost[(one.name, one.change), one.substeps, 0]) for one in played]
-    return priced, apart, busy
+    return priced, differences, busy
 
 
 def reasons(

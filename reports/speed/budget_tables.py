@@ -12,7 +12,7 @@ from adapters.mechanisms.table import NAMES
 from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
 from reports.speed.explained import LEAST, TO
 
-EXPLAINED = TO[0]  # of the engine's error: what is left over below it is said to be none
+EXPLAINED = TO[0]  # of the engine's error: a residual below it is said to be none
 FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar is empty
 WHO = ["engine", "profile"]
 
@@ -42,8 +42,8 @@ class BudgetTable(NamedTuple):
 
 
 def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
-    """Root mean squares in radii, a row an engine: engine, the residual, the contributions, sum and
-    all."""
+    """Root mean squares in radii, a row for each engine: engine, the residual, the contributions,
+    sum and all."""
     here = budget[budget.scenario == scenario]
     contributions = [
         contribution

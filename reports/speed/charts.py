@@ -27,8 +27,8 @@ TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
 def speed(points: pd.DataFrame, tall: bool = False) -> Figure:
-    """Error against cost, a line an engine over its ladder; `points` of one scene, or pooled and
-    then `tall`."""
+    """Error against cost, a line for each engine over its ladder; `points` of one scene, or pooled
+    and then `tall`."""
     drawn = points[points.cost.notna() & np.isfinite(points.error)]
     bare = (
         drawn.bare
@@ -192,7 +192,8 @@ def sweep_hover(what: str, row: dict[str, Any], relative: bool) -> str:
 
 
 def matched(reached: pd.DataFrame, tall: bool = False) -> Figure:
-    """The cost of each accuracy, a mark an engine; at the top, engines that do not reach it."""
+    """The cost of each accuracy, a mark for each engine; at the top, engines that do not reach
+    it."""
     names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
     y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
     not_down = edge(y_axis, "not yet")
@@ -254,8 +255,8 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> Figure:
 
 
 def options(table: pd.DataFrame, ratio: str, title: str) -> Figure:
-    """A row a change, a mark a scene: `ratio` ("cost_ratio", "error_ratio") to the unchanged
-    engine, 1: the same; a change that failed the scene stands at the right edge.
+    """A row for each change, a mark for each scene: `ratio` ("cost_ratio", "error_ratio") to the
+    unchanged engine, 1: the same; a change that failed the scene stands at the right edge.
     """
     rows = list(dict.fromkeys(zip(table.engine, table.profile, table.change)))[::-1]
     values = table[ratio].to_numpy(float)

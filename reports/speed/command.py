@@ -72,7 +72,7 @@ def run_speed(
             kept = kept_of(plan, header, journal, resume)
     part = kept.journal.path.parent
     with (
-        broken_off(part, lambda: f"What has ended is kept in {part}: ask again with --resume"),
+        broken_off(part, lambda: f"The finished part is kept in {part}: ask again with --resume"),
         kept.journal,
     ):
         results, header = carry_out(plan, header, kept, resume)

@@ -56,9 +56,9 @@ class Share(NamedTuple):
 
 
 def explained(budget: pd.DataFrame) -> pd.DataFrame:
-    """A row a scene and engine, of `COLUMNS`: its error, its residual (root mean squares), and how
-    far the scene was evaluated, its exact answer goes, and the scene goes; note: why the engine has
-    no error.
+    """A row for each scene and engine, of `COLUMNS`: its error, its residual (root mean squares),
+    and how far the scene was evaluated, its exact answer goes, and the scene goes; note: why the
+    engine has no error.
     """
     keys = COLUMNS[: COLUMNS.index("error_radii")]
     wide = budget.pivot(index=keys, columns="contribution", values="position_radii").reindex(

@@ -85,7 +85,7 @@ def figures(results: Results) -> pd.DataFrame:
 
 
 def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:
-    """A row an engine and change of `versus`: in which scenes it costs less than `YARDSTICK`;
+    """A row for each engine and change of `versus`: in which scenes it costs less than `YARDSTICK`;
     value: the ratio."""
     rows = versus[versus[count].notna()]
     numbers = {

@@ -271,7 +271,7 @@ class SpeedTaskLine(Line):
 KINDS = Kinds(
     {"header": SpeedHeaderLine, "task": SpeedTaskLine},
     "delete that line, and --resume measures again what it was of",
-    "without it the request is not known: delete the folder, or name another --out",
+    "without it the plan of the run is not known: delete the folder, or name another --out",
 )
 
 

@@ -85,8 +85,8 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
 
 
 def middle_scores(results: Results) -> pd.DataFrame:
-    """A row an engine and scene, at the middle of the step sizes measured: `situations.COLUMNS`;
-    angles are not measured here."""
+    """A row for each engine and scene, at the middle of the step sizes measured:
+    `situations.COLUMNS`; angles are not measured here."""
     points = results.points
     sizes = points.groupby("scenario").step_size.unique()
     middle = points.scenario.map({name: sorted(k)[len(k) // 2] for name, k in sizes.items()})
@@ -131,21 +131,22 @@ def pooled_section(results: Results) -> SpeedSection:
             "Error against cost",
             f"Each point is an engine at one of the {counted(steps, 'step size')} that all scenes"
             f" have: error and cost are geometric means of the middle half of {count_of_scenes}:"
-            f" {', '.join(results.scenes)}. {said_of_pool(results.pooled)} A scene that an engine"
-            " failed has an infinite error and an infinite cost. The light mark left of a point is"
-            " the cost without what as many steps and calls of an empty world take. Lower and"
-            " further left is better. The broad grey line joins the points that no engine beats in"
-            " both; the narrow one those that no engine beats that takes steps.",
+            f" {', '.join(results.scenes)}. {said_of_pool(results.pooled)} A scene in which an"
+            " engine failed has an infinite error and an infinite cost. The light mark left of a"
+            " point is the cost without that of as many steps and calls in an empty world. Lower"
+            " and further left is better. The broad grey line is the Pareto front: no engine is"
+            " better than its points in both error and cost. The narrow line is the Pareto front"
+            " of the engines that take steps.",
             charts.speed(results.pooled, tall=True),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "The cost of the cheapest step size at which the error, and that at every finer one, is"
-            f" at most this. Each engine is compared with {YARDSTICK} in the scenes in which both"
-            " reach it: shown is the geometric mean of the cost of the latter over all its scenes,"
-            " times the geometric mean of the ratios. never: in half of the scenes or more it is"
-            " not reached at any dt, or the engine fails. not yet: in half or more it is not"
-            " reached at the finest dt measured. Hover for how many of each."
+            "The cost of reaching an error: that of the cheapest step size from which on all finer"
+            f" steps keep it, too. Each engine is compared with {YARDSTICK} in the scenes in which"
+            f" both reach it. A mark is the geometric mean of the cost of {YARDSTICK} over all its"
+            " scenes, times the geometric mean of the ratios. never: in half of the scenes or more,"
+            " no dt reaches the error, or the engine fails. not yet: in half or more, the finest dt"
+            " measured does not reach it. Hover over a mark for the numbers of scenes."
             f" {said_of_cheaper(results.pooled_reached)}",
             charts.matched(results.pooled_reached, tall=True),
         ),
@@ -166,7 +167,7 @@ def section_of(results: Results, scene: str) -> SpeedSection:
     noise = results.noise_summary(scene)
     low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
     floor = (
-        f" Noise floor: half of the engines read {low} to {high} against themselves."
+        f" Noise floor: for half of the engines the ratio of two timings is {low} to {high}."
         if noise["pairs"]
         else ""
     )
@@ -178,23 +179,23 @@ def section_of(results: Results, scene: str) -> SpeedSection:
     )
     wrapping = (points.wrapping > 0).any()
     budgets = (
-        " It does not include setting disks onto the opposite edge, which Python does for engines"
-        " without such an edge: hover."
+        " The time does not include the wrap, which Python does for engines without one: hover"
+        " over a point to see it."
         if wrapping
         else ""
     )
     drawings = {
         "speed": Drawing(
             "Error against cost",
-            f"A point is one dt; half of it is the next to the right.{scored}{spread} Time: median"
-            " of the rounds, the bars are quartiles; the light mark is without what as many steps"
-            f" and calls of an empty world take.{floor}{budgets}",
+            f"A point is one dt; the next point to the right has half of it.{scored}{spread} Time:"
+            " the median of the rounds, with bars from quartile to quartile. The light mark is the"
+            f" time without that of as many steps and calls in an empty world.{floor}{budgets}",
             charts.speed(points),
         ),
         "matched": Drawing(
             "Cost at matched accuracy",
-            "never: not reached at any dt, because the engine approaches another motion, or fails."
-            " not yet: not reached at the finest dt measured.",
+            "never: no dt reaches the error, because the engine converges to another motion, or"
+            " fails. not yet: the finest dt measured does not reach it.",
             charts.matched(reached),
         ),
     }
@@ -242,16 +243,17 @@ def options_section(results: Results) -> SpeedSection | None:
     drawings = {
         "cost": Drawing(
             "Its cost",
-            "Time over that of the matched profile; right of the dotted line it costs more.",
+            "Time divided by that of the matched profile; right of the dotted line the option costs"
+            " more.",
             charts.options(table, "cost_ratio", "time / time unchanged") if many else None,
         ),
         "error": Drawing(
             "Its effect on the error",
-            "Error over that of the matched profile; right of the dotted line it is worse.",
+            "Error divided by that of the matched profile; right of the dotted line it is larger.",
             charts.options(table, "error_ratio", "error / error unchanged"),
         ),
     }
-    return section("options", "No more than a scene needs", "", drawings)
+    return section("options", "Options that a scene does not need", "", drawings)
 
 
 def sweep_sections(results: Results) -> list[SpeedSection]:
@@ -264,11 +266,11 @@ def sweep_sections(results: Results) -> list[SpeedSection]:
     )
     pooled = Drawing(
         "Pooled",
-        "Dotted: at one dt, with more iterations or substeps to the right; the first and the last"
-        " are named. Solid: the same engine as matched, from 4 times that dt to an eighth of it."
-        " Error and cost are divided by those of the engine as matched at that dt, where all lines"
-        f" meet; geometric means of the middle half of {counted(count, 'scene')}."
-        + (f" Without a ratio, as there is nothing to divide by: {without}." if without else ""),
+        "Dotted: more iterations or substeps at one dt, from left to right; the first and the last"
+        " number are named. Solid: the matched profile, from 4 times that dt to an eighth of it."
+        " Error and cost are divided by those of the matched profile at that dt, where all lines"
+        f" meet. A point is the geometric mean of the middle half of {counted(count, 'scene')}."
+        + (f" These have no ratio, because the divisor is 0: {without}." if without else ""),
         charts.sweeps(results.pooled_sweeps, relative=True),
     )
     each = {

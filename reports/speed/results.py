@@ -210,8 +210,8 @@ class Results:
         return models.cheapest(self.measured.truths, self.points)
 
     def order_table(self, scene: str) -> pd.DataFrame:
-        """A row an engine: order with interval and verdict, and for every accuracy (cost, dt, why)
-        as columns."""
+        """A row for each engine: order with interval and verdict, and for every accuracy (cost, dt,
+        why) as columns."""
         orders = self.orders[self.orders.scenario == scene]
         reached = self.reached[self.reached.scenario == scene]
         wide = orders.assign(

@@ -23,7 +23,8 @@ from reports.speed.sizes import exponent
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario, engine and dt: the columns of `summed`, and step_size (0: coarsest)."""
+    """A row for each scenario, engine and dt: the columns of `summed`, and step_size (0:
+    coarsest)."""
     found = summed(measured, SCENE, seed)
     return found.assign(step_size=doublings(found))
 
@@ -86,7 +87,7 @@ def measurable(here: pd.DataFrame) -> pd.Series:
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
-    """A row a scenario, engine, change and dt of one kind.
+    """A row for each scenario, engine, change and dt of one kind.
 
     Columns: scenario, engine, profile, change, dt_s, substeps, until_s and duration_s (of the first
     seed, see `ladder.errors_of`), seeds, failed (how many), status and reason (of the
@@ -141,10 +142,10 @@ def in_us(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row a scenario and engine: slope, low, high, verdict, see `order.Order`; coarsest_error and
-    finest_error in radii (medians over the seeds), the latter at finest_dt_s; steps, how many were
-    played, and failed, at how many of them a seed failed: what failed has no part in slope and
-    verdict.
+    """A row for each scenario and engine: slope, low, high, verdict, see `order.Order`;
+    coarsest_error and finest_error in radii (medians over the seeds), the latter at finest_dt_s;
+    steps, how many were played, and failed, at how many of them a seed failed: what failed has no
+    part in slope and verdict.
     """
     rows = []
     for keys, dt, errors, changes in ladders(measured):
@@ -199,8 +200,8 @@ def ladders(
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
-    """A row a scenario, engine and accuracy: accuracy (radii), cost (µs per simulated second),
-    dt_s, why it is not, and lost: it is not at any dt, or failed."""
+    """A row for each scenario, engine and accuracy: accuracy (radii), cost (µs per simulated
+    second), dt_s, why it is not, and lost: it is not at any dt, or failed."""
     verdicts: dict[tuple[Any, ...], str] = dict(
         zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict)
     )
@@ -227,8 +228,8 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
 
 
 def noise(measured: Measured) -> pd.DataFrame:
-    """A row a scenario and engine: ratio of the median costs of an engine and its copy in the same
-    rounds."""
+    """A row for each scenario and engine: ratio of the median costs of an engine and its copy in
+    the same rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
     both = (
         summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"])
@@ -313,8 +314,8 @@ def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def options(measured: Measured) -> pd.DataFrame:
-    """A row a scenario, engine and change: cost and error, each over the unchanged engine's; and
-    both errors."""
+    """A row for each scenario, engine and change: cost and error, each over the unchanged engine's;
+    and both errors."""
     samples = measured.samples[measured.samples.kind == OPTION]
     errors = measured.errors[measured.errors.kind == OPTION]
     if samples.empty or errors.empty:

@@ -34,7 +34,7 @@ KEYS = ["engine", "profile", "change"]
 
 
 def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
-    """A row an engine with end-of-step detection, and one each of its changed settings, of
+    """A row for each engine with end-of-step detection, and one each of its changed settings, of
     `COLUMNS`.
 
     ratio, low, high: its cost over that of `OWN` at the same steps, geometric mean, least and most

@@ -18,7 +18,7 @@ from reports.stability.predicates import (
     BOUNCES_OFF,
     SCALED_DEVIATION,
     SPRING_GROWS,
-    STRAYS,
+    WRONG_DISTANCE,
 )
 from reports.stability.variants import DrivenEngine, with_variant
 from scenarios.families.placing import lay_out
@@ -228,7 +228,7 @@ ALONE = (
         "m",
         DECADES,
         far,
-        STRAYS,
+        WRONG_DISTANCE,
     ),
     Case(
         "spin",

@@ -126,7 +126,7 @@ def slow(x: float, run: int) -> Scenario:
 
 
 def unequal(x: float, run: int) -> Scenario:
-    """A disk of mass 1 hits a disk of mass x at rest, at v dt / R = 0.1."""
+    """A disk of mass 1 strikes a disk of mass x at rest, at v dt / R = 0.1."""
     return flyby(0.1 * RADIUS / DT, run, mass=x)
 
 
@@ -200,7 +200,7 @@ COLLISIONS = (
     Case(
         "near_miss",
         FAMILY,
-        "How near may a disk pass at v dt / R = 0.2 without being hit?",
+        "How near may a disk pass at v dt / R = 0.2 without a collision?",
         "b / 2R - 1",
         "1",
         (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),

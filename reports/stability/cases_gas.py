@@ -12,7 +12,7 @@ from adapters.run import Run
 from reports.stability.limits import RARELY, Case
 from reports.stability.predicates_gas import (
     ENERGY_DRIFTS,
-    GAS_PARTS,
+    GAS_DIVERGES,
     MOMENTUM_DRIFTS,
     TEMPERATURES_PART,
     WRONG_GAS,
@@ -318,7 +318,7 @@ GAS = (
         "1",
         COUNTS,
         steps_of_gas,
-        GAS_PARTS,
+        GAS_DIVERGES,
         runs=SEEDS,
         whole=True,
         play=reversed_order,
@@ -334,7 +334,7 @@ GAS = (
         "1",
         COUNTS,
         steps_of_gas,
-        GAS_PARTS,
+        GAS_DIVERGES,
         runs=SEEDS,
         whole=True,
         play=restarted,

@@ -177,7 +177,7 @@ STACKS = (
     Case(
         "overlap_energy",
         FAMILY,
-        "From how deep an overlap are two disks at rest thrown apart?",
+        "From how deep an overlap on does an engine eject two disks at rest?",
         *OVERLAPS,
         EJECTED,
     ),

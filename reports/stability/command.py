@@ -84,7 +84,7 @@ def find_limits(
     added = {name: row_of(name) for name in chosen if name not in ENGINES}
     if files := [name.removesuffix(OWN) for name, row in added.items() if row.exercise]:
         how = (
-            "a solver of the exercise is not driven to its limits: crosscheck check judges it,"
+            "it does not test a solver of the exercise: crosscheck check judges it,"
             " crosscheck run plays it"
         )
         refuse([f"--engine {file}: {how}" for file in files])
@@ -105,7 +105,7 @@ def find(plan: StabilityPlan, resume: bool, out: Path) -> NoReturn:
         with given_back(journal):
             done = gone_on_with(journal, plan, resume)
     part = journal.path.parent
-    kept = f"What has ended is kept in {part}: ask again with --resume"
+    kept = f"The finished part is kept in {part}: ask again with --resume"
     with broken_off(part, lambda: kept), journal, Progress() as progress:
         carry_out(plan, journal, done, progress)
         progress.say("writing the tables and the page")

@@ -214,13 +214,13 @@ class StabilityTaskLine(Line):
 
 KINDS = Kinds(
     {"header": StabilityHeaderLine, "task": StabilityTaskLine, "footer": StabilityFooterLine},
-    "delete that line, and --resume plays again what it was of",
-    "without it the request is not known: delete the folder, or name another --out",
+    "delete that line; --resume then plays its task again",
+    "without it the plan of the run is not known: delete the folder, or name another --out",
 )
 
 
 def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """SharedReason there is no such case or engine, as the end of a sentence; "" if there is.
+    """Why there is no such case or engine, as the end of a sentence; "" if there is.
     `files`: the scene files of the header."""
     if isinstance(one, Limit):
         path, _, what = one.case.rpartition(":")
@@ -233,7 +233,7 @@ def unknown_engine(one: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
 
 
 def impossible(limit: Limit, case: Case) -> str:
-    """SharedReason no search of the case can end like this, as the end of a sentence; "" if one
+    """Why no search of the case can end like this, as the end of a sentence; "" if one
     can."""
     if limit.status != "ok":
         lost = (
@@ -270,7 +270,7 @@ def impossible(limit: Limit, case: Case) -> str:
 
 
 def miscounted(trial: Trial, case: Case, at_the_limit: bool) -> str:
-    """SharedReason no runs at a value of the case can give this, as the end of a sentence; "" if
+    """Why no runs at a value of the case can give this, as the end of a sentence; "" if
     they can."""
     if trial.runs > case.runs or trial.failed > trial.runs or trial.allowed > case.runs:
         return (

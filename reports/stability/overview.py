@@ -97,10 +97,10 @@ def in_report(case: Case) -> str:
     else:
         differ = f"another scene: {setting(one)}, at dt {dt} ms; here {setting(mine)}, and {here}"
     return (
-        f"{case.report} is {differ}. In the report an engine fails where a disk is more than"
-        f" {number(FAR_OFF)} radius from its exact position, or where there is no result; here it"
-        f" fails where {case.predicate.means}. So an engine may fail here and not there, and the"
-        " other way round."
+        f"{case.report} is {differ}. In the report an engine fails if a disk is more than"
+        f" {number(FAR_OFF)} radius from its exact position, or if there is no result. Here it"
+        f" fails if {case.predicate.means}. So an engine may fail here and not in the report, or"
+        " the other way round."
     )
 
 
@@ -165,19 +165,18 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     if failing:
         tested = sum(bool(limit.tested) for limit in failing)
         found.append(
-            f"The reason of {tested} of {counted(len(failing), 'limit')} was tested: the limit"
-            " follows from the reason, or an engine that differs in that one thing gets farther, or"
-            " the failing run works without it, or the reference with end-of-step detection and the"
-            " fewest mechanisms of the engine that suffice works and fails at the same values. The"
-            " other reasons are called likely, or not known."
+            f"The reason of {tested} of {counted(len(failing), 'limit')} was tested in one of four"
+            " ways. The limit follows from the reason; an engine that differs in this one thing"
+            " works at harsher values; the failing run works without this thing; or the ablated"
+            " reference, with as few mechanisms of the engine as possible, works and fails at the"
+            " same values. The other reasons are called likely, or not known."
         )
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.engine} in {limit.case}" for limit in odd[:3]))
         found.append(
-            f"In {counted(len(odd), 'search', 'searches')} (marked *) there is more than one edge:"
-            f" the engine works again beyond its first failure, as {names}. The table has the first"
-            " failure."
+            f"In {counted(len(odd), 'search', 'searches')} (marked *) the engine works again beyond"
+            f" its first failure, for example {names}. The table has the first failure."
         )
     return found
 
@@ -195,13 +194,11 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
     if cases < 2 or not any(fails.values()):
         return []
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
-    said = (
-        f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most those of"
-    )
-    said += f" {engines_with(fails, max)}; a refusal counts as one."
+    said = f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most are"
+    said += f" those of {engines_with(fails, max)}. A refusal counts as a failure."
     libraries = {engine: fails[engine] for engine in grouped(fails).get(ENGINE, [])}
     if libraries and min(libraries.values()) > min(fails.values()):
-        said += f" Of the libraries the fewest are those of {engines_with(libraries, min)}."
+        said += f" Of the libraries, the fewest are those of {engines_with(libraries, min)}."
     return [said]
 
 

@@ -180,9 +180,9 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
         return shares(case, limits)
     title = f"{predicate.name.capitalize()}, {predicate.unit}"
     caption = (
-        f"The worst of the runs played at each {case.parameter}, harsher to the right; above the"
-        " dotted line it fails. A line that ends has nothing to read there: refused, broken off,"
-        " or not a number."
+        f"The worst of the runs played at each {case.parameter}, harsher to the right. Above the"
+        " dotted line the engine fails. Where a line ends, the engine refused the scene, stopped,"
+        " or gave a value that is not a number."
     )
     lines = []
     for limit in limits:
@@ -227,8 +227,8 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
         )
         lines.append(ChartLine(named(limit), x, y))
     caption = (
-        f"How many of the runs at each {case.parameter} failed; harsher to the right. Values that"
-        " were left at their first failing run, as the quick form does, are not drawn."
+        f"The share of the runs at each {case.parameter} that failed; harsher to the right. Values"
+        " at which the quick form stopped at the first failing run are not drawn."
     )
     title = f"{case.predicate.name.capitalize()}, share of runs"
     return Drawing(

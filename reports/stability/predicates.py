@@ -106,7 +106,7 @@ def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
     )
 
 
-def _strays(scenario: Scenario, played: Trajectory) -> Reading:
+def _wrong_distance(scenario: Scenario, played: Trajectory) -> Reading:
     way = np.linalg.norm(played.position[-1] - played.position[0], axis=1)
     true = truth_of(scenario)
     ought = np.linalg.norm(true.position[-1] - true.position[0], axis=1)
@@ -204,7 +204,7 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
 
 
 def first_bounce(scenario: Scenario) -> float:
-    """s, when a ball dropped onto y = 0 first hits it."""
+    """s, when a ball dropped onto y = 0 first reaches it."""
     scene = scenario.scene
     return float(np.sqrt(2 * (scene.position[0, 1] - scene.radius[0]) / -scene.gravity[1]))
 
@@ -226,8 +226,12 @@ COLLISIONS_SPURIOUS = Predicate(
 RESTITUTION_OFF = Predicate(
     "restitution off", "1", 0.01, "the collision does not have the scene's e", _restitution_off
 )
-STRAYS = Predicate(
-    "strays", "of the way", 0.01, "a free disk has not moved the right distance", _strays
+WRONG_DISTANCE = Predicate(
+    "wrong distance",
+    "of the way",
+    0.01,
+    "a free disk has not moved the right distance",
+    _wrong_distance,
 )
 VELOCITY_OFF = Predicate(
     "velocity off",

@@ -98,7 +98,7 @@ STANDS = Predicate(
     _stands,
 )
 EJECTED = Predicate(
-    "thrown apart", "radii/s", 0.1, "two disks at rest are pushed apart at a speed", _ejected
+    "ejected", "radii/s", 0.1, "two disks that start at rest separate at a speed", _ejected
 )
 STILL_OVERLAP = Predicate(
     "still overlap", "radii", 0.02, "an overlap is left after a second", _still_overlap

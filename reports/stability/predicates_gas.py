@@ -45,7 +45,7 @@ def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     )
 
 
-def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
+def _gas_diverges(scenario: Scenario, played: Trajectory) -> Reading:
     drift = (
         np.linalg.norm(played.position - truth_of(scenario).position, axis=2)
         / scenario.scene.radius
@@ -54,7 +54,7 @@ def _gas_parts(scenario: Scenario, played: Trajectory) -> Reading:
     worst = int(np.argmax(drift[-1]))
     return Reading(
         float(off.max()),
-        first_above(played.t, off, GAS_PARTS.bound),
+        first_above(played.t, off, GAS_DIVERGES.bound),
         f"disk {worst} is at another position",
         disk=worst,
     )
@@ -169,8 +169,8 @@ MOMENTUM_DRIFTS = Predicate(
     "the momentum changes by more than a hundred roundings of float32",
     _momentum_drifts,
 )
-GAS_PARTS = Predicate(
-    "parts", "radii", 1e-3, "the disks of the two runs are at different positions", _gas_parts
+GAS_DIVERGES = Predicate(
+    "diverges", "radii", 1e-3, "the disks of the two runs are at different positions", _gas_diverges
 )
 TEMPERATURES_PART = Predicate(
     "temperatures part",

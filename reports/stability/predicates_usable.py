@@ -63,7 +63,7 @@ def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
 def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
     if not len(scenario.scene.walls):
         return None
-    through = np.flatnonzero(laws.through_walls(played, scenario.scene))
+    through = np.flatnonzero(laws.tunnelled(played, scenario.scene))
     event = f"disk {through[0]} goes through a wall" if len(through) else ""
     return Reading(
         2.0 * len(through),
@@ -94,7 +94,11 @@ def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
     event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
     return Reading(
-        float(lost.max()) / MOST_LOST, float(played.t[k + 1]), event, "strays", disk=int(disk)
+        float(lost.max()) / MOST_LOST,
+        float(played.t[k + 1]),
+        event,
+        "wrong distance",
+        disk=int(disk),
     )
 
 

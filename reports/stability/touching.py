@@ -101,7 +101,7 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk hits a row of n - 1 disks."""
+    """A disk strikes a row of n - 1 disks."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))

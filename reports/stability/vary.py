@@ -193,7 +193,7 @@ def varied(path: str, what: str, x: float, _run: int) -> Scenario:
 
 
 def cannot_vary(one: Scenario, what: str) -> str:
-    """SharedReason this cannot be varied in a scene, as the end of a sentence; "" if it can."""
+    """Why this cannot be varied in a scene, as the end of a sentence; "" if it can."""
     if what == "mass_ratio" and one.scene.static.all():
         return "no disk moves, so that none can be made heavier"
     if what == "dt" and not ladder(one):

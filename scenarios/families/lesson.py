@@ -90,8 +90,8 @@ def falling_box(seed: int = 0) -> Scenario:
     question = Scenario(
         name="falling_box",
         asks=(
-            "Do thirty disks that fall in a box stay inside it and apart, and lose energy only by"
-            " collisions?"
+            "Do thirty disks that fall in a box stay inside without overlap, and lose energy only"
+            " by collisions?"
         ),
         source=f"{SOURCE}, parts 3 and 4, in two dimensions",
         scene=scene,

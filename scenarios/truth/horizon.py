@@ -197,7 +197,7 @@ class TangentVectors:
 
     def release_delay(self, i: int, leg: Leg, t: float) -> Array:
         """(d,) s, the delay at which disk i leaves the end of its wall, or a disk that another one
-        hits; or at which its slip ends."""
+        strikes; or at which its slip ends."""
         if leg.turn is not None and leg.held and leg.held == self.path.legs[i][self.leg[i]].held:
             return self.slip_end_delay(i, leg)
         spans = [

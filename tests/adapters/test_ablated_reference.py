@@ -215,7 +215,8 @@ scene = lay_out(
     walls=box([-0.6, -0.6], [2.6, 2.6]), restitution=0.8, gravity=[0.1, -0.7],
     angular_velocity=np.where(n == 4, 0, 1.0),
 )
-on = {"friction": 0.3, "correction_share": 0.1, "slop": 0.01, "push_speed": 3.0, "margin": 0.01}
+on = {"friction": 0.3, "correction_share": 0.1, "slop": 0.01}
+on |= {"correction_speed": 3.0, "margin": 0.01}
 rapier = {
     "recycled": 0.02, "fattened": 0.02, "tangent": True, "rebounds": False,
     "rub_biased": False,

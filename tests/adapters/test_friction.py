@@ -116,7 +116,7 @@ ABLATIONS = [
 
 
 @pytest.mark.parametrize(("name", "rate", "e", "mu", "off", "explained"), ABLATIONS)
-def test_each_cause_is_shown_by_switching_it_off(name, rate, e, mu, off, explained):
+def test_each_cause_is_shown_by_an_ablation(name, rate, e, mu, off, explained):
     """With all mechanisms the reference is the engine; without this one it is off by what it
     explains."""
     asked = thrown(e, mu)

@@ -311,7 +311,7 @@ def left_over(scene: str, name: str) -> float:
     ],
 )
 def test_the_error_of_planck_is_that_of_box2d_without_float32(scene, name):
-    """The same mechanisms but float32: nothing is left over but the rounding of float64, a thousand
+    """The same mechanisms but float32: the residual is the rounding of float64, a thousand
     steps of 1e-16 over an error of 1e-3."""
     assert left_over(scene, name) < 1e-10
 
@@ -346,7 +346,7 @@ def test_the_error_of_rapier_is_that_of_box2d_3_with_its_own_numbers(scene, name
 @pytest.mark.parametrize("profile", ["shipped", "matched"])
 @pytest.mark.parametrize("scene", ["free_fall", "head_on_equal_e09", "bouncing_ball_e1"])
 def test_air_polygons_and_iterations_are_all_that_matter_does_along_a_line(scene, profile):
-    """Switched off one after the other; what is left over is the reference's own error."""
+    """Disabled one after the other; the residual is the reference's own error."""
     assert left_over(scene, f"matter:{profile}") < 1e-9
 
 
@@ -393,7 +393,7 @@ def test_rapier_looks_at_a_pair_again_only_when_it_has_moved():
 @fetched
 def test_rapier_stops_a_disk_that_turns_fast_at_the_wall():
     """Its rim moves by more than half a radius in a step: the continuous collision that a setting
-    switches off."""
+    disables."""
     scene = scene_of(
         position=[[0.0, 0.25 + 0.0133]],
         velocity=[[6.0, -4.0]],

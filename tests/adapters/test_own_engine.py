@@ -385,7 +385,7 @@ def test_a_fault_is_a_status_and_a_sentence(
 def test_who_reports_no_collisions_is_not_said_to_miss_them(tmp_path: Path):
     """They are not judged, also not those of an engine beside it; and the probes do not ask. One
     that reports an empty list is said to miss them."""
-    path = template(tmp_path, "javascript", ("function collisions(", "function hits("))
+    path = template(tmp_path, "javascript", ("function collisions(", "function contacts("))
     silent, verdicts = played(path), missed(row_of_file(path), "collisions_are_reported")
     other = played(template(tmp_path, "javascript"))
     nothing = template(tmp_path, "javascript", ("return world.heard", "return []"))

@@ -3,7 +3,7 @@ says.
 
 Left out: what is judged in collision-free samples (velocity, energy error and loss, deviation of
 momentum and energy), the collisions that are matched to those of another (missed, spurious, delay),
-and disks through walls. To add one, write it from its line and give it a row in `OWN`.
+and tunnelling. To add one, write it from its line and give it a row in `OWN`.
 """
 
 from __future__ import annotations

@@ -178,5 +178,5 @@ def test_the_step_that_is_suggested_is_accepted(
     try:
         with_steps(one, [asked], False)
     except ValueError as refusal:
-        suggested = re.findall(r"allowed is (\S+) s or more|e\.g\. (\S+)$", str(refusal))[0]
+        suggested = re.findall(r"must be (\S+) s or more|e\.g\. (\S+)$", str(refusal))[0]
         with_steps(one, [float("".join(suggested))], False)

@@ -1,1 +1,2 @@
-"""What `crosscheck check` writes for programs, a file a format; formats.py is the table of them."""
+"""What `crosscheck check` writes for programs, a file for each format; formats.py is the table of
+them."""

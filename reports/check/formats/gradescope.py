@@ -1,4 +1,4 @@
-"""results.json of Gradescope: a test a task, whose scores it adds up."""
+"""results.json of Gradescope: a test for each task, whose scores it adds up."""
 
 from __future__ import annotations
 

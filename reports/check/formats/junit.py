@@ -1,4 +1,4 @@
-"""JUnit XML: a test suite a file, a test case a question."""
+"""JUnit XML: a test suite for each file, a test case for each question."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ JUNIT = b'<testsuites name="crosscheck check"'
 
 
 def as_junit(marked: Sequence[Marked]) -> str:
-    """A test suite a file, a test case a row; a fault is a failure, what was not asked or follows
-    from a fault is skipped."""
+    """A test suite for each file, a test case for each row; a fault is a failure, what was not
+    asked or follows from a fault is skipped."""
     suites = ElementTree.Element("testsuites", name="crosscheck check")
     for one in (student.check for student in marked):
         skipped = sum(OUTCOMES[row.verdict].junit == "skipped" for row in one.rows)

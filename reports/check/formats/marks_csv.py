@@ -1,4 +1,4 @@
-"""A table of marks for a spreadsheet: a row a student."""
+"""A table of marks for a spreadsheet: a row for each student."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""results.json of PrairieLearn's external grading: a test a task, the score as a share of 1, and a
-picture of the smallest scene that shows each fault."""
+"""results.json of PrairieLearn's external grading: a test for each task, the score as a share of 1,
+and a picture of the smallest scene that shows each fault."""
 
 from __future__ import annotations
 

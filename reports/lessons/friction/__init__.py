@@ -1,2 +1,2 @@
-"""Lesson 9, spin and friction: a file a page, and what the pages on a bounce share in
+"""Lesson 9, spin and friction: a file for each page, and what the pages on a bounce share in
 `thrown.py`."""

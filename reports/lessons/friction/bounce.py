@@ -92,7 +92,7 @@ def angles_of(law: Law, spin: float) -> Array:
 
 
 def taken_by(played: Simulation) -> dict[str, Taken]:
-    """What each engine gave the disks, and last what is exact."""
+    """What each engine gave the disks; the exact values come last."""
     assert played.truth is not None
     scene = played.scenario.scene
     found = {run.name: taken(run.trajectory, scene) for run in played.runs if run.trajectory}
@@ -147,7 +147,7 @@ def left_with(each: Taken, scene: Scene) -> str:
 
 
 def tidy(value: float) -> str:
-    """To four digits; what is 0 but for rounding is 0."""
+    """To four digits; a number that is 0 except for rounding is shown as 0."""
     return number(value, 4) if abs(value) > SINGLE else "0"
 
 
@@ -183,7 +183,7 @@ def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str,
 
 
 def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
-    """When the contact sticks, who has the exact answer, and what the others do."""
+    """When the contact sticks, which engines have the exact answer, and what the others do."""
     slips = slip_at(angles, settings["spin"])
     exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
     return [
@@ -213,7 +213,7 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
             ),
         ),
         Claim(
-            f"{BOX2D} turns the disk as if the friction acted {number(1e3 * SHORT, 2)} mm above the"
+            f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
             f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
             " friction impulse should change it.",
             lambda shown: turned_short(shown, settings["spin"]),

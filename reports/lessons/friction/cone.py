@@ -64,7 +64,7 @@ def show_cone(settings: Settings) -> Shown:
 
 
 def cone_claims(mu: float, whole: bool, dt: float) -> list[Claim]:
-    """What the normal impulse is, and what friction each gives."""
+    """The normal impulse, and the friction that each engine gives."""
     narrow = mu / (1 + STATED)
     ablated = np.full(len(STATED), mu) if whole else narrow
 
@@ -116,7 +116,7 @@ CONE = Lesson(
             " <code>e = 0</code>. See [friction] for what the cone is."
         ),
         (
-            "The ablated reference plays with the mechanisms of Box2D 3.1. Switch what limits its"
+            "The ablated reference plays with the mechanisms of Box2D 3.1. Choose what limits its"
             " friction. The disk is so fast along the floor that the contact slips at every setting"
             " here. If the contact sticks within the narrower cone, the order does not matter."
         ),

@@ -69,7 +69,7 @@ def overlap(dt: float, scene: Scene) -> float:
 
 
 def lever_claims(share: float, dt: float, scene: Scene) -> list[Claim]:
-    """By how much each arm is too short."""
+    """The length by which each lever arm is too short."""
     deep = overlap(dt, scene)
     half = 1 - deep / 2 / RADII
     # Every step rounds a height of up to 2 m; the smallest radius shows it most.

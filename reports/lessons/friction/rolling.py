@@ -86,7 +86,7 @@ def sliding(spin: float, friction: float) -> Legs:
 
 
 def facts(played: Simulation) -> list[tuple[str, str]]:
-    """How each moves in the end."""
+    """The motion of each engine's disk at the end."""
     motions = {run.name: run.trajectory for run in played.runs} | {"exact answer": played.truth}
     return [
         (name, f"in the end {tidy(each.velocity[-1, 0, 0])} m/s, slip {tidy(slip(each)[-1])} m/s")
@@ -96,12 +96,12 @@ def facts(played: Simulation) -> list[tuple[str, str]]:
 
 
 def tidy(value: float) -> str:
-    """To three digits; what is 0 but for rounding is 0."""
+    """To three digits; a number that is 0 except for rounding is shown as 0."""
     return number(value) if abs(value) > DOUBLE else "0"
 
 
 def rolling_claims(settings: Settings, dt: float) -> list[Claim]:
-    """When it rolls and how fast, who is exact, and what slips in the end."""
+    """When the disk rolls and how fast, which engines are exact, and the slip at the end."""
     mu, spin = settings["mu"], settings["spin"]
     legs = sliding(spin, mu)
     rolls, end = float(legs.start[-1]), float(legs.velocity[-1, 0])
@@ -203,7 +203,7 @@ def mixed_claim(spin: float, mu: float, dt: float) -> Claim:
 
 
 def slip_claims(spin: float) -> list[Claim]:
-    """What slips on in Box2D."""
+    """The slip that remains in Box2D."""
 
     def share(shown: Shown, name: str) -> float:
         return float(np.abs(shown.y(name, 1)[-1] / shown.y(name)[-1]))
@@ -264,11 +264,11 @@ ROLLING = Lesson(
             "An engine keeps a coefficient for each shape, and mixes those of floor and disk by a"
             " rule of its own: pymunk multiplies them, Box2D takes the root of the product. As"
             " shipped, both have <code>µ</code> here. <code>pymunk:matched</code> gives both the"
-            " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] tries the rules."
+            " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] compares the rules."
         ),
         (
-            "The last chart shows the <b>slip at rest</b>, what is left when the disk should roll."
-            " See [lever] for that of Box2D 2.3."
+            "The last chart shows the <b>slip at rest</b>: the slip that remains when the disk"
+            " should roll. See [lever] for the slip at rest of Box2D 2.3."
         ),
     ),
     sliders=(

@@ -24,8 +24,8 @@ APART = 0.6  # m, of disks that fly side by side, the faster ones ahead
 
 
 class Taken(NamedTuple):
-    """What disks took up from t = 0 to the end, (n,): N s along the floor and along its normal, and
-    N m s about the centre."""
+    """The impulses on disks from t = 0 to the end, (n,): N s along the floor and along its normal,
+    and N m s about the centre."""
 
     along: Array
     normal: Array

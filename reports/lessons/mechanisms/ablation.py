@@ -69,7 +69,7 @@ def over(x: Array, runs: Sequence[Run], read: Read) -> list[Curve]:
 
 
 def lies_on(engine: str, own: bool, bound: float, unit: str = "") -> Claim:
-    """Whether the ablated reference, as it is set, does what the engine does.
+    """Whether the ablated reference, with its current settings, moves as the engine does.
 
     own: whether it is set as the engine is; bound: what the rounding of both may add up to.
     """
@@ -91,7 +91,7 @@ def follows(name: str, law: Array, bound: float) -> Callable[[Shown], np.bool_]:
 
 
 def distances(runs: Sequence[Run], curves: Sequence[Curve], unit: str) -> list[tuple[str, str]]:
-    """By how much the ablated reference's curve differs from those of the engines, at the most."""
+    """The largest difference between the curve of the ablated reference and that of each engine."""
     shown = Shown([LessonChart("", "", "", curves)])
     return [
         (

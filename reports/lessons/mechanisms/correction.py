@@ -52,7 +52,7 @@ def show_position_correction(settings: Settings) -> Shown:
 
 
 def correction_claims(share: float, slop: float) -> list[Claim]:
-    """What is left of 200 mm after a step, and in the end; slop in mm."""
+    """The overlap that remains of 200 mm after a step, and in the end; slop in mm."""
     own = 2.5  # mm, the slop of Box2D in a scene of metres
     single = 1e3 * 72 * FLOAT32  # mm: 24 steps, three corrections each, of coordinates up to 1 m
     left = np.array(box2d_overlaps(200.0, own, 24))
@@ -103,9 +103,9 @@ CORRECTION = page(
     "correction",
     "Slop and position correction",
     "What becomes of an overlap?",
-    "The exercise projects two disks apart at once. Box2D undoes a share of their overlap at a"
-    " time and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact. Here a"
-    " disk starts deep in a fixed one, for which there is no exact answer. Continuous"
+    "The exercise removes an overlap in one step, by projection. Box2D removes a share of it in"
+    " each pass and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact."
+    " Here a disk starts deep in a fixed disk, for which there is no exact answer. Continuous"
     " collision detection (CCD, see [gravity]) is off in Box2D (<code>+no_ccd</code>), because it"
     " removes the overlap by other means.",
     [NO_CCD],

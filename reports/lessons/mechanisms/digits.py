@@ -46,7 +46,7 @@ def show_digits(settings: Settings) -> Shown:
 
 
 def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) -> list[Claim]:
-    """What rounding a place that often may add up to, and what it adds up to in Box2D."""
+    """The largest sum of the rounding errors of a position, and their sum in Box2D."""
     apart = float(np.spacing(np.float32(far + 2)))  # m; the disk moves by 2 m
     most = steps * apart / 2  # along x; y has smaller numbers, and far more digits
     largest = float(np.max(box2d.y))
@@ -93,7 +93,8 @@ DIGITS = page(
     "Single precision",
     "Why does a free disk drift, far from the origin?",
     "A float32 number has 24 binary digits. The farther a disk is from the origin, the more of"
-    " them the integer part of its coordinate takes, and the fewer are left for a step.",
+    " these digits the integer part of its coordinate takes. Fewer digits remain for the"
+    " displacement in a step.",
     ["box2d:shipped"],
     show_digits,
     Slider("digits", "Binary digits", (53, 24), 0),

@@ -24,9 +24,9 @@ from reports.lessons.mechanisms.planck import (
     PLANCK,
     PROFILES,
     SCENES,
-    apart,
     kept,
     known,
+    largest_deviation,
     recorded,
     run_of,
     whole,
@@ -34,7 +34,7 @@ from reports.lessons.mechanisms.planck import (
 from reports.page.style import TRUTH, number
 from scenarios.model import Array
 
-APART = "between the two"
+BETWEEN = "between the two"
 ALIKE = 0.02  # of an error: where float32 changes none of a scene by more, one sentence says so
 
 
@@ -49,7 +49,7 @@ def show_float32(settings: Settings) -> Shown:
     curves = [
         Curve(f"{PLANCK}:{profile}", ms, rows.planck_radii.to_numpy(float), dots=True),
         Curve(box2d, ms, errors_of_box2d(name, profile), dots=True),
-        Curve(APART, ms, rows.apart_radii.to_numpy(float), dots=True),
+        Curve(BETWEEN, ms, rows.deviation_radii.to_numpy(float), dots=True),
     ]
     middle = scene.middle_substeps
     film = Simulation(
@@ -90,7 +90,7 @@ def show_float32(settings: Settings) -> Shown:
 def errors_of_box2d(name: str, profile: str) -> Array:
     """Radii, at each step size of `LADDER`, on this machine."""
     runs = [run_of(BOX2D, profile, name, substeps) for substeps in LADDER]
-    return np.array([apart(whole(run), known(name)[1], name) for run in runs])
+    return np.array([largest_deviation(whole(run), known(name)[1], name) for run in runs])
 
 
 @cache
@@ -135,7 +135,7 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
     if name == "free_fall":
         claims.append(
             Claim(
-                f"Half the step is half the error of {planck}, at every step size.",
+                f"Half the step gives half the error of {planck}, at every step size.",
                 lambda shown: np.abs(shown.y(planck)[:-1] / shown.y(planck)[1:] - 2).max() < 1e-3,
             )
         )
@@ -169,9 +169,9 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
                 "The distance between the two grows with the number of steps:"
                 f" {LADDER[-1]} times as many steps make it {number(growth, 2)} times as large.",
                 lambda shown: (
-                    abs(ends(shown.y(APART)) / growth - 1) <= 1e-9
-                    and ends(shown.x(APART)) == 1 / LADDER[-1]
-                    and np.polyfit(np.log(shown.x(APART)), np.log(shown.y(APART)), 1)[0] < -0.5
+                    abs(ends(shown.y(BETWEEN)) / growth - 1) <= 1e-9
+                    and ends(shown.x(BETWEEN)) == 1 / LADDER[-1]
+                    and np.polyfit(np.log(shown.x(BETWEEN)), np.log(shown.y(BETWEEN)), 1)[0] < -0.5
                 ),
             )
         )
@@ -207,9 +207,9 @@ SINGLE = Lesson(
     text=(
         (
             "Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which"
-            " computes in float64. Both have the same settings here, so they differ by rounding"
-            " alone: the error of Box2D less that of planck is the <b>share of float32</b>. A share"
-            " below 0 means that float32 makes the error smaller."
+            " computes in float64. Both have the same settings here, so they differ only by"
+            " rounding. The error of Box2D minus that of planck is the <b>share of float32</b>. A"
+            " share below 0 means that float32 makes the error smaller."
         ),
         (
             "A smaller step makes the error of the method smaller. It also makes more steps, and"
@@ -222,7 +222,7 @@ SINGLE = Lesson(
     ),
     names=(
         *(f"{engine}:{profile}" for profile in PROFILES for engine in (PLANCK, BOX2D)),
-        APART,
+        BETWEEN,
         TRUTH,
     ),
     show=show_float32,

@@ -29,7 +29,7 @@ ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed af
 
 
 def show_gravity(settings: Settings) -> Shown:
-    """Height of a ball that should bounce for ever."""
+    """The height of a ball that should bounce for ever."""
     scenario, k = bouncing_ball_e1(), settings["k"]
     names = ["box2d:matched", "pymunk:matched"]
     ablated = AblatedReference(order=ORDERS[settings["order"]])
@@ -80,16 +80,16 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
     )
     return [
         Claim(
-            "Box2D without CCD (+no_ccd) turns round a velocity that gravity has"
-            " changed already. The ball gains about |v| dt of height at each bounce, where v is"
+            "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already"
+            " changed. The ball gains about |v| dt of height at each bounce, where v is"
             f" its speed: some {number(1e3 * fall * dt, 2)} mm at the first, and more at each later"
             " one.",
             lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
         ),
         continuous,
         Claim(
-            "pymunk:matched turns round the velocity before gravity. Up and down are the same"
-            " motion, and the ball returns to the height it started from.",
+            "pymunk:matched reverses the velocity before gravity changes it. The ball rises as it"
+            " fell, and returns to the height it started from.",
             lambda shown: np.abs(peaks(shown, "pymunk:matched") - start).max() <= seen + 1e-9,
         ),
         Claim(
@@ -113,13 +113,13 @@ GRAVITY = page(
     "gravity",
     "Impulse before or after gravity",
     "Why does a ball in Box2D bounce ever higher?",
-    "A bounce turns round the velocity with which a ball meets the floor. If gravity has been"
-    " added to it already, the part that gravity added in this step is turned round, too."
-    " <b>Continuous collision detection</b> (CCD) looks for a contact along the whole way of a disk"
-    " in a step, not only at its end. Box2D plays twice, with CCD and without it"
+    "A bounce reverses the velocity with which a ball meets the floor. If gravity has already"
+    " changed this velocity in the step, the change is reversed, too."
+    " <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a"
+    " disk in a step, not only at its end. Box2D plays twice, with CCD and without it"
     " (<code>+no_ccd</code>), because CCD hides the effect at some step sizes.",
     [NO_CCD, "box2d:matched", "pymunk:matched"],
     show_gravity,
-    Slider("order", "Velocity that is turned round", tuple(ORDERS), 0),
+    Slider("order", "Velocity that is reversed", tuple(ORDERS), 0),
     time_step(1 / 60, (8, 4, 2, 1), 1),
 )

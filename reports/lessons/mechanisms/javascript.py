@@ -54,7 +54,7 @@ def show_javascript(settings: Settings) -> Shown:
 
 
 def claim_of(e: float, curve: Curve) -> Claim:
-    """Up to which speed an engine cuts the bounce, and what it gives above."""
+    """The speed up to which an engine reduces the bounce, and the e that it gives above."""
     name = curve.name
     speed, ratio = np.asarray(curve.x, float), np.asarray(curve.y, float)
     stuck = ratio < STUCK * e
@@ -89,23 +89,23 @@ JAVASCRIPT = Lesson(
     name="javascript",
     number="6.11",
     title="The same bounce in planck, matter and Rapier",
-    asks="What do the JavaScript engines make of e?",
+    asks="Which restitution do the JavaScript engines give?",
     text=(
         (
             "<code>planck</code> is Box2D 2.3, with its restitution threshold (see [threshold])."
             " <code>Rapier</code> has no threshold. <code>matter-js</code> differs in three ways,"
-            " and each can be switched off. Air slows its disks in flight. Its disks are polygons,"
+            " and each can be disabled. Air slows its disks in flight. Its disks are polygons,"
             " which touch at a corner, so that a part of the impulse turns them. It solves a"
             " collision in several iterations, and those after the first stop a slow pair."
         ),
         (
-            "Switch them off one after the other. The matched profiles lift all of it by settings"
+            "Disable them one after the other. The matched profiles avoid all three by settings"
             " that the engines document; matter's disks then have 200 sides."
         ),
     ),
     sliders=(
         Slider("e", "Restitution e", RESTITUTIONS, 1),
-        Slider("off", "Switched off", tuple(VERSIONS), 0),
+        Slider("off", "Disabled", tuple(VERSIONS), 0),
     ),
     names=(
         *dict.fromkeys(name_in(engine, version) for version in VERSIONS for engine in ENGINES),

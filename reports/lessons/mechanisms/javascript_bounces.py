@@ -26,7 +26,7 @@ from scenarios.model import Array, Scenario
 KEPT = Path(__file__).with_name("javascript_bounces.csv")
 COMMAND = "uv run --extra js python -m reports.lessons.mechanisms.javascript_bounces"
 ENGINES = ("planck", "matter", "rapier2d")
-# what is switched off -> the profile, and the options that do it
+# what is disabled -> the profile, and the options that do it
 VERSIONS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     "nothing": ("shipped", {}),
     "air in matter": ("shipped", {"friction_air": 0}),

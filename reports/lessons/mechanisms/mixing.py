@@ -84,7 +84,7 @@ def show_mixing(settings: Settings) -> Shown:
 
 
 def mixing_claims(mark: str, product: bool) -> list[Claim]:
-    """Who multiplies, and who gives the number that is stated."""
+    """Which engine multiplies, and which gives the number that is stated."""
     # A ratio of impulses, rounded a few times.
     double, single = 16 * 2.0**-53, 16 * FLOAT32
     box2d, own = ("the larger", 0.0) if mark == "e" else ("the root of the product", 0.2)

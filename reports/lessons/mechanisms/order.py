@@ -55,7 +55,7 @@ ORDER = page(
     "Velocity or position first",
     "Why is a thrown disk off its parabola?",
     "With the same gravity and the same step, one engine moves a disk with the old velocity and"
-    " the other with the new one. [thrust] does this with a force.",
+    " another with the new velocity. [thrust] does this with a force.",
     ["pymunk:matched"],
     show_order,
     Slider("order", "Order", ("velocity first", "position first"), 0),

@@ -29,7 +29,15 @@ PLANCK, BOX2D = "planck", "box2d"
 PROFILES = ("matched", "shipped")
 SCENES = ("free_fall", "oblique_e09", "head_on_unequal_e0", "head_on_equal_e09")  # of the lesson
 LADDER = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)  # its steps in a sample interval
-COLUMNS = ["scenario", "profile", "substeps", "dt_s", "planck_radii", "box2d_radii", "apart_radii"]
+COLUMNS = [
+    "scenario",
+    "profile",
+    "substeps",
+    "dt_s",
+    "planck_radii",
+    "box2d_radii",
+    "deviation_radii",
+]
 
 
 @cache
@@ -46,11 +54,11 @@ def run_of(engine: str, profile: str, name: str, substeps: int) -> Run:
 
 
 def whole(run: Run) -> Trajectory | None:
-    """What was played; None if that does not go to the end of the scene."""
+    """The trajectory of a run; None if it does not reach the end of the scene."""
     return run.trajectory if run.status == "ok" else None
 
 
-def apart(one: Trajectory | None, other: Trajectory | None, name: str) -> float:
+def largest_deviation(one: Trajectory | None, other: Trajectory | None, name: str) -> float:
     """Radii: the largest distance of any disk between the two, up to the end of the exact answer;
     nan if there is none of them."""
     scenario, truth = known(name)
@@ -61,7 +69,7 @@ def apart(one: Trajectory | None, other: Trajectory | None, name: str) -> float:
 
 
 def measured(name: str, profile: str, substeps: int) -> dict[str, float | str | int]:
-    """A row of the table: the error of both engines, and how far they are apart."""
+    """A row of the table: the error of both engines, and their deviation from each other."""
     scenario, truth = known(name)
     planck, box2d = (whole(run_of(each, profile, name, substeps)) for each in (PLANCK, BOX2D))
     return {
@@ -69,9 +77,9 @@ def measured(name: str, profile: str, substeps: int) -> dict[str, float | str | 
         "profile": profile,
         "substeps": substeps,
         "dt_s": scenario.dt(substeps),
-        "planck_radii": apart(planck, truth, name),
-        "box2d_radii": apart(box2d, truth, name),
-        "apart_radii": apart(planck, box2d, name),
+        "planck_radii": largest_deviation(planck, truth, name),
+        "box2d_radii": largest_deviation(box2d, truth, name),
+        "deviation_radii": largest_deviation(planck, box2d, name),
     }
 
 

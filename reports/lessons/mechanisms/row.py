@@ -88,7 +88,7 @@ def overlapping(n: int) -> Array:
 
 
 def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
-    """Who gets what of 5 m/s."""
+    """How the 5 m/s are shared among the disks."""
     last, thrown = np.append(np.zeros(n), 5.0), overlapping(n)
     # 8 iterations over up to 5 contacts, at 5 m/s.
     single = 8 * n * 5 * FLOAT32
@@ -113,7 +113,8 @@ def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
             follows(PLAIN, last, ROUNDING),
         ),
         Claim(
-            "So does pymunk:matched here, because disks that only just touch are no contact to it."
+            "So does pymunk:matched here, because it finds no contact between disks that just"
+            " touch."
             f" If the disks of the row overlap by {number(OVERLAP)} m, it solves their contacts"
             f" together: the first disk is thrown back at {number(-thrown[0])} m/s, and all others"
             " move on.",

@@ -44,8 +44,8 @@ SUBSTEPS = page(
     "substeps",
     "Substeps",
     "What is a step of Box2D 3.1?",
-    "Box2D 3.1 cuts every step into n smaller ones, and a disk in flight has the error of the"
-    " smaller step. [order] is about a whole one.",
+    "Box2D 3.1 divides every step into n substeps. A disk in flight has the error of a substep."
+    " [order] shows the error of a whole step.",
     ["box2d_v3:matched"],
     show_substeps,
     Slider("substeps", "Substeps n", (1, 2, 4, 8), 0),

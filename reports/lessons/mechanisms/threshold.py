@@ -46,7 +46,7 @@ def show_threshold(settings: Settings) -> Shown:
     claims = [
         Claim(
             f"box2d:shipped takes every collision below 1 m/s as inelastic, and gives every faster"
-            f" one the stated e = {e}.",
+            f" collision the stated e = {e}.",
             lambda shown: cut_below(shown, "box2d:shipped", 1.0),
         ),
         Claim(
@@ -68,9 +68,9 @@ THRESHOLD = page(
     "threshold",
     "A restitution threshold",
     "Why do slow disks stick in Box2D?",
-    "An engine may take a collision that closes more slowly than a threshold as inelastic, so"
-    " that what should rest comes to rest. The threshold is a speed in the units of the scene."
-    " Raise it in the ablated reference until its curve lies on that of Box2D.",
+    "An engine may take a collision below a threshold of closing speed as inelastic, so that disks"
+    " come to rest. The threshold is a speed in the units of the scene. Raise it in the ablated"
+    " reference until its curve lies on that of Box2D.",
     ["box2d:shipped"],
     show_threshold,
     Slider("threshold", "Threshold", (0.0, 0.25, 0.5, 1.0, 2.0), 0, "m/s"),

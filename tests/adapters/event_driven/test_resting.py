@@ -74,7 +74,7 @@ def test_bounces_down_an_incline_end_in_a_slide():
             assert v[0] @ normal == pytest.approx(0.0, abs=1e-14)
 
 
-# A disk of unit speed hits one that lies on the floor: speeds after A-B, B-floor, A-B, ... until
+# A disk of unit speed strikes one that lies on the floor: speeds after A-B, B-floor, A-B, ... until
 # nothing closes in.
 ON_A_LYING_DISK = {0.8: (0.638, 0.0144), 0.5: (0.21875, 0.046875)}
 

@@ -117,7 +117,7 @@ LOADING = {
     "throws.py": (PY + "\n1 / 0\n", "ZeroDivisionError: division by zero (line 92, column 1)"),
     "memory_load.py": (
         "x = bytearray(10**10)\n",
-        "wants more memory than it is given while it is loaded",
+        "needs more memory than it may use while it is loaded",
     ),
     "exit.py": ("import sys\nsys.exit(3)\n", "ends the process (SystemExit: 3) (line 2, column 1)"),
     "kill.py": ("import os\nos._exit(3)\n", "ended its own process (exit status 3)"),
@@ -261,7 +261,7 @@ CALLS = {
     ),
     "memory.py": (
         within(PY, "integrate", "    x = [0] * 10**10"),
-        "wants more memory than it is given",
+        "needs more memory than it may use",
     ),
     "typo.py": (PY.replace("sphere.velocity.x +=", "sphere.velocty.x +="), "AttributeError"),
     "nan.py": (within(PY, "integrate", "    sphere.velocity.x = float('nan')"), "NaN"),

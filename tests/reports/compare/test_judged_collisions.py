@@ -105,7 +105,7 @@ def test_a_finer_step_judges_more_collisions():
     assert judged[0] < judged[-1]
 
 
-def test_where_there_is_no_collision_none_is_missed_but_one_may_be_invented():
+def test_where_there_is_no_collision_none_is_missed_but_one_may_be_spurious():
     """An engine that reports one in a near miss; the page counts it, and does not count what cannot
     be missed."""
     one, truth = truth_of("near_miss")

@@ -194,9 +194,7 @@ def test_every_metric_is_under_test():
     assert {*pd.concat(tables).metric} == {*METRICS}
     for metric in METRICS:
         values = np.concatenate([table[table.metric == metric].value for table in tables])
-        assert (np.isfinite(values) & (values != 0)).any() or metric == "disks_through_walls", (
-            metric
-        )
+        assert (np.isfinite(values) & (values != 0)).any() or metric == "disks_tunnelled", metric
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -234,8 +234,8 @@ def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
     one, truth = truth_of("box_billiard")
     away = replace(truth, position=truth.position + np.linspace(0, 50, len(truth))[:, None, None])
 
-    assert value("disks_through_walls", View(one, one.dt(1), truth)) == 0
-    assert value("disks_through_walls", View(one, one.dt(1), away)) == 1
+    assert value("disks_tunnelled", View(one, one.dt(1), truth)) == 0
+    assert value("disks_tunnelled", View(one, one.dt(1), away)) == 1
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
     still = np.zeros((len(heights), 1))
     moved = Trajectory(np.arange(len(heights)), position, 0 * position, still, still)
 
-    assert laws.through_walls(moved, scene).tolist() == [through]
+    assert laws.tunnelled(moved, scene).tolist() == [through]
 
 
 def test_an_explosion_does_not_make_itself_small():

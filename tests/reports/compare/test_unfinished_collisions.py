@@ -141,7 +141,7 @@ def test_a_disk_that_is_pressed_through_the_floor_has_no_restitution():
     view = View(one, run.dt, run.trajectory)
     found, overlap, through = (
         METRICS[metric].of(view)
-        for metric in ("restitution", "penetration_radii", "disks_through_walls")
+        for metric in ("restitution", "penetration_radii", "disks_tunnelled")
     )
 
     assert found is not None

@@ -262,8 +262,8 @@ def test_looking_at_every_step_near_an_edge_changes_no_bit(names: list[str]):
 
 
 def test_the_marker_names_the_first_collision():
-    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it parts at the first collision;
-    the oracle names it."""
+    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it diverges at the first
+    collision; the oracle names it."""
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]

@@ -436,7 +436,7 @@ def test_the_page_tells_its_frame_time(page: Page):
     fly(page, 30)
 
     assert re.search(
-        r"\d+ pictures a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text()
+        r"\d+ frames a second.* engines take \d+\.\d ms", page.locator("#pace").inner_text()
     )
 
 

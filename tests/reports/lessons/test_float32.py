@@ -15,9 +15,9 @@ from reports.lessons.mechanisms.planck import (
     LADDER,
     PROFILES,
     SCENES,
-    apart,
     kept,
     known,
+    largest_deviation,
     measured,
     recorded,
     run_of,
@@ -50,7 +50,7 @@ ROWS_OF_SUITES = (
 
 def box2d_alone(name: str, profile: str, substeps: int) -> dict[str, float | str | int]:
     """Its part of a row, for which no npm package is needed."""
-    error = apart(whole(run_of(BOX2D, profile, name, substeps)), known(name)[1], name)
+    error = largest_deviation(whole(run_of(BOX2D, profile, name, substeps)), known(name)[1], name)
     return {"scenario": name, "profile": profile, "substeps": substeps, "box2d_radii": error}
 
 
@@ -65,7 +65,7 @@ def test_box2d_gives_what_is_recorded_beside_planck(rows: list[tuple[str, str, i
 @pytest.mark.parametrize("rows", ROWS_OF_SUITES, ids=["some", "a quarter", "all"])
 def test_planck_gives_what_is_recorded(rows: list[tuple[str, str, int]]):
     """Its error, and its distance from Box2D."""
-    wrong = [row for row in rows if differing(measured(*row), ("planck_radii", "apart_radii"))]
+    wrong = [row for row in rows if differing(measured(*row), ("planck_radii", "deviation_radii"))]
     assert wrong == []
 
 

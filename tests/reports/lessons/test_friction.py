@@ -118,7 +118,7 @@ def of_states(*states: State) -> Trajectory:
     )
 
 
-def test_switching_the_order_moves_the_ablated_reference_onto_box2d():
+def test_a_change_of_the_order_moves_the_ablated_reference_onto_box2d():
     """From the exact answer, with one mechanism: restitution after friction."""
     off, on = CONE_PAGE.at((0, 1, 1)), CONE_PAGE.at((1, 1, 1))
 

@@ -1,5 +1,5 @@
 """The recorded numbers of lesson 6.11 are those that the JavaScript engines give, and what it says
-of matter is shown by switching it off."""
+of matter is shown by disabling it."""
 
 from __future__ import annotations
 

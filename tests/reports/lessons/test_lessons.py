@@ -218,7 +218,7 @@ def test_names_are_chosen_from_a_list_and_numbers_by_a_slider(browser: Browser, 
     prints as it is, and a page that is loaded again starts where its curves do."""
     page, heard = opened(browser, f"{url}/javascript", viewport={"width": 1280, "height": 900})
     page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
-    off = page.get_by_label("Switched off")
+    off = page.get_by_label("Disabled")
     off.focus()
     page.keyboard.press("ArrowDown")
     page.evaluate("lesson.ready")

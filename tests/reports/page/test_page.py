@@ -251,8 +251,8 @@ def test_the_page_says_what_its_counts_count(page: Page, comparisons: list[Compa
     runs = [run for comparison in comparisons for run in comparison.runs]
 
     assert f"through {len({run.name for run in runs})} engines" in lede
-    assert f"{len(runs)} cells here" in counts
-    assert f"once for each of its profiles, as {runs[0].name}." in counts
+    assert f"There are {len(runs)} cells" in counts
+    assert f"counts as one engine, for example {runs[0].name}." in counts
 
 
 def test_failed_and_refused_runs_are_in_sight(page: Page) -> None:

@@ -179,9 +179,9 @@ def test_the_section_opens_with_a_scene_that_tells_engines_apart():
     drawn = drawn_of(one)
 
     def priority(*shares: float, truth: bool = True) -> tuple[bool, int, bool, int]:
-        apart = {str(k): share for k, share in enumerate(shares)}
+        off_by = {str(k): share for k, share in enumerate(shares)}
         scene = one if truth else replace(one, truth=None)
-        return panels.priority(scene, replace(drawn, apart=apart), {})
+        return panels.priority(scene, replace(drawn, off_by=off_by), {})
 
     assert priority(0.0, 0.5, 0.0) > priority(0.0, 0.001, 0.0) == priority(0.5, 0.5, 0.5)
     assert priority(0.0, 0.0) > priority(0.5)

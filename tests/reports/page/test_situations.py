@@ -242,7 +242,7 @@ def test_one_scene_is_described_without_counts_of_scenes():
         "In a the matched settings take box2d farther from the exact answer."
     )
     assert findings.where_it_fails(engines, ["ok"]) == (
-        "More than a whole radius off, or without a result: box2d:matched; every cell was played"
+        "More than one radius off, or without a result: box2d:matched; every cell was played"
         " to its end."
     )
     assert findings.unranked_sentence("reference:ordered", off, situations.RIGHT, {}) == (
@@ -374,7 +374,7 @@ def test_the_table_of_the_page_is_that_of_the_scores(
     assert scene.startswith(SINGLE)
     assert rows[0][0] == best
     assert named.split() == [*f"{SINGLE}:".split(), best]
-    assert says.startswith("Nearest to the exact answer of the libraries, at a step of ")
+    assert says.startswith("The library nearest to the exact answer, at a step of ")
     assert "\u00a0ms:" in says
     assert "crosscheck advise my_scene.toml --error 1%" in says
     assert heard == []

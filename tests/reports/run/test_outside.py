@@ -176,14 +176,14 @@ def test_no_more_workers_are_started_than_the_machine_can_hold(
     assert affordable(1000) == 2
     assert (
         capsys.readouterr().err
-        == "1000 workers are more than can start here (memory of 1000 MB, of which each takes 400):"
-        " 2 do\n"
+        == "1000 workers are more than can start here (memory of 1000 MB, each needs 400):"
+        " 2 are started\n"
     )
     assert affordable(2) == 2
     assert capsys.readouterr().err == ""
     monkeypatch.setattr(runner.psutil, "virtual_memory", lambda: SimpleNamespace(total=10**12))
     assert affordable(1000) == 184
-    assert "limit of 1024 open files, of which each takes 5): 184 do" in capsys.readouterr().err
+    assert "limit of 1024 open files, each needs 5): 184 are started" in capsys.readouterr().err
 
 
 @pytest.mark.long
@@ -193,7 +193,7 @@ def test_a_thousand_workers_crash_nothing(tmp_path: Path):
     most = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 1_000_000 // LEAST_MEMORY
 
     assert done.returncode == 0, done.stderr
-    assert most >= 1000 or f"{most} do" in done.stderr
+    assert most >= 1000 or f"{most} are started" in done.stderr
     assert {record["status"] for record in Archive.read(tmp_path / "out").records} == {"ok"}
 
 

@@ -50,7 +50,7 @@ def test_a_finished_result_called_out_part_is_nobodys_interrupted_run(
 
     assert done.returncode == 2
     assert (
-        "out.part is needed while it is made, and holds a finished result; move that elsewhere"
+        "out.part is for unfinished results, but holds a finished one; move it elsewhere"
         in done.stderr
     )
     assert "interrupted" not in done.stderr
@@ -69,7 +69,7 @@ def test_the_finished_result_of_another_command_is_left_as_it_is_too(here: Path,
     done = crosscheck(*COMMANDS[name], cwd=here)
 
     assert done.returncode == 2
-    assert "holds a finished result" in done.stderr
+    assert "holds a finished one" in done.stderr
     assert all_of(here) == before
 
 

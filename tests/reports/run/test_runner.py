@@ -209,10 +209,7 @@ def test_no_engine_remembers_what_it_played(name: str):
         ("foo", "--scheduler foo: is no address; one is like tcp://192.168.0.7:8786"),
         (
             "tcp://foo:1",
-            (
-                "--scheduler tcp://foo:1: many machines take the package distributed, which is not"
-                " installed"
-            ),
+            ("--scheduler tcp://foo:1: it needs the package distributed, which is not installed"),
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""The error budget gives every cause its own, names what is left over, and closes."""
+"""The error budget gives every cause its own, names the residual, and closes."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def budgeted(
 
 
 def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
-    """What is left over is the bug to rounding, of every disk in every sample."""
+    """The residual is the bug to rounding, of every disk in every sample."""
     contributions, made = budgeted("oblique_e09", KNOWN)
     moving = made.at.scenario.scene.radius
 
@@ -95,7 +95,7 @@ def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
 
 
 def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
-    """Negative control: without the restitution rule in the list, what is left over is as large as
+    """Negative control: without the restitution rule in the list, the residual is as large as
     it and the bug."""
     known, _ = budgeted("oblique_e09", KNOWN)
     missed, _ = budgeted("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])

@@ -13,7 +13,7 @@ from reports.speed.ladder import scored
 
 
 def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:
-    """A table of scene, engine, until, horizon, error, what is left, note."""
+    """A table of scene, engine, until, horizon, error, residual, note."""
     return pd.DataFrame(
         [
             (scene, 0, engine, "own", 0.1, until, horizon, 9.0, error, left, note)

@@ -156,7 +156,7 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
         (["--engine", "bullet"], "engine 'bullet' is not known"),
         (
             ["slow_collision", "--engine", "../solvers/correct/plain.py"],
-            "a solver of the exercise is not driven to its limits: crosscheck check",
+            "it does not test a solver of the exercise: crosscheck check",
         ),
         (
             ["scenes/still.toml", "--vary", "mass_ratio"],
@@ -236,8 +236,8 @@ def test_the_page_says_what_its_counts_count(page: Page):
     """Profiles, engines with one thing changed, cases of its own and of the report."""
     counts = page.locator("#summary .small").inner_text()
 
-    assert "An engine is counted once for each of its profiles, as pymunk:matched." in counts
-    assert "2 engines are here" in counts
+    assert "Each profile of an engine counts as one engine, for example pymunk:matched." in counts
+    assert "This page has 2 engines" in counts
     assert f"{len(page.locator('section.scenario').all())} cases" in counts
 
 

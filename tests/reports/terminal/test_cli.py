@@ -349,7 +349,7 @@ def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: 
     done = crosscheck("report", "out", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert "two-disks is not the scene any more that was played" in done.stderr
+    assert "two-disks has changed since it was played" in done.stderr
 
 
 def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):
@@ -358,4 +358,4 @@ def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):
     done = [crosscheck(*SMALL, "--out", out, cwd=tmp_path / "a" / "b") for out in (".", "..", "/")]
 
     assert [one.returncode for one in done] == [2, 2, 2]
-    assert all("is where you are" in one.stderr for one in done)
+    assert all("is the current folder" in one.stderr for one in done)
