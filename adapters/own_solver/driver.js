@@ -26,7 +26,11 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     globalThis[name] = () => { throw new ReferenceError(name + " is not defined"); };
   }
   const quiet = () => undefined;
-  globalThis.console = { log: quiet, info: quiet, warn: quiet, error: quiet, debug: quiet, table: quiet, assert: quiet };
+  globalThis.console = {};
+  for (const name of ["log", "info", "warn", "error", "debug", "table", "assert", "clear", "count", "countReset", "dir",
+    "dirxml", "group", "groupCollapsed", "groupEnd", "time", "timeEnd", "timeLog", "timeStamp", "trace"]) {
+    globalThis.console[name] = quiet;
+  }
 
   let file;  // the solver's functions and globals, once it is loaded
   let world;  // the scene being played
@@ -182,6 +186,9 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
       }
       for (let k = 0; k < question.calls.length; k++) {
         const result = call(question.calls[k], spheres);
+        if (result && typeof result.next === "function") {
+          throw new TypeError(`a call of ${question.calls[k][0]} runs nothing: it is a function* or has a yield`);
+        }
         returned = returned || (typeof result === "object" && result !== null);
         if (question.world) spheres = everybody();  // a ufo that is set back may be a new object
         states += (k ? "," : "") + rows(spheres);

@@ -4,6 +4,7 @@ reference_impl."""
 from __future__ import annotations
 
 import random
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ from adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
 from adapters.system import TimeIsUp, stopped_after
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
+DECIMAL_COMMA = re.compile(r"=\s*\d+,\d+\s*$", re.MULTILINE)
 LOGGED = 400  # contacts kept for the check
 TRACED = 400  # accesses kept of a traced call
 
@@ -135,6 +137,8 @@ class PythonSolver:
             )
         if "for ^" in what:
             what += "; a power is written **"
+        elif "'tuple'" in what and DECIMAL_COMMA.search(self.solver.text):
+            what += "; a decimal number has a point, not a comma"
         elif isinstance(error, EOFError):
             what += "; input() is not available"
         if isinstance(error, SyntaxError) and error.filename == self.name:
@@ -201,7 +205,7 @@ class PythonSolver:
             "strayed": strayed,
             "strange": strange,
             "kept": [name for name, value in self.numbers().items() if before.get(name) != value],
-            "calls": calls,
+            "calls": list(calls),  # a later question adds to it
             "error": error,
         }
 

@@ -13,8 +13,8 @@ from scenarios.model import Array
 
 
 class PairCollision(NamedTuple):
-    """A pair before the call, m, m/s, kg: u = vA - vB, n from B to A, distance d, sum of sizes s;
-    shifts of A and B."""
+    """A pair before the call, SI: u = vA - vB, n from B to A, distance d, sum of sizes s; shifts of
+    A and B; sizes and MoI of both."""
 
     va: Array
     vb: Array
@@ -25,6 +25,8 @@ class PairCollision(NamedTuple):
     mb: float
     shift_a: Array
     shift_b: Array
+    sizes: tuple[float, float]
+    inertias: tuple[float, float]
 
     @property
     def u(self) -> Array:
@@ -46,8 +48,11 @@ def collision_of(balls: tuple[Ball, ...], after: list[Ball]) -> PairCollision:
     """The `PairCollision` of a pair, with its displacement."""
     a, b = balls
     n, d = direction(a, b)
-    shifts = (np.subtract(y.x, x.x) for x, y in zip(balls, after))
-    return PairCollision(np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, *shifts)
+    shift_a, shift_b = (np.subtract(y.x, x.x) for x, y in zip(balls, after))
+    sizes, inertias = (a.r, b.r), (a.MoI, b.MoI)
+    return PairCollision(
+        np.array(a.v), np.array(b.v), n, d, a.r + b.r, a.m, b.m, shift_a, shift_b, sizes, inertias
+    )
 
 
 Impulse = Callable[[PairCollision, float], Array]

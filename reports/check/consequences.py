@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from reports.check.functions import keeps_state
+from reports.check.impacts import ABSOLUTE_NORMAL
 from reports.check.impulse import UNALIKE
 from reports.check.rows import FOLLOWS, TASKS, UNKNOWN, CheckRow
 
@@ -36,6 +38,7 @@ SAME_MISTAKE = (
         "the size of B is used twice",
         UNALIKE,
     },
+    {"they are moved by the absolute values of the normal", ABSOLUTE_NORMAL},
     {"they are moved along x only", "the normal is taken along x"},
     {"they are moved along y only", "the normal is taken along y"},
     {
@@ -60,27 +63,46 @@ def with_consequences(rows: Sequence[CheckRow]) -> list[CheckRow]:
         if row.verdict == "fault" and row.cause not in (FOLLOWS, UNKNOWN):
             for cause in {row.cause}.union(*(same for same in SAME_MISTAKE if row.cause in same)):
                 first.setdefault(cause, row.task)
-    velocities_displaced = displaced_velocities(rows)
-    return [
-        followed(row, first, velocities_displaced) if row.verdict == "fault" else row
-        for row in rows
-    ]
+        if (row.name, row.verdict) == ("impulse", "fault"):
+            first[IMPULSE] = row.task
+    spoilt = spoilers(rows)
+    return [followed(row, first, spoilt) if row.verdict == "fault" else row for row in rows]
 
 
-def followed(row: CheckRow, first: dict[str, str], velocities_displaced: bool) -> CheckRow:
+def followed(row: CheckRow, first: dict[str, str], spoilt: dict[str, str]) -> CheckRow:
     """A fault, or a row that follows from another.
 
-    first: cause -> the first task that has it; velocities_displaced: the result of
-    `displaced_velocities`.
+    first: cause -> the first task that has it; spoilt: the result of `spoilers`.
     """
     if row.cause == FOLLOWS:
         return replace(row, verdict="follows")
     if (task := first.get(row.cause, row.task)) != row.task:
         return replace(row, verdict="follows", cause=f"it follows from the fault in {task}")
-    if velocities_displaced and row.task in ("2c", "2d") and row.cause.startswith(NOT_EXPLAINED):
-        cause = "it may follow from the fault in 2b, which changes the velocities, too"
-        return replace(row, verdict="follows", cause=cause)
+    if row.task in spoilt and row.cause.startswith(NOT_EXPLAINED):
+        return replace(row, verdict="follows", cause=spoilt[row.task])
+    if row.name == "restitution" and row.cause.startswith("the file has e = ") and IMPULSE in first:
+        return replace(row, verdict="follows", cause="it follows from the fault in the impulse")
     return row
+
+
+IMPULSE = "the impulse is wrong"  # a key of `first`, which is no cause
+
+
+def spoilers(rows: Iterable[CheckRow]) -> dict[str, str]:
+    """Task -> why a fault that nothing explains may follow from an explained one."""
+    rows = list(rows)
+    spoilt: dict[str, str] = {}
+    if displaced_velocities(rows):
+        spoilt |= dict.fromkeys(
+            ("2c", "2d"), "it may follow from the fault in 2b, which changes the velocities, too"
+        )
+    for row in rows:
+        if keeps_state([row]):
+            parts = ("1",) if row.task == "1" else ("2a", "2b", "2c", "2d")
+            spoilt |= dict.fromkeys(
+                parts, "it may follow from the value that is kept from one call to the next"
+            )
+    return spoilt
 
 
 def displaced_velocities(rows: Iterable[CheckRow]) -> bool:

@@ -11,6 +11,7 @@ from adapters.own_solver.restitution import code_of
 from reports.check.functions import failed_calls
 from reports.check.questions import QUESTIONS, Ball, Question, SolverAnswer, named
 from reports.check.rows import CheckRow, judged, near, shown
+from scenarios.model import Array
 
 Rule = Callable[[float, float, float, float], bool | None]
 
@@ -134,11 +135,7 @@ def reach(answers: dict[str, SolverAnswer], rules: Mapping[str, Rule]) -> CheckR
     wrong = [(q, was) for q, was in seen if was != RULES[""](*q)]
     if no_number(answers):
         cause = "the distance is not a number (a field that does not exist, a division by zero?)"
-    if cause is None and mixed_up(answers):
-        cause = (
-            "the distance is not that of the centres: positions are added, or their components"
-            " confused"
-        )
+    cause = cause or mixed_up(answers) or margin(seen)
     if not wrong:
         return judged(
             "overlap", "2a", ASKED, "the pairs that overlap", "the pairs that overlap", True
@@ -166,14 +163,52 @@ def no_number(answers: dict[str, SolverAnswer]) -> bool:
     return bool(reached) and not np.isfinite([[b.x for b in balls] for balls in reached]).any()
 
 
-def mixed_up(answers: dict[str, SolverAnswer]) -> bool:
-    """Whether the sum of the positions decides, as in a misprint of the lesson."""
-    for question, answer in named(answers, "reach/"):
-        a, b = question.balls
-        summed = float(np.hypot(*np.add(a.x, b.x)))
-        if (summed < a.r + b.r) != reacted(question, answer):
-            return False
-    return True
+# (position of A, position of B) -> a wrong vector between them
+MIXED: dict[str, Callable[[Array, Array], Array]] = {
+    "the positions are added, not subtracted": lambda a, b: a + b,
+    "dx is xA + xB": lambda a, b: a + b * [1, -1],
+    "dy is yA + yB": lambda a, b: a + b * [-1, 1],
+    "x and y of B are exchanged": lambda a, b: a - b[::-1],
+    "dx is xA - yB": lambda a, b: a - b[[1, 1]],
+    "dy is yA - xB": lambda a, b: a - b[[0, 0]],
+    "dx is xA - yA": lambda a, b: np.array([a[0] - a[1], a[1] - b[1]]),
+    "dy is xB - yB": lambda a, b: np.array([a[0] - b[0], b[0] - b[1]]),
+}
+
+
+def mixed_up(answers: dict[str, SolverAnswer]) -> str | None:
+    """The cause that the vector between the centres has the wrong terms; None if no vector of
+    `MIXED` gives the pairs that react."""
+    seen = [(q.balls, reacted(q, answer)) for q, answer in named(answers, "reach/")]
+    for name, vector in MIXED.items():
+        if all(
+            (np.hypot(*vector(np.array(a.x), np.array(b.x))) < a.r + b.r) == was
+            for (a, b), was in seen
+        ):
+            return f"the distance is not that of the centres: {name}"
+    return None
+
+
+def margin(seen: list[tuple[tuple[float, float, float, float], bool]]) -> str | None:
+    """The cause that a length is added to the sizes, or that they are multiplied by a factor, as
+    far as the distances asked tell it; None if neither gives the pairs that react."""
+    distances, sizes = (
+        np.array([np.hypot(x, y) for (x, y, _, _), _ in seen]),
+        np.array([a + b for (_, _, a, b), _ in seen]),
+    )
+    was = np.array([reacts for _, reacts in seen])
+    if was.all() or not was.any():
+        return None
+    far, near_by = (distances - sizes)[was].max(), (distances - sizes)[~was].min()
+    if far < near_by and far > 0:
+        return f"pairs with a gap of {shown(far)} m between them are taken to collide, too"
+    if far < near_by < 0:
+        return f"pairs that overlap by only {shown(-near_by)} m are not taken to collide"
+    largest, smallest = (distances / sizes)[was].max(), (distances / sizes)[~was].min()
+    if largest < smallest:
+        between = f"{shown(largest)} and {shown(smallest)}"
+        return f"the sum of the sizes is multiplied by a number between {between}"
+    return None
 
 
 def touch(answer: SolverAnswer) -> CheckRow:

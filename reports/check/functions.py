@@ -72,6 +72,7 @@ def same_again(
     if not mine:
         return []
     kept = {name for answer in mine.values() for name in answer.kept} or globals_changed(text)
+    kept = {name for name in kept if is_read(name, text)}
     where = f" in the global {min(kept)}" if len(kept) == 1 else ""
     return [
         judged(
@@ -97,6 +98,13 @@ def globals_changed(text: str) -> set[str]:
     own = {name for line in inside for name in re.findall(r"\b(?:let|var|const)\s+(\w+)", line)}
     changed = {name for line in inside for name in re.findall(rf"\b(\w+){CHANGED}", line)}
     return defined & changed - own - {"ufo", "asteroids"}
+
+
+def is_read(name: str, text: str) -> bool:
+    """Whether a file uses a variable elsewhere than where it is defined or changed, as far as its
+    text shows: one that only counts or collects affects no answer."""
+    changed_only = re.compile(rf"\b{name}{CHANGED}|\bglobal {name}\b")
+    return bool(re.search(rf"\b{name}\b", changed_only.sub("", code_of(text))))
 
 
 LONGEST = 200  # characters of a line that is searched
@@ -144,7 +152,7 @@ def why_unchanged(function: str, answers: Iterable[SolverAnswer]) -> str:
     strange = sorted({name for answer in answers for name in answer.strange})
     if strange:
         return f"{function} writes the field {strange[0]!r}, which a sphere does not have"
-    return f"not implemented: {function} does nothing"
+    return f"not implemented: {function} does nothing, or changes only copies"
 
 
 def arguments(task: str, function: str, answers: Iterable[SolverAnswer]) -> CheckRow:

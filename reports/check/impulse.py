@@ -12,9 +12,12 @@ from reports.check.collisions import PairCollision, changes, collision_of
 from reports.check.impacts import (
     IMPULSES,
     MASSLESS,
+    NEVER,
     SEPARATING,
+    SWAPPED,
     UPDATES,
     CollisionExplanation,
+    in_call,
     tangent,
 )
 from reports.check.questions import COLLISIONS, QUESTIONS, SolverAnswer, finite
@@ -35,6 +38,8 @@ class CollisionCase:
         impulse, update: the mistake in (c) and the one in (d); "" if none is known.
         opposite: whether A and B get opposite impulses in every collision: then J, right or wrong,
             is applied as in (d).
+        for_one: whether in every collision one of the spheres gets the right impulse: then J is
+            right, whatever the other gets.
     """
 
     pair: PairCollision
@@ -44,6 +49,7 @@ class CollisionCase:
     impulse: str
     update: str
     opposite: bool
+    for_one: bool
 
     @property
     def mistake(self) -> str:
@@ -61,7 +67,7 @@ class CollisionCase:
         (c)."""
         if self.found:
             return self.found.law(self.pair, self.found.e)
-        return self.received if self.opposite else self.right_impulse
+        return self.received if self.opposite and not self.for_one else self.right_impulse
 
     @property
     def change(self) -> Array:
@@ -76,13 +82,13 @@ class CollisionCase:
     @property
     def shown_impulse(self) -> Array:
         """J n as far as it is known, N s: a mistake in (d) changes the impulse on A."""
-        known = self.found is not None and self.found.impulse not in MASSLESS
+        known = self.right_c or (self.found is not None and self.found.impulse not in MASSLESS)
         return self.computed_impulse if known else self.received
 
     @property
     def right_c(self) -> bool:
         """Whether the impulse is known to be right."""
-        return self.found is not None and not self.found.impulse
+        return self.for_one if self.found is None else not self.found.impulse
 
     @property
     def right_d(self) -> bool:
@@ -98,23 +104,33 @@ def impulse_rows(
     """The rows of (c) and (d)."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), quantities_kept(answers)]
-    case = case_to_show(answers, restitution, found)
+    case, rest = case_to_show(answers, restitution, found), quantities_kept(answers)
+    if case.impulse == NEVER and rest.verdict == "fault":
+        rest = replace(rest, cause=f"the velocities never change: {rest.cause} instead")
+        case = replace(case, impulse=rest.cause)
+    apart = separating(answers, case)
     # the part whose mistake makes energy and restitution wrong
     spoilt = "2d" if case.right_c else "2c"
     return [
         normal_impulse(case),
         tangential_impulse(case),
         *([] if spoilt == "2d" else energy_rows(case, restitution, spoilt)),
-        restitution.speeds(case.mistake),
-        separating(answers, found, case.e),
+        in_task(restitution.speeds(case.mistake), spoilt),
+        *([] if apart.task == "2d" else [apart]),
         new_velocity(case, 0),
         new_velocity(case, 1),
         momentum(case),
+        *([apart] if apart.task == "2d" else []),
         # A mistake in (d) shows more clearly in the velocities than in the energy.
         *(energy_rows(case, restitution, spoilt) if spoilt == "2d" else []),
         symmetry(answers, case),
-        quantities_kept(answers),
+        rest,
     ]
+
+
+def in_task(row: CheckRow, task: str) -> CheckRow:
+    """A row, with its fault, if it is one, in this task."""
+    return replace(row, task=task) if row.verdict == "fault" else row
 
 
 def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
@@ -149,23 +165,39 @@ def case_to_show(
 ) -> CollisionCase:
     """The collision to show, with the mistakes in it."""
     e = found.e if found else restitution.own
-    wrong = [] if found else wrong_collisions(answers, e)
-    name = next(iter(wrong or COLLISIONS))
+    name = next(iter(wrong_collisions(answers, e) or COLLISIONS))
     balls, after = QUESTIONS[name].balls, answers[name].last
+    for_one = right_for_one(answers, e)
+    if found:
+        impulse, update = found.impulse, found.update if found.task == "2d" else ""
+    else:
+        known = partly(answers, e)
+        impulse, update = ("", known) if for_one else (known, "")
     return CollisionCase(
         collision_of(balls, after),
         np.array([b.v for b in after]),
         found,
         e,
-        restitution.mistake or (found.impulse if found else partly(answers, e)),
-        found.update if found and found.task == "2d" else "",
+        restitution.mistake or impulse,
+        update,
         opposite_impulses(answers),
+        for_one,
     )
+
+
+def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
+    """Whether in every collision A or B has the right velocity afterwards."""
+    for name in (*COLLISIONS, *SWAPPED):
+        pair, changed = in_call(QUESTIONS[name], answers[name])
+        right = UPDATES[""].change(pair, IMPULSES[""](pair, e), e)
+        if not any(near(one, wanted) for one, wanted in zip(changed, right)):
+            return False
+    return True
 
 
 def opposite_impulses(answers: dict[str, SolverAnswer]) -> bool:
     """Whether every pair keeps its momentum, whichever sphere is called A."""
-    for name in (*COLLISIONS, *map(swapped, COLLISIONS)):
+    for name in (*COLLISIONS, *SWAPPED):
         balls, (a, b) = QUESTIONS[name].balls, changes(QUESTIONS[name].balls, answers[name].last)
         if not near(balls[0].m * a, -balls[1].m * b):
             return False
@@ -350,11 +382,10 @@ def energy(collision: PairCollision, changed: Array) -> float:
     return float(collision.ma * va @ va + collision.mb * vb @ vb - before) / 2
 
 
-def separating(
-    answers: dict[str, SolverAnswer], found: CollisionExplanation | None, e: float
-) -> CheckRow:
+def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRow:
     """The row on pairs that move apart: no impulse, or that of the printed formula; the choice is
     free."""
+    found, e = case.found, case.e
     asked = "Which impulse acts on a pair that overlaps and moves apart?"
     expected = "none, or that of the formula"
     seen = [
@@ -374,11 +405,12 @@ def separating(
     if all(near(change(h, law(h, e), e), changed, 0.1) for h, changed in seen):
         said = "as the formula is printed, pairs that move apart get an impulse, too"
         return chosen("that of the formula", said)
-    got = f"A is changed by {shown(seen[0][1][0])} m/s"
+    got = "A is changed by {} m/s, B by {} m/s".format(*map(shown, seen[0][1]))
     cause = found.mistake if found else ""
     if all(near(change(h, -law(h, e), e), changed, 0.1) for h, changed in seen):
         cause = ABSOLUTE
-    return judged("separating", "2c", asked, got, expected, False, cause)
+    task = "2d" if case.right_c and not case.right_d else "2c"
+    return judged("separating", task, asked, got, expected, False, cause)
 
 
 ABSOLUTE = (

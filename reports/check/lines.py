@@ -46,6 +46,7 @@ ONE_PLACE = "in one of its two places"
 AFTER = "after the displacement"
 NO_MASSES = "the masses are missing"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
+DECIDES = re.compile(r"compar|taken to collide")
 GUARD = re.compile(r"==\s*0\b")  # two at the same place
 HEAD_OF_LOOP = re.compile(r"\b(?:for|while|do|forEach|map)\b")
 BRANCH = re.compile(r"\bif\b.*[<>]|[<>].*\?")  # on the order of two numbers
@@ -155,6 +156,8 @@ class Source:
         if named := named_line(row.cause, self.text):
             # What performSimStep calls fails by what it is called with: that is at its loops.
             numbers = [named[0][0], *(self.loops() if row.task == "loop" else [])]
+        elif row.name == "box":
+            numbers = self.assignment_lines(re.findall(r"\bm(?:in|ax)[XY]\b", row.got))
         elif row.task == "loop":
             numbers = self.calls(row.name)
         elif "does not come back" in row.cause:
@@ -180,7 +183,7 @@ class Source:
             sizes = detection_lines(seen)
             if row.cause == UNKNOWN:
                 return [*distance_lines(seen), *sizes, *self.branches(sizes)]
-            return [*made, *sizes, *(self.branches(sizes) if "compar" in row.cause else [])]
+            return [*made, *sizes, *(self.branches(sizes) if DECIDES.search(row.cause) else [])]
         if row.task == "2b":
             return made or displacement_lines(seen, row.cause)
         if row.task == "2c" and SIGN_OF_J in row.cause:

@@ -14,6 +14,7 @@ from reports.check.questions import (
     Ball,
     Question,
     SolverAnswer,
+    ask,
     ask_in_two_orders,
     fresh_world,
 )
@@ -43,19 +44,35 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
         return [no_scene]
     asked = worlds(len(start), has["wrap"])
     answers, _ = ask_in_two_orders(process, asked)
+    if has["wrap"]:  # a step may change the edges of the box
+        answers |= ask(process, {"edges": asked["edges"]}, afresh=True)
     if failed := next((answer.failed for answer in answers.values() if answer.failed), None):
         cause = FOLLOWS if faulty else f"performSimStep: {failed}"
         return [
             judged("step", "loop", "Does performSimStep return?", "it fails", "yes", False, cause)
         ]
-    rows = (
-        [not_asked("all spheres", "loop", "the functions that the step calls have faults")]
-        if faulty
-        else step_rows(asked, answers)
-    )
+    kept = {name for answer in answers.values() for name in answer.kept}
+    resized = [name for name in BOX if name in kept]
+    if resized:
+        rows = [box(resized), not_asked("all spheres", "loop", "the step changes the box")]
+    elif faulty:
+        rows = call_rows(asked, answers, len(start))
+    else:
+        rows = step_rows(asked, answers)
     if has["wrap"]:
         rows += edges(asked["edges"], answers["edges"], start, process.surface == "exercise")
     return rows
+
+
+BOX = ("minX", "maxX", "minY", "maxY")
+
+
+def box(changed: list[str]) -> CheckRow:
+    """The fault that a step changes the edges of the box."""
+    names = " and ".join(changed)
+    asked = "Does a step leave minX, maxX, minY and maxY as they are?"
+    cause = f"a step changes {names}: projectObjects then moves spheres at other edges"
+    return judged("box", "loop", asked, f"changes {names}", "yes", False, cause)
 
 
 def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None]:
@@ -79,9 +96,9 @@ def step_rows(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> l
     itself = against_itself(asked["free"], answers)
     if itself and itself.verdict == "fault":
         return [itself, not_asked("all spheres", "loop", "a sphere collides with itself")]
-    met = pairs(asked, answers)
-    rows = [integrated(asked["free"], answers), met, *([itself] if itself else [])]
-    if met.verdict == "right":
+    moved, met = integrated(asked["free"], answers), pairs(asked, answers)
+    rows = [moved, met, *([itself] if itself else [])]
+    if moved.verdict == met.verdict == "right":
         rows.append(integration_first(asked, answers))
     if "edges in a step" in answers:
         rows.append(
@@ -108,6 +125,9 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
     ):
         if 0 <= i < j < n:
             found[f"pair {i} {j}"] = Question(put(plain, i, A, j, B), step, world=True)
+            a, b = A._replace(v=(0.0, 0.0)), B._replace(v=(0.0, 0.0))
+            resting = put(plain, i, a, j, b)
+            found[f"calls for {i} {j}"] = Question(resting, step, world=True, watch=True)
     for i, j in ((0, 1), (1, 2)):
         found[f"about to meet {i} {j}"] = Question(put(plain, i, LEFT, j, RIGHT), step, world=True)
     if wraps:
@@ -116,8 +136,8 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
             spheres[k + 1] = plain[k + 1]._replace(x=place, v=(0.2, 0.3))
         spheres[0] = plain[0]._replace(x=(5.4, 0.5))
         found["edges"] = Question(tuple(spheres), (("wrap",),), world=True)
-        resting = tuple(b._replace(v=(0.0, 0.0)) for b in spheres)
-        found["edges in a step"] = Question(resting, step, world=True)
+        still = tuple(b._replace(v=(0.0, 0.0)) for b in spheres)
+        found["edges in a step"] = Question(still, step, world=True)
     return found
 
 
@@ -134,6 +154,77 @@ def parked(n: int) -> tuple[Ball, ...]:
         Ball((float(x[k % columns]), y[k // columns]), m=1.0, r=min(0.05, 2.0 / columns))
         for k in range(n)
     )
+
+
+def call_rows(
+    asked: dict[str, Question], answers: dict[str, SolverAnswer], n: int
+) -> list[CheckRow]:
+    """The rows of a step whose functions have faults: for `n` spheres only its calls can be judged.
+    A row says so if they cannot be recorded."""
+    calls = answers["watched"].calls
+    counts = [sum(call[:2] == ("integrate", k) for call in calls) for k in range(n)]
+    met = collided(answers["watched"])
+    if not any(counts) or not met:
+        return [not_asked("all spheres", "loop", FAULTY)]
+    wrong = next((k for k in range(n) if counts[k] != 1), None)
+    # A step may leave out pairs that are far apart: these overlap.
+    missed = next(
+        (
+            pair
+            for name, answer in answers.items()
+            if name.startswith("calls for")
+            for pair in [tuple(map(int, name.split()[-2:]))]
+            if frozenset(pair) not in met | collided(answer)
+        ),
+        None,
+    )
+    got = "yes" if wrong is None else f"{name_of(wrong)}: {counts[wrong]} times"
+    rows = [
+        not_asked("integration first", "loop", FAULTY),
+        judged(
+            "all spheres",
+            "loop",
+            "Does a step integrate every sphere once?",
+            got,
+            "yes",
+            wrong is None,
+            LEAVES_SPHERES_OUT
+            if wrong is None or not counts[wrong]
+            else f"performSimStep integrates {name_of(wrong)} {counts[wrong]} times",
+        ),
+        judged(
+            "pairs",
+            "loop",
+            "Does a step let every pair collide, the ufo with each asteroid too?",
+            f"no call for {name_of(*missed)}" if missed else "yes",
+            "yes",
+            missed is None,
+            LEAVES_PAIRS_OUT,
+        ),
+    ]
+    if "edges in a step" in asked:
+        # The call of a function that is a constant cannot be recorded, only what it does.
+        wrapped = any(call[0] == "wrap" for call in calls)
+        wrapped = wrapped or not stayed(asked["edges in a step"], answers["edges in a step"])
+        question, got = "Does a step call projectObjects?", "yes" if wrapped else "no"
+        rows.append(judged("edges in a step", "loop", question, got, "yes", wrapped, NOT_WRAPPED))
+    return rows
+
+
+def stayed(question: Question, answer: SolverAnswer) -> bool:
+    """Whether all spheres are where they were."""
+    return all(near(b.x, a.x) for b, a in zip(question.balls, answer.last))
+
+
+def collided(answer: SolverAnswer) -> set[frozenset[int]]:
+    """The pairs that a step gives to the collision function, in either order."""
+    return {frozenset(call[1:]) for call in answer.calls if call[0] == "collide"}
+
+
+FAULTY = "the functions that the step calls have faults"
+LEAVES_SPHERES_OUT = "a loop of performSimStep leaves spheres out"
+LEAVES_PAIRS_OUT = "a loop of performSimStep leaves pairs out"
+NOT_WRAPPED = "performSimStep does not call projectObjects"
 
 
 def integrated(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow:
@@ -159,7 +250,7 @@ def integration_cause(k: int, before: Ball, after: Ball, watched: SolverAnswer) 
     """The likely cause if a step does not integrate sphere `k` exactly once."""
     steps = [call[2] for call in watched.calls if call[:2] == ("integrate", k)]
     if near(after.v, before.v):
-        return "a loop of performSimStep leaves spheres out"
+        return LEAVES_SPHERES_OUT
     if len(steps) > 1:
         return f"performSimStep integrates {name_of(k)} {len(steps)} times"
     if steps and not near(steps[0], DT):
@@ -212,9 +303,7 @@ def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> Check
         else "yes"
     )
     cause = (
-        "a loop of performSimStep leaves pairs out"
-        if silent
-        else "performSimStep lets spheres collide that do not overlap"
+        LEAVES_PAIRS_OUT if silent else "performSimStep lets spheres collide that do not overlap"
     )
     return judged(
         "pairs",
@@ -259,7 +348,6 @@ def wrapping(question: Question, answer: SolverAnswer, alone: SolverAnswer) -> C
     expected = (
         f"at {shown(alone.last[wrong[0]].x)} m, where projectObjects puts it" if wrong else "yes"
     )
-    stayed = all(near(a.x, b.x) for b, a in zip(question.balls, answer.last))
     return judged(
         "edges in a step",
         "loop",
@@ -267,7 +355,7 @@ def wrapping(question: Question, answer: SolverAnswer, alone: SolverAnswer) -> C
         got,
         expected,
         not wrong,
-        "performSimStep does not call projectObjects" if stayed else "",
+        NOT_WRAPPED if stayed(question, answer) else "",
     )
 
 

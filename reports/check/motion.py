@@ -6,6 +6,7 @@ Wanner, Geometric Numerical Integration, I.1).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -56,11 +57,12 @@ UNDER_FORCE: dict[str, Law] = {
     "it is converted to radians, though it is in radians already": lambda v, f, m, _o, dt: (
         v + np.radians(f / m * dt)
     ),
-    "a step of 0.001 s is written into the file and used instead of dt": lambda v, f, m, _o, _dt: (
-        v + f / m * 0.001
-    ),
     "dt is divided by 1000, though it is in seconds already": lambda v, f, m, _o, dt: (
         v + f / m * dt / 1000
+    ),
+    "y is computed from x": lambda v, f, m, _o, dt: taken(v, 0) + f / m * dt,
+    "y is computed from the new x": lambda v, f, m, _o, dt: (
+        taken(v, 0) + (f + taken(f, 0) * Y[: np.size(f)]) / m * dt
     ),
 }
 # the same for a torque, with the size as a sixth argument
@@ -77,6 +79,9 @@ UNDER_TORQUE: dict[str, Law] = {
         w + t / (m * r * r / 2) * dt
     ),
     "mass size2 is used instead of the {mass}": lambda w, t, _i, m, dt, r: w + t / (m * r * r) * dt,
+    "pi / 2 size4 is used instead of the sphere's own {mass}": lambda w, t, _i, _m, dt, r: (
+        w + t / (np.pi / 2 * r**4) * dt
+    ),
 }
 # (x or alpha, v or w before, the same after, acceleration by the right formula, dt) -> x' or alpha'
 MOVED: dict[str, Law] = {
@@ -104,6 +109,7 @@ MOVED: dict[str, Law] = {
     "x is moved by both parts of the velocity, y by none": lambda x, _v, new, _a, dt: (
         x + X[: np.size(x)] * new.sum() * dt
     ),
+    "it is moved by a dt2 alone": lambda x, _v, _n, a, dt: x + a * dt * dt,
     "it is moved by a dt2 / 2 alone": lambda x, _v, _n, a, dt: x + a * dt * dt / 2,
     "it is set to {velocity} times dt, which must be added": lambda x, _v, new, _a, dt: (
         new * dt + 0 * x
@@ -114,13 +120,23 @@ MOVED: dict[str, Law] = {
     "it is converted to radians, though it is in radians already": lambda x, _v, new, _a, dt: (
         x + np.radians(new * dt)
     ),
-    "a step of 0.001 s is written into the file and used instead of dt": (
-        lambda x, _v, new, _a, _dt: x + new * 0.001
+    "y is computed from x": lambda x, _v, new, _a, dt: taken(x, 0) + new * dt,
+    "y is computed from the new x": lambda x, _v, new, _a, dt: (
+        taken(x, 0) + (new + taken(new, 0) * Y[: np.size(x)]) * dt
     ),
     "dt is divided by 1000, though it is in seconds already": lambda x, _v, new, _a, dt: (
         x + new * dt / 1000
     ),
     "the old {velocity} is converted to degrees": lambda x, v, _n, _a, dt: x + np.degrees(v * dt),
+}
+# the same with the mass or MoI as a sixth argument
+MOVED_BY_MASS: dict[str, Law] = {
+    name: (lambda *given, law=law: law(*given[:5])) for name, law in MOVED.items()
+} | {
+    "the {velocity} is divided by the {mass} once more": lambda x, _v, new, _a, dt, m: (
+        x + new / m * dt
+    ),
+    "the {velocity} is multiplied by the {mass}": lambda x, _v, new, _a, dt, m: x + new * m * dt,
 }
 
 
@@ -134,10 +150,12 @@ def motion_rows(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     angular = [(np.array(b.w), np.array(b.torque), b.MoI, b.m, dt, b.r) for b, dt, _ in seen]
     # The positions are judged with the file's own velocities, so that one mistake counts once.
     places = [
-        (np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt) for b, dt, a in seen
+        (np.array(b.x), np.array(b.v), np.array(a.v), np.array(b.F) / b.m, dt, b.m)
+        for b, dt, a in seen
     ]
     angles = [
-        (np.array(b.alpha), np.array(b.w), np.array(a.w), b.torque / b.MoI, dt) for b, dt, a in seen
+        (np.array(b.alpha), np.array(b.w), np.array(a.w), b.torque / b.MoI, dt, b.MoI)
+        for b, dt, a in seen
     ]
     after = [a for _, _, a in seen]
     velocity = law_row(
@@ -162,10 +180,10 @@ def motion_rows(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
         "angle",
         "What is the angle of a sphere after that step, by its new angular velocity?",
         "rad",
-        MOVED,
+        MOVED_BY_MASS,
         angles,
         [a.alpha for a in after],
-        {"velocity": "angular velocity"},
+        {"velocity": "angular velocity", "mass": "MoI"},
     )
     return [
         velocity,
@@ -173,10 +191,10 @@ def motion_rows(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
             "position",
             "Where is a sphere after that step, by its new velocity?",
             "m",
-            MOVED,
+            MOVED_BY_MASS,
             places,
             [a.x for a in after],
-            {"velocity": "velocity"},
+            {"velocity": "velocity", "mass": "mass"},
         ),
         spin,
         angle,
@@ -202,10 +220,16 @@ def law_row(
         right = np.asarray(laws[""](*given[0]), float)
     if not np.isfinite(right).all():  # it is judged by the file's own velocity
         return not_asked(name, "1", f"the {words['velocity']} is not a number")
+    if found != "" and laws is MOVED_BY_MASS and moved_rightly(given, answers):
+        found = ""
     if found is None and name in ("velocity", "spin"):
         found = damped(given, answers)
+    if found is None:
+        found = fixed_step(laws[""], given, answers)
     if found is None and np.ndim(answers[0]):
-        found = one_axis(laws, given, answers)
+        found = one_axis(laws, given, answers) or limited(laws[""], given, answers)
+    if found is None:
+        found = multiplied(laws[""], given, answers)
     cause = (found or "").format(**words)
     if name == "spin":
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
@@ -220,6 +244,54 @@ def law_row(
         found == "",
         cause,
     )
+
+
+def moved_rightly(given: list[tuple[Any, ...]], answers: list[Any]) -> bool:
+    """Whether places or angles are those of the right velocity, which the file then computes but
+    does not keep: that is one mistake, and not in the place."""
+    wanted = [x + (old + a * dt) * dt for x, old, _, a, dt, _ in given]
+    return all(near(answer, place, 0.1) for answer, place in zip(answers, wanted))
+
+
+def ratio(
+    law: Law, given: list[tuple[Any, ...]], answers: list[Any], per: Callable[[Any], Any]
+) -> float | None:
+    """The factor between the change in every answer and `per` of the question times the right
+    change; None if it is not the same everywhere."""
+    changed = [np.asarray(answer, float) - q[0] for q, answer in zip(given, answers)]
+    wanted = [(np.asarray(law(*q), float) - q[0]) * per(q) for q in given]
+    one, other = (np.concatenate([np.atleast_1d(x) for x in both]) for both in (changed, wanted))
+    factor = float(one @ other / (other @ other))
+    return factor if near(one, factor * other, 0.01) else None
+
+
+def fixed_step(law: Law, given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:
+    """The cause that one step size, in words, is used for every dt that is asked; else None."""
+    step = ratio(law, given, answers, lambda question: 1 / question[4])
+    if step is None:
+        return None
+    return f"a step of {shown(step)} s is written into the file and used instead of dt"
+
+
+def multiplied(law: Law, given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:
+    """The cause that the change is the right one times a factor, in words; else None."""
+    factor = ratio(law, given, answers, lambda question: 1.0)
+    return None if factor is None else f"the change is {shown(factor)} times the right one"
+
+
+def limited(law: Law, given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:
+    """The cause that no component, or no vector, may exceed a limit, in words; else None."""
+    wanted = np.array([law(*question) for question in given], float)
+    reached = np.array(answers, float)
+    largest, longest = np.abs(reached).max(), np.hypot(*reached.T).max()
+    shortened = np.minimum(1.0, longest / np.hypot(*wanted.T))[:, None] * wanted
+    for limit, clamped in (
+        (largest, np.clip(wanted, -largest, largest)),
+        (longest, shortened),
+    ):
+        if near(reached, clamped):
+            return f"it is limited to {shown(limit)}: the exercise has no limit"
+    return None
 
 
 def one_axis(laws: dict[str, Law], given: list[tuple[Any, ...]], answers: list[Any]) -> str | None:

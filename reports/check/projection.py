@@ -8,7 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.own_solver.restitution import EXERCISE
-from reports.check.impacts import BACKWARDS, HALF_TURNED, CollisionExplanation
+from reports.check.collisions import changes
+from reports.check.impacts import (
+    BACKWARDS,
+    HALF_TURNED,
+    NORMAL_IN_DEGREES,
+    CollisionExplanation,
+    in_degrees,
+)
 from reports.check.questions import COLLISIONS, QUESTIONS, Ball, SolverAnswer, direction, finite
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -90,7 +97,8 @@ def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
     return Shift(float(da @ n), float(-(db @ n)), across, a.r + b.r - distance, distance, a.r + b.r)
 
 
-DISPLACED = ("at rest to each other", "separate", *COLLISIONS)  # the questions that (b) needs
+AT_REST = ("at rest to each other", "at rest, other velocity")
+DISPLACED = (*AT_REST, "separate", *COLLISIONS)  # the questions that (b) needs
 TAKEN_TO_BE_APART = "the file takes the overlapping pairs of these questions not to collide"
 
 
@@ -127,6 +135,11 @@ def displaced(before: tuple[Ball, ...], answer: SolverAnswer) -> bool:
     return bool(moved.all()) or in_one_point(shift)
 
 
+def distance_of(balls: list[Ball]) -> float:
+    """The distance of the centres of a pair, m."""
+    return float(np.hypot(*np.subtract(balls[0].x, balls[1].x)))
+
+
 def in_one_point(shift: Shift) -> bool:
     """Whether two overlapping spheres touch after their displacement along the normal."""
     return near(shift.a + shift.b, shift.overlap, 0.1) and near(shift.across, 0.0, 0.1)
@@ -140,11 +153,12 @@ def projection_rows(
         (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
         for name, q in COLLISIONS.items()
     ]
-    met = [in_one_point(shift) for _, shift, _ in seen]
+    met = [near(distance_of(after), shift.sizes, 0.1) for _, shift, after in seen]
     balls, shift, after = seen[met.index(False) if False in met else 0]
-    distance = float(np.hypot(*np.subtract(after[0].x, after[1].x)))
+    distance = distance_of(after)
     along = all(near(s.across, 0.0, 0.1) for _, s, _ in seen)
     backwards = found is not None and found.impulse == BACKWARDS
+    instead = displaced_velocity(answers) == INSTEAD
     explained = found is not None and bool(found.mistake) and found.task != "2b"
     rows = [
         judged(
@@ -154,7 +168,7 @@ def projection_rows(
             f"centres {shown(distance)} m apart",
             f"{shown(shift.sizes)} m, the sum of their sizes",
             all(met),
-            "" if all(met) else BACKWARDS if backwards else total_cause(seen),
+            INSTEAD if instead else BACKWARDS if backwards else total_cause(seen),
         ),
         judged(
             "normal",
@@ -163,45 +177,59 @@ def projection_rows(
             f"moved {shown(shift.across)} m across the line of their centres",
             "0 m across it",
             along,
-            no_numbers(seen) or across_cause(seen),
+            no_numbers(seen) or across_cause(seen) or placed(seen),
         ),
         (
             split(balls, shift)
-            if all(met)
-            else not_asked("shares", "2b", "they do not meet in one point")
+            if all(met) and along
+            else not_asked("shares", "2b", "they are not moved along n until they meet")
         ),
     ]
     return [*rows, *at_rest(answers, explained), separation(answers["separate"])]
 
 
 def at_rest(answers: dict[str, SolverAnswer], explained: bool) -> list[CheckRow]:
-    """The row on a pair at relative rest, whose displacement must not change a velocity. None if a
-    mistake in the impulse explains the change, or velocities are not numbers."""
+    """The row on a pair at relative rest, whose displacement must not change a velocity, and one in
+    (d) if something else changes it. None if a mistake in the impulse explains the change, or
+    velocities are not numbers."""
     still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
     if not kept and answers["at rest to each other"].failed:
         return [not_asked("velocities", "2b", "the call fails after it has changed velocities")]
-    numbers = bool(np.isfinite([b.v for b in after]).all())
     if not kept and (explained or not finite(answers, "v")):
         return []
-    return [
-        judged(
-            "velocities",
-            "2b" if numbers else "2c",
-            "Is a pair at relative rest displaced without a change of velocity?",
-            shown(after[0].v) + " m/s",
-            shown(still[0].v) + " m/s",
-            kept,
-            (
-                "the displacement changes the velocity, too"
-                if numbers
-                else (
-                    "the velocities of a pair at relative rest become NaN or infinite (a division"
-                    " by zero?)"
-                )
-            ),
-        )
-    ]
+    task, cause = "2b", displaced_velocity(answers)
+    if not np.isfinite([b.v for b in after]).all():
+        task, cause = "2c", NOT_FINITE
+    asked = "Is a pair at relative rest displaced without a change of velocity?"
+    got, expected = shown(after[0].v) + " m/s", shown(still[0].v) + " m/s"
+    if not kept and not cause:
+        question = "Does a pair at relative rest keep its velocities?"
+        return [
+            judged("velocities", "2b", asked, "yes", "yes", True),
+            judged("at rest", "2d", question, got, expected, False, WITHOUT_IMPULSE),
+        ]
+    return [judged("velocities", task, asked, got, expected, kept, cause)]
+
+
+NOT_FINITE = (
+    "the velocities of a pair at relative rest become NaN or infinite (a division by zero?)"
+)
+WITHOUT_IMPULSE = "a pair that needs no impulse does not keep its velocities"
+INSTEAD = "the displacement changes the velocity instead of the position"
+
+
+def displaced_velocity(answers: dict[str, SolverAnswer]) -> str:
+    """The cause that the displacement changes velocities, too, or only these; "" if it does not.
+
+    Only then a pair at relative rest gets the same change whatever its velocity is.
+    """
+    before, after = QUESTIONS[AT_REST[0]].balls, answers[AT_REST[0]].last
+    one, other = (changes(QUESTIONS[name].balls, answers[name].last) for name in AT_REST)
+    if near(one, 0.0) or not near(one, other):
+        return ""
+    placed_as_before = all(near(x.x, y.x) for x, y in zip(before, after))
+    return INSTEAD if placed_as_before else "the displacement changes the velocity, too"
 
 
 Pairs = list[tuple[tuple[Ball, ...], Shift, list[Ball]]]
@@ -211,7 +239,7 @@ call."""
 
 def total_cause(seen: Pairs) -> str:
     """The mistake that explains the displacement of all pairs; "" if none does."""
-    mistakes = (no_numbers, half_of_one, b_as_a, across_cause, wrong_total)
+    mistakes = (no_numbers, half_of_one, b_as_a, across_cause, wrong_total, partial, rest_left)
     return next((cause for mistake in mistakes if (cause := mistake(seen))), "")
 
 
@@ -249,6 +277,47 @@ def wrong_total(seen: Pairs) -> str:
     return ""
 
 
+def partial(seen: Pairs) -> str:
+    """The cause that the displacement is a multiple of the overlap; else ""."""
+    factor = (seen[0][1].a + seen[0][1].b) / seen[0][1].overlap
+    if not all(near(s.a + s.b, factor * s.overlap, 0.1) for _, s, _ in seen):
+        return ""
+    if all(near(min(s.a, s.b), s.overlap / 4, 0.1) for _, s, _ in seen) and near(factor, 0.75):
+        return "the overlap is computed again after the first sphere has been moved"
+    return f"they are moved by {shown(factor)} times the overlap"
+
+
+def rest_left(seen: Pairs) -> str:
+    """The cause that a constant part of the overlap is not corrected; else ""."""
+    rest = seen[0][1].overlap - (seen[0][1].a + seen[0][1].b)
+    if rest > 0 and all(near(s.a + s.b, s.overlap - rest, 0.1) for _, s, _ in seen):
+        return f"{shown(rest)} m of the overlap is left"
+    return ""
+
+
+# n -> the direction from A to B in which a mistake would place B
+DIRECTIONS: dict[str, Callable[[Array], Array]] = {
+    "x and y of the normal are exchanged": lambda n: -n[::-1],
+    "one part of the normal has the wrong sign": lambda n: n * [1, -1],
+    "one part of the normal has the wrong sign (y)": lambda n: n * [-1, 1],
+    NORMAL_IN_DEGREES: lambda n: -in_degrees(n),
+    f"{NORMAL_IN_DEGREES} (n from A to B)": lambda n: in_degrees(-n),
+    "the normal has the wrong direction": lambda n: n,
+}
+
+
+def placed(seen: Pairs) -> str:
+    """The cause that one sphere is placed at the right distance from the other in a wrong, known
+    direction; else ""."""
+    for name, direction_of in DIRECTIONS.items():
+        if all(
+            near(np.subtract(after[1].x, after[0].x), s.sizes * direction_of(direction(*b)[0]), 0.1)
+            for b, s, after in seen
+        ):
+            return name.removesuffix(" (y)")
+    return ""
+
+
 # (n, A or B before, the other) -> the direction in which a mistake would move it
 WAYS: dict[str, Callable[[Array, Ball, Ball], Array]] = {
     "along x only": lambda n, one, other: np.array([1.0, 0.0]),
@@ -257,6 +326,8 @@ WAYS: dict[str, Callable[[Array, Ball, Ball], Array]] = {
     "by the x part of the normal in x and in y": lambda n, one, other: np.ones(2) * n[0],
     "by the y part of the normal in x and in y": lambda n, one, other: np.ones(2) * n[1],
     "along their relative velocity": lambda n, one, other: np.subtract(one.v, other.v),
+    "along its own velocity": lambda n, one, other: np.array(one.v),
+    "by the absolute values of the normal": lambda n, one, other: np.abs(n),
     "along the tangent": lambda n, one, other: np.array([-n[1], n[0]]),
     "with x and y of the normal exchanged": lambda n, one, other: n[::-1],
     "along the sum of their positions": lambda n, one, other: np.add(one.x, other.x),
@@ -268,7 +339,8 @@ def across_cause(seen: Pairs) -> str:
     """The cause that one or both are moved in another known direction; else ""."""
     moved = [way_of([(b[who], b[1 - who], after[who]) for b, _, after in seen]) for who in (0, 1)]
     if moved[0] == moved[1]:
-        return f"they are moved {moved[0]}" if moved[0] else ""
+        who = "each is" if moved[0] and "its own" in moved[0] else "they are"
+        return f"{who} moved {moved[0]}" if moved[0] else ""
     parts = (
         f"{who}.{way}" if "is set" in way else f"{who} is moved {way}"
         for who, way in zip("AB", moved)

@@ -178,6 +178,7 @@ def questions() -> dict[str, Question]:
         "turned back": forced(0.1, F=(0.0, 0.0), torque=0.0, alpha=-3.1, w=-2.0),
         "touch": pair(Ball((0.0, 0.0), (1.0, 0.0), r=0.25), Ball((0.75, 0.0), (-1.0, 0.0), r=0.5)),
         "at rest to each other": meeting((1.3, 5.1), (0.3, 0.2), (0.3, 0.2), 0.5),
+        "at rest, other velocity": meeting((1.3, 5.1), (-0.7, 0.4), (-0.7, 0.4), 0.5),
         "separate": meeting((1.3, 5.1), (-1.1, 0.2), (0.7, 0.4), 0.5),
         "separate, other numbers": meeting((2.2, 1.7), (-0.3, -0.9), (0.2, 1.1), 1.3),
         "slow": head_on(2e-3),
@@ -234,6 +235,13 @@ def fresh_world(process: SolverProcess) -> list[Request]:
     return [("renew", None, LOADING), *begin]
 
 
+def renew(process: SolverProcess) -> None:
+    """Begin a fresh world. Raises `SolverFailed` if the file cannot be loaded again."""
+    loaded, *_ = process.request(fresh_world(process))
+    if isinstance(loaded, SolverFailed):
+        raise SolverFailed(loaded.kind, f"it can be loaded only once: {loaded}")
+
+
 def ask_in_two_orders(
     process: SolverProcess, asked: dict[str, Question]
 ) -> tuple[dict[str, SolverAnswer], dict[str, SolverAnswer]]:
@@ -244,11 +252,11 @@ def ask_in_two_orders(
     in a second one. If the answers agree, earlier questions do not matter. If not, each question is
     asked again in a fresh world.
     """
-    process.request(fresh_world(process))
+    renew(process)
     answers = ask(process, asked)
     if was_stopped(answers):
         return answers, {}
-    process.request(fresh_world(process))
+    renew(process)
     again = ask(process, dict(reversed(asked.items())))
     if all(name in BY_CHANCE or alike(answers[name], again[name]) for name in asked):
         return answers, {}

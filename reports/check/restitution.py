@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from adapters.own_solver.restitution import (
     EXERCISE,
+    NAMED,
     OwnRestitution,
+    code_of,
     named_in,
     own_restitution,
     separation,
@@ -24,11 +27,13 @@ class Restitution:
     Attributes:
         read: e in its text, and e of a pair that closes at 2 m/s.
         out_of_range: whether that is outside 0 to 1, and the text assigns it to a name such as e.
+        comma: where the text assigns a number with a decimal comma to such a name; else "".
         slow, fast: e of pairs that close at 2 mm/s and at 200 m/s.
     """
 
     read: OwnRestitution
     out_of_range: bool
+    comma: str
     slow: float
     fast: float
 
@@ -41,6 +46,8 @@ class Restitution:
     def own(self) -> float:
         """The e that the file states, or that of the exercise if it states none, because other
         numbers in the file may mean something else."""
+        if self.comma:
+            return EXERCISE
         return self.read.own if self.read.stated and self.read.own is not None else EXERCISE
 
     @property
@@ -62,12 +69,16 @@ class Restitution:
     @property
     def as_stated(self) -> bool:
         """Whether the file's collisions have the restitution that the file states."""
+        if self.comma:
+            return False
         right = near(self.measured, EXERCISE) or near(self.measured, self.own)
         return right or len(self.candidates) > 1
 
     @property
     def mistake(self) -> str:
         """What is wrong with the number in the file; "" if nothing is."""
+        if self.comma:
+            return f"{self.comma}: the decimal sign is a point, so that e is {shown(self.measured)}"
         return (
             f"e = {shown(self.measured)} is written into the file; it must be from 0 to 1"
             if self.out_of_range
@@ -133,7 +144,22 @@ def restitution_of(text: str, answers: dict[str, SolverAnswer]) -> Restitution:
         restitution_in(answers[name], name) for name in ("even", "slow", "fast")
     )
     out_of_range = not 0 <= measured <= 1 and any(near(e, measured) for e in named_in(text))
-    return Restitution(own_restitution(text, measured), out_of_range, slow, fast)
+    return Restitution(
+        own_restitution(text, measured), out_of_range, decimal_comma(text), slow, fast
+    )
+
+
+DECIMAL_COMMA = re.compile(NAMED.pattern.rpartition("(")[0] + r"\d+,\d+\s*(?:;|$)", re.I | re.M)
+
+
+def decimal_comma(text: str) -> str:
+    """Which line of a file assigns a number with a decimal comma to a name such as e, in words; ""
+    if none does."""
+    code = code_of(text)
+    found = DECIMAL_COMMA.search(code)
+    if found is None:
+        return ""
+    return f"line {code.count(chr(10), 0, found.start()) + 1} has {found[0].rstrip('; ')}"
 
 
 def restitution_in(answer: SolverAnswer, name: str) -> float:

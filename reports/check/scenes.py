@@ -140,7 +140,8 @@ def scene_row(
         bounds(scenario, record, truth.t, dt)
         + rounding(truth.position, truth.velocity, truth.t, dt)
     )[:, None]
-    ratio = np.where(np.isfinite(away), away, np.inf) / allowed
+    with np.errstate(over="ignore"):
+        ratio = np.where(np.isfinite(away), away, np.inf) / allowed
     at, disk = np.unravel_index(int(ratio.argmax()), ratio.shape)
     turned = np.abs(played.angle[:k] - truth.angle)
     may_turn = turning_bounds(scenario, truth.t, dt) + rounding(

@@ -13,6 +13,7 @@ import pytest
 from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
+from reports.check.functions import is_read
 from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
 from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
@@ -101,6 +102,25 @@ def test_two_mistakes_are_both_reported(tmp_path: Path):
 
     assert "the force is not divided by the mass" in sentences[0]
     assert "the impulse on B has the sign of that on A" in sentences[1]
+
+
+def test_a_file_that_can_be_loaded_only_once_is_told_so(tmp_path: Path):
+    """Each fresh world loads it again: nothing else is blamed for what it then lacks."""
+    text = (CORRECT[0].parent / "plain.py").read_text()
+    once = "import sys\nassert not hasattr(sys, 'loaded_before')\nsys.loaded_before = True\n"
+    (tmp_path / "solver.py").write_text(text.replace("import random\n", once + "import random\n"))
+    one = FileCheck(Path("solver.py"), check_solver(tmp_path / "solver.py"))
+
+    assert [row.task for row in one.faults] == ["file"]
+    assert "it can be loaded only once: AssertionError" in one.sentences[0]
+
+
+def test_a_global_that_only_collects_affects_no_answer():
+    """The list of depths is not read; the memo of reduced masses is."""
+    text = (CORRECT[0].parent / "memo.py").read_text()
+    assert "hits.append(r)" in text
+    assert is_read("REDUCED", text)
+    assert not is_read("hits", text)
 
 
 def test_another_restitution_is_a_free_choice_and_is_judged_by_itself():

@@ -88,7 +88,8 @@ def test_a_wrong_restitution_is_right_at_no_speed(checks: dict[str, FileCheck]):
 
 
 def test_a_step_whose_functions_are_wrong_is_partly_asked(checks: dict[str, FileCheck]):
-    """What projectObjects does is asked, what the step does with wrong functions is not."""
+    """What projectObjects does is asked, and which calls the step makes; what comes of calls of
+    wrong functions is not."""
     assert checks["impulse_sign.js"].word("loop") == "partly asked"
     assert checks["impulse_sign.js"].word("1") == "right"
     assert checks["against_itself.js"].word("loop") == "fault"
@@ -379,7 +380,7 @@ def test_who_keeps_a_value_is_told_so_and_nothing_else_is_blamed(checks: dict[st
     assert (row.task, row.name) == ("2c", "same answer again")
     assert "keeps a value in the global J from one call to the next" in row.cause
     assert any("J += -(1" in text for _, text in row.lines)
-    assert one.tasks["loop"] == "not asked"
+    assert one.word("loop") == "partly asked"
     assert {row.name for row in one.faults if row.task != "scenes"} == {"same answer again"}
 
 
