@@ -297,8 +297,8 @@ def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
 
 
 def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, float]:
-    """The gap and dr.dv of a contact, both exact up to a positive factor, and its overlap, m, in
-    float64."""
+    """The gap and dr.dv of a contact, both exact up to a positive factor, and its overlap, m, from
+    the exact gap: a difference of two lengths in float64 would be 0 for a small one."""
     rows, scene, i = bodies.table, bodies.scene, contact.i
     (x, y), (u, v), r = (
         rational(rows[i, :2]),
@@ -310,7 +310,8 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
         r += Fraction(float(bodies.radii[contact.j]))
         dx, dy = px - x, py - y
         square = dx * dx + dy * dy
-        return square - r * r, dx * (pu - u) + dy * (pv - v), float(r) - float(square) ** 0.5
+        overlap = float(r * r - square) / (float(r) + float(square) ** 0.5)
+        return square - r * r, dx * (pu - u) + dy * (pv - v), overlap
     (px, py), (qx, qy) = (rational(end) for end in scene.walls[contact.j])
     tx, ty = qx - px, qy - py
     across, foot, square = (
@@ -320,5 +321,7 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
     )
     if not 0 <= foot <= square:
         return Fraction(1), Fraction(0), 0.0
-    overlap = float(r) - abs(float(across)) / float(square) ** 0.5
-    return across * across - r * r * square, contact.side * (tx * v - ty * u), overlap
+    gap = across * across - r * r * square
+    length = float(square) ** 0.5
+    overlap = -float(gap) / (length * (float(r) * length + abs(float(across))))
+    return gap, contact.side * (tx * v - ty * u), overlap
