@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from math import log
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact
 
 SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disks cannot meet
+# A series that takes more bounces than this to lose all but `SMALL` of its speed is followed bounce
+# by bounce, within the limits of work: it would be a list of any length.
+SMALL, MOST_BOUNCES = 1e-9, 100_000
 FAR = 1e-12  # relative to the largest coordinate, added to those lengths
 
 
@@ -38,6 +42,8 @@ def settle(
     leg, wall = bodies.legs[i], bodies.walls[contact.j]
     fall = -bodies.outward(contact, leg.ax, leg.ay)
     if k.sign(fall) <= 0 or not slip_stays(finder, contact, thrusts):
+        return None
+    if log(SMALL) / log(finder.scene.restitution) > MOST_BOUNCES:
         return None
     speed = bodies.outward(contact, leg.vx, leg.vy)
     stop = now + 2 * speed / (fall * (1 - bodies.law.restitution))
