@@ -275,7 +275,9 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     )
     touched = apart - scene.radius[ours][:, None] < TOUCH
     near = span[touched.any(axis=0)]
-    names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
+    names, they, their, touch = "disks " + ", ".join(map(str, ours)), "them", "their", "they touch"
+    if len(ours) == 1:
+        names, they, their, touch = f"disk {ours[0]}", "it", "its", "it touches"
     momentum = (mass[:, None] * v).sum(axis=0)
     # Momentum is conserved in no direction where the normal turns (around a static disk or the end
     # of a wall), or where friction acts along a wall.
@@ -289,7 +291,8 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     if not len(near):
         total = f"({momentum[0]:.6g}, {momentum[1]:.6g}) N s"
         yield (
-            f"{names}: nothing else touches them, so their momentum {total} is conserved{exception}"
+            f"{names}: nothing else touches {they}, so {their} momentum {total} is"
+            f" conserved{exception}"
         )
     elif (
         np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max()
@@ -297,11 +300,11 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     ):
         way = near[0] / np.hypot(*near[0])
         yield (
-            f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their"
+            f"{names}: all walls {touch} lie along ({way[0]:.4g}, {way[1]:.4g}), so {their}"
             f" momentum in that direction, {momentum @ way:.6g} N s, is conserved{exception}"
         )
     energy = (mass * (v**2).sum(axis=1)).sum() / 2
     if scene.friction:
         spin = np.array([leg[13] + leg[14] * (end - leg[1]) for leg in last])
         energy += (np.where(spin, scene.inertia[ours] * spin**2, 0.0)).sum() / 2
-    yield f"{names}: their kinetic energy, {energy:.6g} J, can only fall{exception}"
+    yield f"{names}: {their} kinetic energy, {energy:.6g} J, can only fall{exception}"

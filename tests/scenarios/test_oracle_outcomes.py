@@ -310,3 +310,19 @@ def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
         assert refusal.value.at == until
     with pytest.raises(ValueError, match="is known up to 4 s"):
         truth_at(with_oracle(asked(BREAK, 4.0)), np.array([5.0]))
+
+
+def test_what_is_said_of_one_disk_is_said_in_the_singular():
+    """A disk that falls into an acute wedge at e = 0."""
+    wedge = lay_out(
+        position=[[0.03, 3]],
+        velocity=[[0.1, 0]],
+        radius=[0.25],
+        mass=[1],
+        walls=[[[-1, 4], [0, 0]], [[0, 0], [1, 4]]],
+        gravity=[0, -9.81],
+        restitution=0.0,
+    )
+    record = computed(asked(wedge))
+    assert record.reason.startswith("disk 0 touches several walls at once and its collisions")
+    assert record.remains[-1].startswith("disk 0: its kinetic energy, ")
