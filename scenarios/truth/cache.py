@@ -54,6 +54,7 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
         scene.restitution,
         [] if scene.wrap is None else scene.wrap,
         scenario.duration,
+        scenario.sample_interval,  # decides which short bounces are listed
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
     ]
     if scene.friction:  # without friction, the record holds no rotation

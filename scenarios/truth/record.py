@@ -16,8 +16,9 @@ from scenarios.truth.oracle.path import Event, Path
 EPS = float(np.finfo(float).eps)
 # relative to `reach`: a few roundings, of the start of a leg, of a time and of a sample
 ROUNDINGS = 4 * EPS
-# s; of bounces that die out, those that last less are not listed, as in `walls.bouncing_ball_e09`
-LEAST = 1e-4
+# s; of bounces that die out, those that last less are not listed, as in `walls.bouncing_ball_e09`;
+# in a scene of shorter sample intervals, those that last less than this share of one
+LEAST, LEAST_SHARE = 1e-4, 1e-2
 TOUCH = 1e-6  # m; a disk closer to a wall than this at the end may touch it
 NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
 
@@ -110,16 +111,23 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
     hops = speed[:, 0] > 0
     if hops.any():
         e, s, u, g = restitution, since[hops], speed[hops], leg[hops, 11:12]
-        left = np.maximum(1 - s * g * (1 - e) / (2 * u), 0.0)
+        done = np.minimum(s * g * (1 - e) / (2 * u), 1.0)  # of the time until it rests
         with np.errstate(divide="ignore"):
-            k = np.floor(np.log(left) / np.log(e))
-        k = np.where(left > 0, np.maximum(k, 0), np.inf)
-        after = np.maximum(s - 2 * u / g * (1 - e**k) / (1 - e), 0.0)
-        up = np.where(left > 0, u * e**k - g * after, 0.0)
-        height = np.where(left > 0, np.maximum((u * e**k - g * after / 2) * after, 0.0), 0.0)
+            k = np.floor(np.log1p(-done) / np.log(e))
+        k = np.where(done < 1, np.maximum(k, 0), np.inf)
+        after = np.maximum(s - 2 * u / g * powers(e, k), 0.0)
+        up = np.where(done < 1, u * e**k - g * after, 0.0)
+        height = np.where(done < 1, np.maximum((u * e**k - g * after / 2) * after, 0.0), 0.0)
         position[hops] += normal[hops] * height
         velocity[hops] += normal[hops] * up
     return position, velocity
+
+
+def powers(e: float, k: Array | int) -> Array:
+    """1 + e + ... + e^(k - 1) = (1 - e^k) / (1 - e), also where e is so close to 1 that 1 - e^k has
+    lost its digits."""
+    total: Array = np.expm1(k * np.log(e)) / (e - 1)
+    return total
 
 
 def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: str) -> TruthRecord:
@@ -130,8 +138,8 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     rows = [_row(event) for event in path.events if float(event.t) < end]
     rows += [
         collision
-        for leg, stop in bouncing(legs, end)
-        for collision in bounces(scenario.scene, leg, stop)
+        for leg, stop in bouncing(legs, min(end, float(np.nextafter(scenario.duration, np.inf))))
+        for collision in bounces(scenario, leg, stop)
     ]
     outcomes = [
         [k, i, *map(float, v[:2])]
@@ -223,16 +231,16 @@ def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
         yield legs[k], min(end, legs[k + 1, 1] if follows else np.inf)
 
 
-def bounces(scene: Scene, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as in `TruthRecord.events` for the bounces on a leg up to `stop` s that last `LEAST` s
-    or more."""
+def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]]:
+    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last `LEAST` s,
+    or `LEAST_SHARE` sample intervals, or more."""
+    scene = scenario.scene
     e, v, g, disk = scene.restitution, leg[10], leg[11], int(leg[0])
-    count = (
-        max(0, int(np.ceil(np.log(LEAST * g / (2 * v)) / np.log(e)))) if LEAST * g < 2 * v else 0
-    )
+    least = min(LEAST, LEAST_SHARE * scenario.sample_interval)
+    count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
     wall = wall_of_bounces(scene, leg)
     for k in range(1, count):
-        t = leg[1] + 2 * v / g * (1 - e**k) / (1 - e)
+        t = leg[1] + 2 * v / g * float(powers(e, k))
         if t >= stop:
             return
         before = v * e ** (k - 1)
@@ -267,7 +275,9 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     )
     touched = apart - scene.radius[ours][:, None] < TOUCH
     near = span[touched.any(axis=0)]
-    names = f"disk {ours[0]}" if len(ours) == 1 else "disks " + ", ".join(map(str, ours))
+    names, they, their, touch = "disks " + ", ".join(map(str, ours)), "them", "their", "they touch"
+    if len(ours) == 1:
+        names, they, their, touch = f"disk {ours[0]}", "it", "its", "it touches"
     momentum = (mass[:, None] * v).sum(axis=0)
     # Momentum is conserved in no direction where the normal turns (around a static disk or the end
     # of a wall), or where friction acts along a wall.
@@ -281,7 +291,8 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     if not len(near):
         total = f"({momentum[0]:.6g}, {momentum[1]:.6g}) N s"
         yield (
-            f"{names}: nothing else touches them, so their momentum {total} is conserved{exception}"
+            f"{names}: nothing else touches {they}, so {their} momentum {total} is"
+            f" conserved{exception}"
         )
     elif (
         np.abs(near[:, 0] * near[0, 1] - near[:, 1] * near[0, 0]).max()
@@ -289,11 +300,11 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
     ):
         way = near[0] / np.hypot(*near[0])
         yield (
-            f"{names}: all walls they touch lie along ({way[0]:.4g}, {way[1]:.4g}), so their"
+            f"{names}: all walls {touch} lie along ({way[0]:.4g}, {way[1]:.4g}), so {their}"
             f" momentum in that direction, {momentum @ way:.6g} N s, is conserved{exception}"
         )
     energy = (mass * (v**2).sum(axis=1)).sum() / 2
     if scene.friction:
         spin = np.array([leg[13] + leg[14] * (end - leg[1]) for leg in last])
         energy += (np.where(spin, scene.inertia[ours] * spin**2, 0.0)).sum() / 2
-    yield f"{names}: their kinetic energy, {energy:.6g} J, can only fall{exception}"
+    yield f"{names}: {their} kinetic energy, {energy:.6g} J, can only fall{exception}"

@@ -127,6 +127,10 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
             asked(replace(BALL, position=[[0, 0.1], [0, 2]])),
             "disk 0 and wall 0 overlap by 0.15 m at the start",
         ),
+        (
+            asked(replace(ROW, position=ROW.position * [1 - 2**-53, 1])),
+            r"overlap by \d\.?\d*e-17 m at the start",
+        ),
         (asked(ROW, thrusts=BODY), "a thrust that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
         (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
@@ -306,3 +310,19 @@ def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
         assert refusal.value.at == until
     with pytest.raises(ValueError, match="is known up to 4 s"):
         truth_at(with_oracle(asked(BREAK, 4.0)), np.array([5.0]))
+
+
+def test_what_is_said_of_one_disk_is_said_in_the_singular():
+    """A disk that falls into an acute wedge at e = 0."""
+    wedge = lay_out(
+        position=[[0.03, 3]],
+        velocity=[[0.1, 0]],
+        radius=[0.25],
+        mass=[1],
+        walls=[[[-1, 4], [0, 0]], [[0, 0], [1, 4]]],
+        gravity=[0, -9.81],
+        restitution=0.0,
+    )
+    record = computed(asked(wedge))
+    assert record.reason.startswith("disk 0 touches several walls at once and its collisions")
+    assert record.remains[-1].startswith("disk 0: its kinetic energy, ")

@@ -4,6 +4,7 @@ and symmetries."""
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from scenarios.catalogue import scenario
 from scenarios.families.placing import lay_out
-from scenarios.model import Scene, Thrust
+from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import ACCURACY, computed
 from scenarios.truth.oracle import resting as oracle_resting
 from scenarios.truth.oracle.numbers import has_balls, mpfr
@@ -401,3 +402,47 @@ def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
     assert record.horizon == pytest.approx(0.5)
     assert [said for said in record.remains if "momentum" in said] == []
     assert any("energy" in said for said in record.remains)
+
+
+def dropped(restitution: float, duration: float = 1.0, scale: float = 1.0) -> Scenario:
+    """A ball that falls 0.75 m onto a floor under 9.81 m/s2, in a scene whose lengths and times are
+    `scale` of that."""
+    scene = lay_out(
+        position=[[0, scale]],
+        velocity=[[0, 0]],
+        radius=[scale / 4],
+        mass=[1],
+        restitution=restitution,
+        gravity=[0, -9.81 / scale],
+        walls=[[[-3 * scale, 0], [3 * scale, 0]]],
+    )
+    return replace(asked(scene, duration * scale), sample_interval=duration * scale / 64)
+
+
+@pytest.mark.parametrize("restitution", [0.99, 1 - 1e-12])
+def test_no_bounce_after_the_end_of_the_scene_is_listed(restitution: float):
+    """However many more would follow."""
+    record = computed(dropped(restitution))
+    assert len(record.events) == 1
+    assert record.horizon == np.inf
+
+
+@pytest.mark.parametrize("miss", [1e-2, 1e-3, 3e-4, 1e-9])
+def test_bounces_are_exact_where_the_restitution_is_close_to_one(miss: float):
+    """The place at the end, from bounce to bounce in rational arithmetic but for one root."""
+    one = dropped(1 - miss, 4.0)
+    (height, g), e = (0.75, 9.81), 1 - miss
+    fall = np.sqrt(2 * height / g)
+    left, speed = Fraction(4.0) - Fraction(fall), Fraction(g) * Fraction(fall) * Fraction(e)
+    while (lasts := 2 * speed / Fraction(g)) < left:
+        left, speed = left - lasts, speed * Fraction(e)
+    expected = 0.25 + float((speed - Fraction(g) * left / 2) * left)
+    # One rounding of the root is late by 1e-16 s at 4 m/s; eight bounces add to it.
+    assert states(one, computed(one)).position[-1, 0, 1] == pytest.approx(expected, abs=1e-14)
+
+
+def test_the_bounces_listed_do_not_depend_on_the_unit_of_time():
+    """All that steps of the scene can resolve are listed, so that no right engine has spurious
+    ones."""
+    slow, fast = (computed(dropped(0.5, 4.0, scale)).events for scale in (1.0, 2.0**-12))
+    assert len(fast) >= len(slow) - 2

@@ -247,9 +247,9 @@ class Motion:
         self.work.left -= tried
         if len(ends) == 1 and ends[0].velocities:
             return ends[0]
-        names = ", ".join(str(i) for i in v if i < self.scene.n)
+        disks = [i for i in v if i < self.scene.n]
         known = [end for end in ends if end.velocities]
-        raise MotionEnds(float(self.now), ambiguous(names, ends), list(v), known)
+        raise MotionEnds(float(self.now), ambiguous(disks, ends), list(v), known)
 
     def log_all(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
         """Log the collisions of one instant; the first one of each of `contacts` is new."""

@@ -98,11 +98,13 @@ class RecentCollisions:
         )
 
 
-def ambiguous(disks: str, ends: Sequence[TieOutcome]) -> str:
-    """The reason why simultaneous contacts have no exact answer."""
+def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
+    """The reason why simultaneous contacts of these disks have no exact answer."""
+    what, their = f"disks {', '.join(map(str, disks))} touch at once", "their"
+    if len(disks) == 1:
+        what, their = f"disk {disks[0]} touches several walls at once", "its"
     if not ends[-1].velocities:
-        return f"disks {disks} touch at once and their collisions do not end"
+        return f"{what} and {their} collisions do not end"
     return (
-        f"disks {disks} touch at once and the outcome depends on the order of their collisions"
-        f" ({len(ends)} outcomes)"
+        f"{what} and the outcome depends on the order of {their} collisions ({len(ends)} outcomes)"
     )
