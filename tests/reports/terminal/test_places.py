@@ -169,7 +169,9 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("encoding", ["ascii", "cp437", "cp1252"])
+@pytest.mark.parametrize(
+    "encoding", ["ascii", "cp437", pytest.param("cp1252", marks=pytest.mark.long)]
+)
 def test_what_a_console_cannot_write_is_escaped_before_a_table_is_laid_out(
     tmp_path: Path, encoding: str
 ):
