@@ -120,7 +120,7 @@ def of_states(*states: State) -> Trajectory:
 
 def test_switching_the_order_moves_the_ablated_reference_onto_box2d():
     """From the exact answer, with one mechanism: restitution after friction."""
-    off, on = CONE_PAGE.at((0, 1, 1)), CONE_PAGE.at((1, 1, 1))
+    off, on = CONE_PAGE.at((0, 1, 2)), CONE_PAGE.at((1, 1, 2))
 
     assert off.gap("reference:ablated") <= 1e-5 < 0.04 < off.gap("reference:ablated", BOX2D_V3)
     assert on.gap("reference:ablated", BOX2D_V3) <= 1e-5 < 0.04 < on.gap("reference:ablated")
