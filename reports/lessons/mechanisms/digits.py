@@ -48,13 +48,15 @@ def show_digits(settings: Settings) -> Shown:
 def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) -> list[Claim]:
     """What rounding a place that often may add up to, and what it adds up to in Box2D."""
     apart = float(np.spacing(np.float32(far + 2)))  # m; the disk moves by 2 m
+    near = float(np.spacing(np.float32(far)))
     most = steps * apart / 2  # along x; y has smaller numbers, and far more digits
     largest = float(np.max(box2d.y))
     claims = [
         Claim(
-            f"{number(far)} m from the origin two neighbouring float32 numbers are"
-            f" {number(1e3 * apart)} mm apart, and a step is {number(1e3 * dt)} mm. Box2D rounds"
-            f" the position in each of {steps} steps, by at most half of that. These errors could"
+            f"Two neighbouring float32 numbers are {number(1e3 * near)} mm apart at x ="
+            f" {number(far)} m, where the disk starts, and {number(1e3 * apart)} mm at x ="
+            f" {number(far + 2, 5)} m, where it ends; a step is {number(1e3 * dt)} mm along x. Box2D"
+            f" rounds x in each of {steps} steps, by at most half of this distance. These errors could"
             f" add up to {number(1e3 * most)} mm. Here the largest distance is"
             f" {number(1e3 * largest)} mm.",
             lambda shown: (
