@@ -72,7 +72,8 @@ NO_CONE = (
     " mu times the normal impulse of the substeps, not mu (1 + e) m v"
 )
 FORESEEN = (
-    "; a contact is foreseen within four slops, 20 mm, and where a step ends with a gap that a substep"
+    "; a contact is foreseen within four slops, 20 mm, and where a step ends with a gap that a"
+    " substep"
     " would close, the substeps have taken only a part of m v"
 )
 ROUGH_PRODUCT = "the frictions of the two shapes are multiplied: mu on every shape gives mu²"

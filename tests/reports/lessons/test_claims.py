@@ -169,7 +169,10 @@ NO_CLAIM = {
         "An engine may take": "defines a threshold",
         "Raise it": "an instruction; the last claim says whether it is done",
     },
-    "mixing": {"But an engine keeps": "defines a rule"},
+    "mixing": {
+        "But an engine keeps": "defines a rule",
+        "Two disks with different": "says why there is no exact answer",
+    },
     "order": {"With the same gravity": "says what the scene is"},
     "gravity": {"Box2D plays twice": "says who plays; a claim says at which dt it is needed"},
     "correction": {

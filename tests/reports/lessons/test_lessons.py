@@ -67,9 +67,10 @@ def test_every_lesson_has_a_scene_that_runs_and_the_exact_answer_beside_it(name:
 
     assert shown.film is not None
     assert any(run.trajectory is not None for run in shown.film.runs)
-    assert (shown.film.truth is None) == (name == "correction")  # its disks overlap from the start
+    # its disks overlap from the start, or differ in e and no law mixes the two
+    assert (shown.film.truth is None) == (name in ("correction", "mixing"))
     # nor has a cost in time, and an error is the distance from it
-    assert (TRUTH in drawn) == (name not in ("correction", "crowd", "float32"))
+    assert (TRUTH in drawn) == (name not in ("correction", "mixing", "crowd", "float32"))
     assert drawn | {run.name for run in shown.film.runs} <= set(lesson.names)
 
 

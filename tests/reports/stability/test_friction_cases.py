@@ -12,8 +12,8 @@ import pytest
 from adapters.engines import ENGINES, UNASKED
 from adapters.mechanisms.table import IMPULSE, Mechanism, mechanisms_of, with_mechanisms
 from adapters.play import play
-from reports.stability.cases import CASES
 from reports.lessons.lesson import run_of
+from reports.stability.cases import CASES
 from reports.stability.cases_friction import DT, FALL, FRICTION, PHASES, in_corner, rough_bounce
 from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
 from reports.stability.overview import findings
@@ -77,7 +77,7 @@ def test_friction_without_the_restitution_is_seen_in_box2d_3_1_alone():
 def test_a_contact_that_is_foreseen_for_a_whole_step_takes_less_friction(margin: float, late: int):
     """Box2D 3.1 as shipped gives m v (1 - 4 gap / (v dt)) before restitution where a step ends with
     a gap that one of its four substeps would close, which is a quarter of the phases. The ablated
-    reference does the same, and no more with a margin below the 12.5 mm that a step moves the disk."""
+    reference does so, too, but not with a margin below the 12.5 mm that a step moves the disk."""
     mu, shares, law = 0.1, [], []
     for run in range(PHASES):
         scenario = rough_bounce(8.0, run, e=0.5, mu=mu)
