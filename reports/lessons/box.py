@@ -208,7 +208,7 @@ def resting_claim(settings: Settings, budgets: dict[str, Budget]) -> Claim:
 
     def last(name: str) -> float:
         late = sum(each.step >= steps - 60 for each in budgets[name].impulses)
-        return late / 60 / settings["n"]
+        return float(late / 60 / settings["n"])
 
     return Claim(
         "In the end the disks lie on the floor. reference:exercise puts each back in every step and"

@@ -270,6 +270,11 @@ LIMITS = Lesson(
             f" most {QUICK.ratio - 1:.0%} apart."
         ),
         (
+            "In the names of the cases and in the reasons v is a speed, R a radius, b the distance"
+            " of the centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force,"
+            " its angular frequency, and h the length of a substep."
+        ),
+        (
             "A reason counts as tested if the limit follows from it, or if an engine that differs"
             " in this one thing gets farther; else it is called likely. The command"
             " <code>crosscheck stability</code> searches all cases; these are the quick ones."

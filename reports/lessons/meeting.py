@@ -93,7 +93,7 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
         (
             "Detect",
             (
-                f"|x₁ − x₂| = {number(distance)} m < r₁ + r₂ = {number(reach)} m: they overlap by δ"
+                f"|x₁ − x₂| = {number(distance)} m < R₁ + R₂ = {number(reach)} m: they overlap by δ"
                 f" = {number(1e3 * overlap)} mm, detected at the end of a step, up to dt ="
                 f" {number(1e3 * dt)} ms late"
             ),

@@ -23,6 +23,7 @@ from reports.lessons.friction.bounce import CONE as EDGES
 from reports.lessons.lesson import Lesson, unbroken
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.mechanisms.float32 import APART
+from reports.lessons.mechanisms.javascript_bounces import CHANGED
 from reports.page.documents import ENGINE, deflated, fragment, render
 from reports.page.server import in_thread
 from reports.page.style import Look, look
@@ -41,6 +42,7 @@ OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
     EDGES: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
     APART: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
+    CHANGED: look("matter", "shipped")._replace(dash=(3, 3)),
     ROUNDED: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
 }
 

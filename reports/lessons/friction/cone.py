@@ -56,8 +56,8 @@ def show_cone(settings: Settings) -> Shown:
     ]
     return Shown(
         [
-            LessonChart("Friction over normal impulse", "restitution e", "J_t / J_n", curves[0]),
-            LessonChart("Normal impulse", "restitution e", "J_n in N s", curves[1]),
+            LessonChart("Friction over normal impulse", "restitution e", "Jₜ / Jₙ", curves[0]),
+            LessonChart("Normal impulse", "restitution e", "Jₙ in N s", curves[1]),
         ],
         filmed(scenario, runs),
         [("replayed: e", number(float(STATED[-1]))), *distances(runs[:1], curves[0], "")],
@@ -66,7 +66,7 @@ def show_cone(settings: Settings) -> Shown:
 
 
 def share_of_v3(dt: float, scene: Scene) -> float:
-    """The part of m v_n that Box2D 3.1 takes before restitution.
+    """The part of m vₙ that Box2D 3.1 takes before restitution.
 
     Less than 1 if a step ends with a gap that is shorter than a substep moves the disk, and began
     within `FORESEEN`: the last pass only slows the disk to gap / h (b2SolveContact, s > 0).
@@ -88,7 +88,7 @@ def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> list[Claim]:
 
     return [
         Claim(
-            "The normal impulse is right in every engine: (1 + e) m v_n.",
+            "The normal impulse is right in every engine: (1 + e) m vₙ.",
             lambda shown: all(
                 shown.gap(name, chart=1) <= 10 * SINGLE for name in (BOX2D_V3, ROUGH, ABLATED)
             ),
@@ -114,22 +114,22 @@ def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> list[Claim]:
 
 def foreseen_claim(holds: Callable[[Shown], np.bool_], share: float, dt: float) -> Claim:
     """What Box2D 3.1 gives with this step, and why."""
-    step = f"v_n dt = {number(1e3 * FALL * dt)} mm"
+    step = f"vₙ dt = {number(1e3 * FALL * dt)} mm"
     near = f"{number(1e3 * FORESEEN)} mm"
     if share == 1.0:
         return Claim(
-            f"{BOX2D_V3} gives µ m v_n at every e. That is right at e = 0. It is µ/(1 + e) of the"
+            f"{BOX2D_V3} gives µ m vₙ at every e. That is right at e = 0. It is µ/(1 + e) of the"
             " normal impulse: at e = 1 half of the exact friction. A contact is foreseen within"
             f" {near}; a step moves the disk by {step}, which is more, so this holds wherever in a"
             " step the disk meets the floor.",
             lambda shown: FALL * dt > FORESEEN and holds(shown),
         )
     return Claim(
-        f"{BOX2D_V3} gives {number(share, 2)} µ m v_n at every e above 0 here. A step moves the"
+        f"{BOX2D_V3} gives {number(share, 2)} µ m vₙ at every e above 0 here. A step moves the"
         f" disk by {step}, less than the {near} within which a contact is foreseen. A step then"
         f" ends with a gap that {number(1 - share, 2)} of a substep would close. Its last pass only"
         f" slows the disk to what closes the gap in one substep, which takes {number(share, 2)} of"
-        " m v_n. Restitution gives the rest of the impulse, without friction.",
+        " m vₙ. Restitution gives the rest of the impulse, without friction.",
         holds,
     )
 
@@ -143,7 +143,7 @@ CONE = Lesson(
         (
             "Box2D 3.1 solves a step in two parts. In the first a contact stops the approach, and"
             " friction acts up to <code>µ</code> times the normal impulse of this part,"
-            " <code>m v_n</code>. In the second part, restitution adds <code>e m v_n</code>, and"
+            " <code>m vₙ</code>. In the second part, restitution adds <code>e m vₙ</code>, and"
             " friction does not act again. The friction cone is that of a collision with"
             " <code>e = 0</code>. See [friction] for what the cone is."
         ),

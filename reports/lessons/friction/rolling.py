@@ -33,7 +33,7 @@ BOX2D, BOX2D_V3 = "box2d:shipped", "box2d_v3:shipped"
 EVENTS = "event_driven:float64"
 NAMES = (ROUGH, SHIPPED, MATCHED, BOX2D, BOX2D_V3, EVENTS)
 SPEED, RADIUS, SECONDS = 2.0, 0.25, 4.0  # m/s at the start, m, s
-SOLID = 2.0  # m r² / I
+SOLID = 2.0  # m R² / I
 # m/s: 960 steps that each round velocities of up to 8 m/s in float64.
 DOUBLE = 960 * 8 * 2.0**-53
 STILL = 1e-16  # m/s, as low as a logarithmic axis goes
@@ -59,14 +59,14 @@ def show_rolling(settings: Settings) -> Shown:
             LessonChart(
                 "Slip of the point that touches",
                 "time in s",
-                "v + r ω in m/s",
+                "v + R ω in m/s",
                 played.curves(slip),
                 guides=guides,
             ),
             LessonChart(
                 "Size of that slip",
                 "time in s",
-                "|v + r ω| in m/s, 0 at the foot",
+                "|v + R ω| in m/s",
                 played.curves(lambda each: np.maximum(np.abs(slip(each)), STILL)),
                 "y",
                 guides=guides,
@@ -144,7 +144,7 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
     if not rolls:
         return [
             Claim(
-                f"The disk rolls from the start, v = −r ω = {number(SPEED)} m/s: the point that"
+                f"The disk rolls from the start, v = −R ω = {number(SPEED)} m/s: the point that"
                 " touches is at rest, there is no friction, and the exact velocity stays.",
                 lambda shown: (
                     np.abs(shown.y(TRUTH) - SPEED).max() <= DOUBLE
@@ -168,8 +168,8 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
         "stops": "stands still: the spin was just enough to stop it",
         "returns": "has turned back",
     }["stops" if abs(end) <= DOUBLE else "rolls" if end > 0 else "returns"]
-    rule = "2/3 v₀" if not spin else "(2 v₀ − r ω₀)/3"
-    when = "v₀/(3 µ g)" if not spin else "(v₀ + r ω₀)/(3 µ g)"
+    rule = "2/3 v₀" if not spin else "(2 v₀ − R ω₀)/3"
+    when = "v₀/(3 µ g)" if not spin else "(v₀ + R ω₀)/(3 µ g)"
     return [
         Claim(
             f"While the disk slides, its velocity falls by µ g = {number(brake)} m/s each second."
@@ -310,7 +310,7 @@ ROLLING = Lesson(
     text=(
         (
             "A disk touches the floor and slides. Friction <code>µ m g</code> acts against the slip"
-            " <code>v + r ω</code> of the point that touches. It slows the disk and changes its"
+            " <code>v + R ω</code> of the point that touches. It slows the disk and changes its"
             " spin until the slip is gone. From then on the disk <b>rolls</b>, and on a level floor"
             " no friction acts any more. A disk with back spin, here <code>ω > 0</code>, may stop"
             " and return before it rolls."

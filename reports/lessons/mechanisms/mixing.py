@@ -208,7 +208,7 @@ def mixing_claims(what: str, rule: str, other: float) -> list[Claim]:
 
 def lies_along(name: str, law: np.ndarray, bound: float, shown: Shown) -> np.bool_:
     """Whether a curve is `law`, within `bound`."""
-    return np.abs(shown.y(name) - law).max() <= bound
+    return np.bool_(np.abs(shown.y(name) - law).max() <= bound)
 
 
 MIXING_RULE = page(

@@ -205,7 +205,7 @@ NO_CLAIM = {
         "+16_substeps": "names what is changed",
     },
     "friction": {
-        "J_n = (1 + e) m v_n": "defines both; the first claim has its number",
+        "Jₙ = (1 + e) m vₙ": "defines both; the first claim has its number",
         "An impulse of |slip|": "defines to stick; the list below has its numbers",
         "Coulomb's law allows": "defines the cone; a claim says where the impulse lies",
         "See": "names other lessons",

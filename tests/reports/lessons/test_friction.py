@@ -37,7 +37,7 @@ def test_angle_spin_and_friction_leave_the_normal_impulse_as_it_is():
 
 
 def test_the_edge_of_the_cone_lies_between_stick_and_slip():
-    """The exact impulse has a corner at mu (1 + e) (1 + m r2 / I) v_n of slip: 3 m/s of 5 m/s."""
+    """The exact impulse has a corner at mu (1 + e) (1 + m r2 / I) vₙ of slip: 3 m/s of 5 m/s."""
     shown = BOUNCE.at(BOUNCE.start)
     angle, impulse = shown.x(TRUTH, 1), shown.y(TRUTH, 1)
     corner = np.degrees(np.arctan(3 / 5))
