@@ -186,10 +186,9 @@ def budget_claims(
     claims.append(
         Claim(
             f"Collisions take {number(-lesson.collisions)} J of reference:lesson and"
-            f" {number(-exercise.collisions)} J of reference:exercise until then, and"
-            f" the exact ones {number(exact)} J. Once one is detected late, the disks meet"
-            " elsewhere"
-            " and at other speeds. Which curve is lowest follows from the sum of the three parts.",
+            f" {number(-exercise.collisions)} J of reference:exercise until then, and the exact"
+            f" ones {number(exact)} J. Once one is detected late, the disks meet elsewhere and at"
+            " other speeds. Which curve is lowest follows from the sum of the three parts.",
             lambda shown: (
                 adds_up(shown)
                 and max(lesson.collisions, exercise.collisions) < 0
@@ -299,9 +298,8 @@ BOX = Lesson(
             "Small disks start from random places with random velocities and fall. In a collision"
             " of a disk with a wall, or with another disk, the relative velocity along the normal"
             " <code>u</code> becomes <code>u' = −e u</code>, which leaves <code>e²</code> of the"
-            " energy of this"
-            " part of the motion. Nothing else may take energy. Between two collisions the sum of"
-            " <code>m v²/2 + m g y</code> must be level."
+            " energy of this part of the motion. Nothing else may take energy. Between two"
+            " collisions the sum of <code>m v²/2 + m g y</code> must be level."
         ),
         (
             "The exact answer ends where float64 can no longer follow the motion, or where a disk"

@@ -398,9 +398,8 @@ HORIZON = Lesson(
         ),
         (
             "What stays comparable for longer is what depends little on which disk is where: the"
-            " energy, the number of collisions. A disk that leaves the field enters it again at the"
-            " opposite edge, as in"
-            " the exercise."
+            " energy, the number of collisions. A disk that leaves the field enters it again at"
+            " the opposite edge, as in the exercise."
         ),
     ),
     sliders=(

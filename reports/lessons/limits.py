@@ -266,8 +266,7 @@ LIMITS = Lesson(
             " collision, limits a spin, or loses a position to rounding. The search tries values"
             " from gentle to harsh, a collision at several moments of its step, and stops at the"
             " first value that fails. Then it halves the gap to the last value that works until"
-            " the two are at"
-            f" most {QUICK.ratio - 1:.0%} apart."
+            f" the two are at most {QUICK.ratio - 1:.0%} apart."
         ),
         (
             "In the names of the cases and in the reasons v is a speed, R a radius, b the distance"

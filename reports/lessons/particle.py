@@ -130,8 +130,7 @@ def with_gravity(played: Simulation) -> list[Claim]:
     return [
         Claim(
             f"Here g = {number(g)} m/s². Until the first bounce explicit Euler (reference:lesson)"
-            " is"
-            f" g dt t / 2 above the exact parabola, {number(late)} mm at t ="
+            f" is g dt t / 2 above the exact parabola, {number(late)} mm at t ="
             f" {number(float(played.truth.t[flight][-1]))} s, the last sample before it, and"
             " symplectic Euler (reference:exercise) as far below it.",
             lambda shown: all(

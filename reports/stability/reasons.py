@@ -73,8 +73,7 @@ NO_CONE = (
 )
 FORESEEN = (
     "; a contact is foreseen within four slops, 20 mm, and where a step ends with a gap that a"
-    " substep"
-    " would close, the substeps have taken only a part of m v"
+    " substep would close, the substeps have taken only a part of m v"
 )
 ROUGH_PRODUCT = "the frictions of the two shapes are multiplied: mu on every shape gives mu²"
 IN_TURN = (

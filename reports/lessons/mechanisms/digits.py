@@ -59,10 +59,8 @@ def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) 
             f"Two neighbouring float32 numbers are {number(1e3 * near)} mm apart at x ="
             f" {number(far)} m, where the disk starts, and {number(1e3 * apart)} mm at x ="
             f" {number(far + 2, 5)} m, where it ends; a step is {number(1e3 * dt)} mm along x."
-            " Box2D"
-            f" rounds x in each of {steps} steps, by at most half of this distance. These errors"
-            " could"
-            f" add up to {number(1e3 * most)} mm. Here the largest distance is"
+            f" Box2D rounds x in each of {steps} steps, by at most half of this distance. These"
+            f" errors could add up to {number(1e3 * most)} mm. Here the largest distance is"
             f" {number(1e3 * largest)} mm.",
             lambda shown: (
                 apart / 100 < shown.y("box2d:shipped").max() <= most

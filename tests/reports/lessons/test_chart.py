@@ -148,3 +148,16 @@ def test_a_name_in_the_table_of_facts_is_clear_of_its_value(page: Page, width: i
 
     assert len(gaps) > 1
     assert min(gaps) > 8, gaps
+
+
+def test_what_is_0_has_a_place_of_its_own_at_the_foot_of_a_logarithmic_axis(page: Page):
+    """Below every other value and every other tick, within the axis, and called 0."""
+    zero, least, ticks = page.evaluate(
+        "(() => { const axis = new Axis([0, 1e-12, 1e-3], true, 0, 400);"
+        " return [axis.place(0), axis.place(1e-12),"
+        " axis.ticks().map(([v, text]) => [axis.place(v), text])]; })()"
+    )
+
+    assert 0 < zero < least
+    assert ticks[0] == [zero, "0"]
+    assert all(place >= least - 20 > zero for place, _ in ticks[1:])
