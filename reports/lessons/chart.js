@@ -38,7 +38,7 @@ class Axis {
     const step = this.log ? Math.max(1, Math.ceil(span / 6)) : Math.max(niceStep(span / 5), this.counts ? 1 : 0);
     const first = Math.ceil(this.low / step - 1e-9) * step;
     const found = [];
-    for (let v = first; v <= this.high + 1e-9 * span; v += step) if (v >= this.low + this.foot) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
+    for (let v = first; v <= this.high + 1e-9 * span; v += step) if (v >= this.low + this.foot && !(this.foot && 10 ** v <= EMPTY)) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
     const numbers = this.log && found.length < 2 ? this.withinADecade() : found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v)]);
     return this.foot ? [[0, "0"], ...numbers] : numbers;
   }
