@@ -89,7 +89,7 @@ def show_box(settings: Settings) -> Shown:
     )
 
 
-class Budget(NamedTuple):
+class EnergyChange(NamedTuple):
     """J that an engine's disks gain by flight, by collisions and by being moved apart, and the
     impulses in its steps."""
 
@@ -114,7 +114,7 @@ class Budget(NamedTuple):
 
 
 @cache
-def budget(name: str, restitution: float, count: int, k: int, until: float) -> Budget:
+def budget(name: str, restitution: float, count: int, k: int, until: float) -> EnergyChange:
     """What changes the energy of a reference solver until then, s.
 
     A step of flight changes it by m g² dt²/2 each, up for explicit Euler, down for symplectic
@@ -140,11 +140,11 @@ def budget(name: str, restitution: float, count: int, k: int, until: float) -> B
         each.impulse**2 * (inverse[each.i] + inverse[max(each.j, -1)]) / 2 for each in impulses
     )
     collisions = -(1 - restitution) / (1 + restitution) * float(taken)
-    return Budget(flight, collisions, end - start - flight - collisions, impulses)
+    return EnergyChange(flight, collisions, end - start - flight - collisions, impulses)
 
 
 def budget_claims(
-    settings: Settings, budgets: dict[str, Budget], end: float, exact: float
+    settings: Settings, budgets: dict[str, EnergyChange], end: float, exact: float
 ) -> list[Claim]:
     """What becomes of the energy after the first collision; end: s, of the exact answer; exact: J
     that its collisions take."""
@@ -201,7 +201,7 @@ def budget_claims(
     return claims
 
 
-def resting_claim(settings: Settings, budgets: dict[str, Budget]) -> Claim:
+def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim:
     """Why the two count so many and so few collisions once the disks lie on the floor."""
     steps = round(SECONDS * 60 * settings["k"])
 
