@@ -271,7 +271,7 @@ LIMITS = Lesson(
         (
             "In the names of the cases and in the reasons v is a speed, R a radius, b the distance"
             " of the centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force,"
-            " its angular frequency, and h the length of a substep."
+            " its angular frequency, and h the duration of a substep."
         ),
         (
             "A reason counts as tested if the limit follows from it, or if an engine that differs"
