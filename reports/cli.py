@@ -395,7 +395,10 @@ def play(
 @app.command()
 def lesson(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="A lesson. Default: the list of them.")
+        str,
+        typer.Argument(
+            metavar="NAME", help="A lesson, by name or number. Default: the list of them."
+        ),
     ] = "",
     port: Port = 8000,
     opens: Opens = False,
@@ -411,6 +414,11 @@ def lesson(
     """Show why engines differ, in lessons with sliders.
 
     A lesson is a page in a browser: a scene that runs, the exact answer beside it, and sliders.
+
+    Each has a number and a name: 1 particle, 2 thrust, 3 box, 4 meeting, 5 crowd, 6.1
+    threshold, 6.2 mixing, 6.3 order, 6.4 gravity, 6.5 correction, 6.6 substeps, 6.7 digits, 6.8
+    cap, 6.9 row, 6.10 float32, 6.11 javascript, 7 horizon, 8 limits, 9.1 friction, 9.2 cone,
+    9.3 lever, 9.4 rolling.
     """
     if export is None:
         from reports.commands import serve

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
+from adapters.engine import ContactImpulse
+from adapters.engines import ENGINES
 from reports.lessons.lesson import (
     Claim,
     Lesson,
@@ -30,9 +35,11 @@ def small_box(restitution: float, count: int) -> Scenario:
     arrays = ("position", "velocity", "radius", "mass", "angle", "angular_velocity", "inertia")
     cut = {name: getattr(base.scene, name)[:count] for name in arrays}
     scene = replace(base.scene, restitution=restitution, **cut)
-    return with_oracle(replace(base, scene=scene, truth=None, duration=3.0))
+    return with_oracle(replace(base, scene=scene, truth=None, duration=SECONDS))
 
 
+SECONDS = 3.0
+EULER = {"reference:lesson": 1, "reference:exercise": -1}  # the sign of its gain in flight
 BOX_NAMES = ("reference:lesson", "reference:exercise", "pymunk:matched", "event_driven:float64")
 
 
@@ -47,15 +54,28 @@ def show_box(settings: Settings) -> Shown:
         moving = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1)
         return np.asarray(moving - each.position @ scene.gravity @ scene.mass)
 
+    end = float(shown.truth.t[-1])
+    exact = float(energy(shown.truth)[0] - energy(shown.truth)[-1])
+    budgets = {
+        name: budget(name, settings["e"], settings["n"], settings["k"], end) for name in EULER
+    }
     facts = [
+        ("the exact answer ends at", f"{number(end)} s"),
         (
-            f"contact impulses of {run.name}, step by step, in {number(run.trajectory.t[-1])} s",
-            str(len(run.trajectory.collisions)),
-        )
-        for run in shown.runs
-        if run.trajectory
+            "exact energy taken by collisions until then",
+            f"{number(exact) if exact > 1e-9 else '0'} J",
+        ),
+        *((f"{name}, energy until then", each.in_words) for name, each in budgets.items()),
+        *(
+            (
+                f"collisions of {run.name} in {number(run.trajectory.t[-1])} s; a contact with an"
+                " impulse in every step counts once",
+                str(len(run.trajectory.collisions)),
+            )
+            for run in shown.runs
+            if run.trajectory
+        ),
     ]
-    facts.append(("the exact answer ends at", f"{number(float(shown.truth.t[-1]))} s"))
     return Shown(
         [
             LessonChart("Kinetic and potential energy", "time in s", "J", shown.curves(energy)),
@@ -65,7 +85,140 @@ def show_box(settings: Settings) -> Shown:
         ],
         shown.film,
         facts,
-        box_claims(shown, settings),
+        box_claims(shown, settings) + budget_claims(settings, budgets, end, exact),
+    )
+
+
+class EnergyChange(NamedTuple):
+    """J that an engine's disks gain by flight, by collisions and by being moved apart, and the
+    impulses in its steps."""
+
+    flight: float
+    collisions: float
+    moved: float
+    impulses: list[ContactImpulse]
+
+    @property
+    def in_words(self) -> str:
+        """With signs."""
+        flight, collisions, moved = (
+            number(part, 3) if abs(part) > 1e-9 else "0"
+            for part in (self.flight, self.collisions, self.moved)
+        )
+        return f"flight {flight} J, collisions {collisions} J, moved apart {moved} J"
+
+    @property
+    def whole(self) -> float:
+        """J, all three."""
+        return self.flight + self.collisions + self.moved
+
+
+@cache
+def budget(name: str, restitution: float, count: int, k: int, until: float) -> EnergyChange:
+    """What changes the energy of a reference solver until then, s.
+
+    A step of flight changes it by m g² dt²/2 each, up for explicit Euler, down for symplectic
+    Euler. An impulse J takes (1 − e)/(1 + e) J² / (2 µ), µ the reduced mass. The rest is by moving.
+    """
+    scenario = small_box(restitution, count)
+    scene, dt = scenario.scene, scenario.dt(k)
+    steps = round(until / dt)
+
+    with closing(ENGINES[name].make()) as engine:
+        engine.load(scene, dt)
+        before = engine.read()
+        engine.step(steps)
+        after, impulses = engine.read(), engine.collisions()
+    start, end = (
+        float((scene.mass * (each.velocity**2).sum(axis=1) / 2).sum())
+        - float(each.position @ scene.gravity @ scene.mass)
+        for each in (before, after)
+    )
+    flight = EULER[name] * float(scene.mass.sum() * (scene.gravity**2).sum()) * dt**2 / 2 * steps
+    inverse = 1 / np.append(scene.mass, np.inf)  # the last is that of every wall
+    taken = sum(
+        each.impulse**2 * (inverse[each.i] + inverse[max(each.j, -1)]) / 2 for each in impulses
+    )
+    collisions = -(1 - restitution) / (1 + restitution) * float(taken)
+    return EnergyChange(flight, collisions, end - start - flight - collisions, impulses)
+
+
+def budget_claims(
+    settings: Settings, budgets: dict[str, EnergyChange], end: float, exact: float
+) -> list[Claim]:
+    """What becomes of the energy after the first collision; end: s, of the exact answer; exact: J
+    that its collisions take."""
+    lesson, exercise = (budgets[name] for name in EULER)
+
+    def adds_up(shown: Shown) -> bool:
+        return all(
+            abs(shown.y(name)[shown.x(name) <= end][-1] - shown.y(name)[0] - each.whole) < 1e-6
+            for name, each in budgets.items()
+        )
+
+    claims = [
+        Claim(
+            "What the two methods gain and lose in flight goes on after the first collision:"
+            f" {number(lesson.flight)} J each until {number(end)} s. reference:exercise moves disks"
+            " out of the walls and apart, and lifts them by it:"
+            f" {number(exercise.moved)} J. reference:lesson leaves them in the walls.",
+            lambda shown: (
+                adds_up(shown)
+                and lesson.flight == -exercise.flight > 0
+                and exercise.moved > max(lesson.moved, 0.0)
+            ),
+        )
+    ]
+    if settings["e"] == 1.0:
+        claims.append(
+            Claim(
+                "With e = 1 a collision takes nothing: the energy of reference:lesson rises by what"
+                " it gains in flight, and that of reference:exercise falls by its loss less what"
+                " moving gives back.",
+                lambda shown: (
+                    adds_up(shown)
+                    and abs(lesson.whole - lesson.flight) < 0.01 * lesson.flight
+                    and exercise.whole < 0
+                ),
+            )
+        )
+        return claims
+    claims.append(
+        Claim(
+            f"Collisions take {number(-lesson.collisions)} J of reference:lesson and"
+            f" {number(-exercise.collisions)} J of reference:exercise until then, and the exact"
+            f" ones {number(exact)} J. Once one is detected late, the disks meet elsewhere and at"
+            " other speeds. Which curve is lowest follows from the sum of the three parts.",
+            lambda shown: (
+                adds_up(shown)
+                and max(lesson.collisions, exercise.collisions) < 0
+                and abs(shown.y(TRUTH)[0] - shown.y(TRUTH)[-1] - exact) < 1e-6
+            ),
+        )
+    )
+    if settings["e"] == 0.5 and end == SECONDS:
+        claims.append(resting_claim(settings, budgets))
+    return claims
+
+
+def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim:
+    """Why the two count so many and so few collisions once the disks lie on the floor."""
+    steps = round(SECONDS * 60 * settings["k"])
+
+    def last(name: str) -> float:
+        late = sum(each.step >= steps - 60 for each in budgets[name].impulses)
+        return float(late / 60 / settings["n"])
+
+    return Claim(
+        "In the end the disks lie on the floor. reference:exercise puts each back in every step and"
+        " gives it an impulse, which is one contact. reference:lesson leaves it in the floor and"
+        " turns it round in every third step only, which counts as a new collision each time.",
+        lambda shown: (
+            all(abs(last(name) - rate) < 0.01 for name, rate in zip(EULER, (1 / 3, 1.0)))
+            and len(budgets["reference:lesson"].impulses)
+            < len(budgets["reference:exercise"].impulses)
+            and np.ptp(shown.y(TRUTH)[-3:]) < 1e-3
+        ),
     )
 
 
@@ -93,7 +246,8 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
         claims.insert(
             0,
             Claim(
-                "Until the first collision the exact energy is constant. Explicit Euler"
+                f"Until the first collision, at {number(played.first_collision + dt)} s, the exact"
+                " energy is constant. Explicit Euler"
                 f" (reference:lesson) gains m g² dt / 2 in a second, {number(gain)} J for all"
                 " disks; symplectic Euler (reference:exercise) loses as much. Under a constant"
                 " force neither is better. In a motion that repeats, such as an orbit or a"
@@ -144,9 +298,10 @@ BOX = Lesson(
         (
             "Small disks start from random positions with random velocities and fall. In a"
             " collision of a disk with a wall, or with another disk, the relative velocity along"
-            " the normal becomes <code>v' = −e v</code>, which leaves <code>e²</code> of the"
-            " energy of the relative motion along the normal. Nothing else may take energy. Between"
-            " two collisions the sum of <code>m v²/2 + m g y</code> must stay constant."
+            " the normal <code>u</code> becomes <code>u' = −e u</code>, which leaves"
+            " <code>e²</code> of the energy of this part of the motion. Nothing else may take"
+            " energy. Between two collisions the sum of <code>m v²/2 + m g y</code> must stay"
+            " constant."
         ),
         (
             "The exact answer ends where float64 can no longer follow the motion, or where a disk"

@@ -22,10 +22,12 @@ class Axis {
     this.counts = !log && finite.every(Number.isInteger);
     if (high - low < 1e-12 * Math.max(Math.abs(high), 1)) [low, high] = [low - 0.5, high + 0.5];
     const room = log ? 0.05 * (high - low) : 0.06 * (high - low);
-    Object.assign(this, { low: low - room, high: high + room });
+    this.foot = log && values.some((v) => v <= EMPTY) ? 2 * room : 0;  // what is 0 has a place of its own below
+    Object.assign(this, { low: low - room - this.foot, high: high + room });
   }
 
   place(value) {
+    if (this.foot && value <= EMPTY) return this.from + 0.25 * this.foot / (this.high - this.low) * (this.to - this.from);
     const v = this.log ? Math.log10(Math.max(value, EMPTY)) : value;
     const share = (v - this.low) / (this.high - this.low);
     return this.from + Math.max(-0.02, Math.min(1.02, share)) * (this.to - this.from);
@@ -36,17 +38,17 @@ class Axis {
     const step = this.log ? Math.max(1, Math.ceil(span / 6)) : Math.max(niceStep(span / 5), this.counts ? 1 : 0);
     const first = Math.ceil(this.low / step - 1e-9) * step;
     const found = [];
-    for (let v = first; v <= this.high + 1e-9 * span; v += step) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
-    if (this.log && found.length < 2) return this.withinADecade();
-    return found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v)]);
+    for (let v = first; v <= this.high + 1e-9 * span; v += step) if (v >= this.low + this.foot && !(this.foot && 10 ** v <= EMPTY)) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
+    const numbers = this.log && found.length < 2 ? this.withinADecade() : found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v)]);
+    return this.foot ? [[0, "0"], ...numbers] : numbers;
   }
 
   // 1, 2 and 5 times powers of ten; where even these are too far apart, the ends.
   withinADecade() {
-    const [first, last] = [Math.floor(this.low), Math.ceil(this.high)];
+    const [first, last] = [Math.floor(this.low + this.foot), Math.ceil(this.high)];
     const decades = Array.from({ length: last - first + 1 }, (_, k) => first + k);
-    const found = decades.flatMap((v) => [1, 2, 5].map((k) => k * 10 ** v)).filter((v) => Math.log10(v) >= this.low && Math.log10(v) <= this.high);
-    const values = found.length < 2 ? [10 ** this.low, 10 ** this.high] : [...new Set(found)];
+    const found = decades.flatMap((v) => [1, 2, 5].map((k) => k * 10 ** v)).filter((v) => Math.log10(v) >= this.low + this.foot && Math.log10(v) <= this.high);
+    const values = found.length < 2 ? [10 ** (this.low + this.foot), 10 ** this.high] : [...new Set(found)];
     return values.map((v) => [v, short(v)]);
   }
 }
@@ -164,8 +166,8 @@ function drawCurve(picture, curve, x, y, [k, count], clip) {
 // Some points of a line, each curve's at places of its own (`share` of the way between two), so that marks of curves
 // that coincide lie side by side. The exact answer has none: it is the thin line on top.
 function marked(curve, points, share) {
-  const marks = 6;
-  if (curve.name === "truth" || curve.faint || points.length < marks) return [];
+  const marks = curve.faint ? 3 : 6;
+  if (curve.name === "truth" || points.length < marks) return [];
   const [from, to] = [points[0][0], points[points.length - 1][0]];
   return Array.from({ length: marks }, (_, j) => from + (to - from) * (j + 0.1 + 0.8 * share) / marks)
     .map((wanted) => points.reduce((best, each) => Math.abs(each[0] - wanted) < Math.abs(best[0] - wanted) ? each : best));

@@ -35,22 +35,21 @@ INDEX, CONVENTIONS = "index.html", "the conventions of the engines"
 
 
 def checked_lesson(name: str) -> str:
-    """The name; exits 2 if there is no such lesson."""
-    if name and name not in LESSONS:
+    """The name of the lesson with this name or number; exits 2 if there is none."""
+    numbers = {lesson.number: each for each, lesson in LESSONS.items()}
+    if name and name not in LESSONS and name not in numbers:
+        there = ", ".join(f"{number} {each}" for number, each in numbers.items())
         refuse(
-            [
-                unknown("lesson", name, LESSONS).replace(
-                    "see: crosscheck list", f"there are {', '.join(LESSONS)}"
-                )
-            ]
+            [unknown("lesson", name, LESSONS).replace("see: crosscheck list", f"there are {there}")]
         )
-    return name
+    return numbers.get(name, name)
 
 
 def write_lessons(name: str, place: Path) -> None:
     """Write the lesson of that name to a file, or with "" all of them to a folder; exits 2 if that
     cannot be."""
-    if checked_lesson(name):
+    name = checked_lesson(name)
+    if name:
         write_one(name, place)
     else:
         write_all(place)

@@ -6,6 +6,9 @@ const darkness = matchMedia("(prefers-color-scheme: dark)");
 const darkPage = () => darkness.matches;
 const nameOf = (name) => document.querySelector(`.names [data-name="${CSS.escape(name)}"]`).textContent.trim();
 
+const PATIENCE = 700;  // ms, after which the page says what it waits for
+const SLOW = "Playing this setting. The first one of a lesson can take a minute, while its engines are compiled; what is grey is of the setting before.";
+
 class Lesson {
   constructor() {
     this.sliders = [...document.querySelectorAll(".sliders :is(input, select)")];
@@ -38,8 +41,9 @@ class Lesson {
 
   // Until the answer is that to where the sliders are: those passed meanwhile are never asked for.
   async ask() {
-    document.querySelector(".stage-lesson").classList.add("busy");
-    const fault = document.querySelector(".fault");
+    document.querySelector("main").classList.add("busy");
+    const [fault, waiting] = [".fault", ".waiting"].map((name) => document.querySelector(name));
+    const slow = this.grid ? 0 : setTimeout(() => { waiting.textContent = SLOW; }, PATIENCE);
     try {
       let at, shown;
       do {
@@ -52,12 +56,14 @@ class Lesson {
     } catch {
       fault.textContent = "The server does not answer: start it again with crosscheck lesson.";
     }
-    document.querySelector(".stage-lesson").classList.remove("busy");
+    clearTimeout(slow);
+    waiting.textContent = "";
+    document.querySelector("main").classList.remove("busy");
   }
 
   async show(shown) {
     this.shown = shown;
-    for (const slider of this.sliders) if (slider.name in shown.said) this.say(slider, shown.said[slider.name]);
+    for (const slider of this.sliders) if (slider.dataset.shown) this.say(slider, shown.said[slider.name] ?? JSON.parse(slider.dataset.shown)[slider.value]);
     document.querySelector(".curves").replaceChildren(...shown.charts.map(drawChart));
     for (const item of document.querySelectorAll(".names li")) item.hidden = !shown.drawn.includes(item.dataset.name);
     document.querySelector(".claims").replaceChildren(...shown.claims.map(([text, holds]) => holds ? row("li", ["span", text]) : row("li", ["b", "Not in this run:"], ["span", text])));
@@ -70,6 +76,8 @@ class Lesson {
     const pack = readPack(await inflate(film.pack));
     const element = document.querySelector(".player");
     element.querySelector(".picture").style.setProperty("--ratio", film.ratio);
+    const all = this.shown.drawn.every((name) => !name.includes(":") || film.names.includes(name));
+    element.querySelector(".replayed").textContent = all ? "" : `The replay shows ${film.names.map(nameOf).join(" and ")} only. `;
     if (!this.player) {
       this.player = players.lesson = new Player(element, pack, looks);
       return;

@@ -205,7 +205,11 @@ class Shown:
         if self.film is not None:
             layers = played(self.film)
             pack = pack_layers(self.film.scenario, layers, more=self.opening)
-            film = {"pack": pack, "ratio": ratio_of(self.film.scenario, layers)}
+            film = {
+                "pack": pack,
+                "ratio": ratio_of(self.film.scenario, layers),
+                "names": [name_of(run) for run, _ in layers],
+            }
         return {
             "charts": [chart.to_json() for chart in self.charts],
             "film": film,

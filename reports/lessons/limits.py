@@ -266,8 +266,12 @@ LIMITS = Lesson(
             " collision, limits a spin, or loses a position to rounding. The search tries values"
             " from gentle to harsh, with the collision at several moments of its step. It stops at"
             " the first value that fails. Then it halves the gap to the last value that works until"
-            " the two are at"
-            f" most {QUICK.ratio - 1:.0%} apart."
+            f" the two are at most {QUICK.ratio - 1:.0%} apart."
+        ),
+        (
+            "In the names of the cases and in the reasons v is a speed, R a radius, b the distance"
+            " of the centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force,"
+            " its angular frequency, and h the duration of a substep."
         ),
         (
             "A reason counts as tested if the limit follows from it, or if an engine that differs"

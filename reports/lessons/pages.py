@@ -18,10 +18,12 @@ from starlette.routing import BaseRoute, Route
 from adapters.engines import ENGINES, FETCHED
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
+from reports.lessons.crowd import ROUNDED
 from reports.lessons.friction.bounce import CONE as EDGES
 from reports.lessons.lesson import Lesson, unbroken
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.mechanisms.float32 import BETWEEN
+from reports.lessons.mechanisms.javascript_bounces import CHANGED
 from reports.page.documents import ENGINE, deflated, fragment, render
 from reports.page.server import in_thread
 from reports.page.style import Look, look
@@ -40,6 +42,8 @@ OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
     EDGES: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
     BETWEEN: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
+    CHANGED: look("matter", "shipped")._replace(dash=(3, 3)),
+    ROUNDED: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
 }
 
 

@@ -74,8 +74,12 @@ def show_particle(settings: Settings) -> Shown:
         ],
         played.film,
         [
-            (f"{curve.name}, largest error", f"{number(np.max(curve.y))} m")
-            for curve in played.errors()
+            ("speed at the start, v", f"{number(speed)} m/s"),
+            ("gravity, g", f"{number(gravity)} m/s²"),
+            *(
+                (f"{curve.name}, largest error", f"{number(np.max(curve.y))} m")
+                for curve in played.errors()
+            ),
         ],
         claims(played),
     )
@@ -91,11 +95,12 @@ def without_force(played: Simulation) -> list[Claim]:
     assert played.truth is not None
     way = way_of(played)
     bounces = np.searchsorted(played.truth.collisions.t, played.truth.t, side="right")
+    speed = float(np.hypot(*played.scenario.scene.velocity[0]))
     mm = number(1e3 * way)
     return [
         Claim(
-            "Until the first bounce both methods are exact: without a force, v dt is the whole"
-            " motion of a step.",
+            f"Here v = {number(speed)} m/s. Until the first bounce both methods are exact: without"
+            " a force, v dt is the whole motion of a step.",
             lambda shown: all(shown.y(name, 1)[bounces == 0].max() < ROUNDING for name in METHODS),
         ),
         Claim(
@@ -117,15 +122,17 @@ def without_force(played: Simulation) -> list[Claim]:
 def with_gravity(played: Simulation) -> list[Claim]:
     """Two orders of the same two lines."""
     assert played.truth is not None
-    gain = float(np.hypot(*played.scenario.scene.gravity)) * played.runs[0].dt  # m/s in a step
+    g = float(np.hypot(*played.scenario.scene.gravity))
+    gain = g * played.runs[0].dt  # m/s in a step
     flight = played.truth.t < played.first_collision
     offset = gain * played.truth.t[flight] / 2
     late = 1e3 * offset[-1]
     return [
         Claim(
-            "Until the first bounce explicit Euler (reference:lesson) is g dt t / 2 above the exact"
-            f" parabola, {number(late)} mm in the end. Symplectic Euler (reference:exercise) is as"
-            " far below it.",
+            f"Here g = {number(g)} m/s². Until the first bounce explicit Euler (reference:lesson)"
+            f" is g dt t / 2 above the exact parabola, {number(late)} mm at t ="
+            f" {number(float(played.truth.t[flight][-1]))} s, the last sample before it. Symplectic"
+            " Euler (reference:exercise) is as far below it.",
             lambda shown: all(
                 np.abs(above(shown, name)[flight] - sign * offset).max() < ROUNDING
                 for name, sign in (("reference:lesson", 1), ("reference:exercise", -1))

@@ -71,6 +71,10 @@ NO_CONE = (
     "restitution is applied in one pass after the substeps, without further friction: its limit is"
     " mu times the normal impulse of the substeps, not mu (1 + e) m v"
 )
+FORESEEN = (
+    "; a contact is foreseen within four slops, 20 mm, and where a step ends with a gap that a"
+    " substep would close, the substeps have taken only a part of m v"
+)
 ROUGH_PRODUCT = "the frictions of the two shapes are multiplied: mu on every shape gives mu²"
 IN_TURN = (
     "the contacts of a step are solved once, one after the other: the second wall brings back slip"
@@ -327,6 +331,15 @@ REASONS = (
         )
         for case in OF_FRICTION
         for solver in ("exercise", "lesson")
+    ),
+    Reason(
+        "friction_in_bounce",
+        "box2d_v3:shipped",
+        NO_CONE + FORESEEN,
+        "Box2D 3.1 src/constants.h: B2_SPECULATIVE_DISTANCE",
+        None,
+        "box2d_v3:matched",
+        FRICTION,
     ),
     Reason(
         "friction_in_bounce",

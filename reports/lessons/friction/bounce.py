@@ -108,8 +108,8 @@ def cone_chart(impulses: Mapping[str, Taken], law: Law) -> LessonChart:
     ]
     return LessonChart(
         "The impulse in its friction cone",
-        "friction impulse J_t in N s",
-        "normal impulse J_n in N s",
+        "friction impulse Jₜ in N s",
+        "normal impulse Jₙ in N s",
         [edges, *lines],
     )
 
@@ -119,8 +119,8 @@ def friction_chart(angles: Array, swept: Mapping[str, Taken], law: Law, here: fl
     edges = [Curve(CONE, angles, np.full(len(angles), side * law.edge)) for side in (-1.0, 1.0)]
     return LessonChart(
         "Friction impulse",
-        "angle of incidence in degrees",
-        "J_t in N s",
+        "angle of incidence from the normal in degrees",
+        "Jₜ in N s",
         [*edges, *(Curve(name, angles, each.along) for name, each in swept.items())],
         guides=[("x", here, "here")],
     )
@@ -132,7 +132,7 @@ def spin_chart(
     """The spin after the bounce at every angle."""
     return LessonChart(
         "Spin after the bounce",
-        "angle of incidence in degrees",
+        "angle of incidence from the normal in degrees",
         "ω in rad/s",
         [Curve(name, angles, spin + each.turning / inertia) for name, each in swept.items()],
         guides=[("x", here, "here")],
@@ -158,26 +158,26 @@ def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str,
     return [
         (
             "Slip",
-            f"v_t + r ω = {tidy(along)} + {number(RADIUS)} · {number(spin)} = {tidy(slip)} m/s",
+            f"vₜ + R ω = {tidy(along)} + {number(RADIUS)} · {number(spin)} = {tidy(slip)} m/s",
         ),
         (
             "Normal impulse",
-            f"J_n = (1 + e) m v_n = {number(1 + settings['e'])} · 1 · {number(FALL)} ="
+            f"Jₙ = (1 + e) m vₙ = {number(1 + settings['e'])} · 1 · {number(FALL)} ="
             f" {number(law.normal)} N s",
         ),
         (
             "To stick",
-            f"|slip| / (1/m + r²/I) = {tidy(abs(slip))} / {number(1 / law.weight)} ="
+            f"|slip| / (1/m + R²/I) = {tidy(abs(slip))} / {number(1 / law.weight)} ="
             f" {tidy(abs(slip) * law.weight)} N s would end the slip",
         ),
         (
             "Cone",
-            f"µ J_n = {number(settings['mu'])} · {number(law.normal)} = {number(law.edge)} N s",
+            f"µ Jₙ = {number(settings['mu'])} · {number(law.normal)} = {number(law.edge)} N s",
         ),
         (
             "Friction impulse",
-            f"the smaller of these two, against the slip: J_t = {tidy(friction)} N s; it changes"
-            " v_t by J_t/m and ω by r J_t/I",
+            f"the smaller of these two, against the slip: Jₜ = {tidy(friction)} N s; it changes"
+            " vₜ by Jₜ/m and ω by R Jₜ/I",
         ),
     ]
 
@@ -188,8 +188,8 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
     exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
     return [
         Claim(
-            f"The normal impulse is (1 + e) m v_n = {number(law.normal)} N s in every engine. At"
-            f" every angle the cone is equally wide, µ J_n = {number(law.edge)} N s to each side.",
+            f"The normal impulse is (1 + e) m vₙ = {number(law.normal)} N s in every engine. At"
+            f" every angle the cone is equally wide, µ Jₙ = {number(law.edge)} N s to each side.",
             lambda shown: (
                 all(abs(shown.y(name)[-1] - law.normal) <= SINGLE for name in (*NAMES, TRUTH))
                 and np.ptp(shown.y(CONE, 1)) == 0.0
@@ -198,7 +198,7 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
         ),
         *claims_here(float(slip_at(settings["angle"], settings["spin"])), settings["spin"], law),
         Claim(
-            "The contact sticks where |v_t + r ω| is at most (1 + m r²/I) µ (1 + e) v_n ="
+            "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
             f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in"
             " proportion to the slip. Where the slip is larger the impulse stays on the edge of"
             " the cone.",
@@ -269,7 +269,7 @@ def turned_short(shown: Shown, spin: float) -> bool:
     arm that is `SHORT`."""
     impulse, turn = shown.y(BOX2D, 1), shown.y(BOX2D, 2) - spin
     rubs = np.abs(impulse) > 0.05  # N s, of which float32 has four digits
-    arm = turn[rubs] * (RADIUS**2 / 2) / impulse[rubs]  # I = m r² / 2 of 1 kg
+    arm = turn[rubs] * (RADIUS**2 / 2) / impulse[rubs]  # I = m R² / 2 of 1 kg
     return bool(rubs.any() and np.abs(arm - (RADIUS - SHORT)).max() <= 1e-5)
 
 
@@ -278,12 +278,12 @@ def cone_of_v3(e: float, mu: float) -> Claim:
     narrow = mu * FALL
     if not e:
         return Claim(
-            f"At e = 0 the friction impulse of {BOX2D_V3} is within a tenth of µ J_n of the exact"
+            f"At e = 0 the friction impulse of {BOX2D_V3} is within a tenth of µ Jₙ of the exact"
             " one.",
             lambda shown: shown.gap(BOX2D_V3, chart=1) <= narrow / 10,
         )
     return Claim(
-        f"{BOX2D_V3} never gives more than µ m v_n = {number(narrow)} N s, 1/(1 + e) ="
+        f"{BOX2D_V3} never gives more than µ m vₙ = {number(narrow)} N s, 1/(1 + e) ="
         f" {number(100 / (1 + e))} % of what the cone allows: its cone is that of a bounce with e ="
         " 0.",
         lambda shown: (
@@ -303,15 +303,15 @@ BOUNCE = Lesson(
     text=(
         (
             "A disk meets a floor. The normal passes through its centre, so the normal impulse"
-            " <code>J_n</code> does not turn the disk. The friction impulse <code>J_t</code> acts"
+            " <code>Jₙ</code> does not turn the disk. The friction impulse <code>Jₜ</code> acts"
             " along the floor and does not change how fast the disk leaves it. The two decouple:"
-            " <code>J_n = (1 + e) m v_n</code> is that of a bounce without friction, and friction"
-            " acts on the <b>slip</b> <code>v_t + r ω</code>, the velocity of the point that"
+            " <code>Jₙ = (1 + e) m vₙ</code> is that of a bounce without friction, and friction"
+            " acts on the <b>slip</b> <code>vₜ + R ω</code>, the velocity of the point that"
             " touches."
         ),
         (
-            "Friction acts against the slip. An impulse of <code>|slip| / (1/m + r²/I)</code> ends"
-            " it: the contact <b>sticks</b>. Coulomb's law allows at most <code>µ J_n</code>, the"
+            "Friction acts against the slip. An impulse of <code>|slip| / (1/m + R²/I)</code> ends"
+            " it: the contact <b>sticks</b>. Coulomb's law allows at most <code>µ Jₙ</code>, the"
             " edge of the <b>friction cone</b>. If that does not end the slip, the contact"
             " <b>slips</b> until the disk leaves. See [cone] and [lever] for why Box2D differs, and"
             " [rolling] for a contact that lasts."
@@ -320,7 +320,7 @@ BOUNCE = Lesson(
     sliders=(
         Slider("e", "Restitution e", (0.0, 0.5, 1.0), 2),
         Slider("mu", "Friction µ", (0.1, 0.2, 0.5), 0),
-        Slider("angle", "Angle of incidence", (0, 15, 30, 45, 60, 75), 3, "°"),
+        Slider("angle", "Angle of incidence, from the normal", (0, 15, 30, 45, 60, 75), 3, "°"),
         Slider("spin", "Spin ω before the bounce", (-40.0, -20.0, 0.0, 20.0, 40.0), 2, "rad/s"),
     ),
     names=(*NAMES, CONE, TRUTH),

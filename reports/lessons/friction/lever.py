@@ -55,7 +55,7 @@ def show_lever(settings: Settings) -> Shown:
         Curve(TRUTH, RADII, np.ones(len(RADII))),
     ]
     chart = LessonChart(
-        "Lever arm over radius", "radius of the disk in m", "lever arm / r", curves, "x"
+        "Lever arm over radius", "radius of the disk in m", "lever arm / R", curves, "x"
     )
     facts = [("replayed: radius", f"{number(REPLAYED)} m"), *distances(runs[:1], curves, "")]
     return Shown([chart], film, facts, lever_claims(share, scenario.dt(k), scenario.scene))
@@ -76,7 +76,7 @@ def lever_claims(share: float, dt: float, scene: Scene) -> list[Claim]:
     flown = SINGLE + scene.position[0, 1] / (FALL * dt) * 2 * FLOAT32 / RADII[0]
     return [
         Claim(
-            f"{ROUGH} has the lever arm r at every radius.",
+            f"{ROUGH} has the lever arm R at every radius.",
             follows(ROUGH, np.ones(len(RADII)), 1e-12),  # float64, at the smallest impulses
         ),
         Claim(
@@ -89,7 +89,7 @@ def lever_claims(share: float, dt: float, scene: Scene) -> list[Claim]:
         Claim(
             f"The lever arm of the ablated reference is {number(1e3 * share * deep)} mm too short."
             if share
-            else "The ablated reference has the lever arm r, too.",
+            else "The ablated reference has the lever arm R, too.",
             follows(ABLATED, 1 - share * deep / RADII, flown),
         ),
         lies_on(BOX2D, share == 0.5, SINGLE),
@@ -104,7 +104,7 @@ LEVER = Lesson(
     text=(
         (
             "A friction impulse at the surface of a disk turns it with the lever arm"
-            " <code>r</code>. A wall of Box2D 2.3 has a <b>skin</b> of 10 mm. A contact is found at"
+            " <code>R</code>. A wall of Box2D 2.3 has a <b>skin</b> of 10 mm. A contact is found at"
             " the end of a step, when disk and skin overlap, and friction acts in the middle of the"
             " overlap, within the disk. The skin is a length in the units of the scene: it matters"
             " most for a small disk."

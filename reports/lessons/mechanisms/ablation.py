@@ -29,6 +29,7 @@ from scenarios.no_truth import answered
 from scenarios.truth.exact import with_oracle
 
 ABLATED, PLAIN, NO_CCD = "reference:ablated", "reference:exercise", "box2d:matched+no_ccd"
+ROUNDING = 1e-13  # of float64, in any unit of these pages
 FLOAT32 = 2.0**-24  # half of the distance of two neighbours, relative
 Read = Callable[[Trajectory], Array]
 
@@ -96,7 +97,11 @@ def distances(runs: Sequence[Run], curves: Sequence[Curve], unit: str) -> list[t
     return [
         (
             f"largest difference of the ablated reference from {run.name}",
-            f"{number(shown.gap(ABLATED, run.name))} {unit}".strip(),
+            (
+                f"{number(gap)} {unit}".strip()
+                if not 0 < (gap := shown.gap(ABLATED, run.name)) < ROUNDING
+                else "0 to rounding"
+            ),
         )
         for run in runs
         if run.name not in (PLAIN, ABLATED)

@@ -22,7 +22,6 @@ from reports.lessons.mechanisms.ablation import (
     over_time,
     page,
     runs_of,
-    setting_rows,
 )
 from reports.page.style import number
 from scenarios.families.placing import lay_out
@@ -41,7 +40,8 @@ def show_position_correction(settings: Settings) -> Shown:
     without = partial(changed, "box2d:matched", continuous=False, bullet=False, length_unit=1.0)
     runs = [play_once(without, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
     curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
-    facts = [*setting_rows(runs, "linear slop in m"), *distances(runs, curves, "mm")]
+    slop = f"{number(1e3 * runs[0].settings['linear slop in m'][1])} mm"
+    facts = [(f"{NO_CCD}, linear slop", slop), *distances(runs, curves, "mm")]
     chart = LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")
     return Shown(
         [chart],

@@ -36,9 +36,12 @@ def show_digits(settings: Settings) -> Shown:
     )
     facts = distances(runs, curves, "m")
     curves.append(Curve(TRUTH, scenario.times, np.full(scenario.intervals + 1, 1e-16)))
-    chart = LessonChart("Distance from x + v t", "time in s", "m, 0 drawn as 10⁻¹⁶", curves, "y")
+    millimetres = [Curve(each.name, each.x, 1e3 * np.asarray(each.y)) for each in curves]
     return Shown(
-        [chart],
+        [
+            LessonChart("Distance from x + v t", "time in s", "m", curves, "y"),
+            LessonChart("The same on a linear axis", "time in s", "mm", millimetres),
+        ],
         filmed(scenario, runs),
         facts,
         digits_claims(far, digits, scenario.intervals * 4, scenario.dt(4), curves[0]),
@@ -48,14 +51,16 @@ def show_digits(settings: Settings) -> Shown:
 def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) -> list[Claim]:
     """The largest sum of the rounding errors of a position, and their sum in Box2D."""
     apart = float(np.spacing(np.float32(far + 2)))  # m; the disk moves by 2 m
+    near = float(np.spacing(np.float32(far)))
     most = steps * apart / 2  # along x; y has smaller numbers, and far more digits
     largest = float(np.max(box2d.y))
     claims = [
         Claim(
-            f"{number(far)} m from the origin two neighbouring float32 numbers are"
-            f" {number(1e3 * apart)} mm apart, and a step is {number(1e3 * dt)} mm. Box2D rounds"
-            f" the position in each of {steps} steps, by at most half of that. These errors could"
-            f" add up to {number(1e3 * most)} mm. Here the largest distance is"
+            f"Two neighbouring float32 numbers are {number(1e3 * near)} mm apart at x ="
+            f" {number(far)} m, where the disk starts, and {number(1e3 * apart)} mm at x ="
+            f" {number(far + 2, 5)} m, where it ends; a step is {number(1e3 * dt)} mm along x."
+            f" Box2D rounds x in each of {steps} steps, by at most half of this distance. These"
+            f" errors could add up to {number(1e3 * most)} mm. Here the largest distance is"
             f" {number(1e3 * largest)} mm.",
             lambda shown: (
                 apart / 100 < shown.y("box2d:shipped").max() <= most
@@ -74,13 +79,13 @@ def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) 
             1,
             Claim(
                 "Here every step is rounded the same way, so the error grows in proportion to the"
-                " time: after twice the time it is twice as large.",
+                " time: on the linear axis it is a straight line.",
                 lambda shown: (
                     np.abs(
-                        shown.y("box2d:shipped")
-                        - shown.y("box2d:shipped")[-1] * shown.x("box2d:shipped") / 2
+                        shown.y("box2d:shipped", 1)
+                        - shown.y("box2d:shipped", 1)[-1] * shown.x("box2d:shipped", 1) / 2
                     ).max()
-                    < 0.05 * shown.y("box2d:shipped")[-1]
+                    < 0.05 * shown.y("box2d:shipped", 1)[-1]
                 ),
             ),
         )

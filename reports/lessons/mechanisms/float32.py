@@ -66,7 +66,6 @@ def show_float32(settings: Settings) -> Shown:
                 curves,
                 "xy",
                 guides=[("x", 1e3 * scene.dt(middle), "middle")],
-                reverse=True,
             ),
             LessonChart(
                 "Share of float32 in the error, all scenes",
@@ -187,10 +186,15 @@ def claim_of_all(profile: str, percent: Array) -> Claim:
     smaller = [name for name in names if shares[name] < 0]
     box2d = f"{BOX2D}:{profile}"
     most = f"; by more than a tenth in {', '.join(names)}" if names else ""
-    sign = f". It makes the error smaller in {', '.join(smaller)}" if smaller else ""
+    sign = (
+        f". In {len(smaller)} of these, {', '.join(smaller)}, it makes the error smaller"
+        if smaller
+        else ""
+    )
     return Claim(
         f"In {small} of {len(percent)} scenes float32 changes the error of {box2d} by less than 1 %"
-        f" at the middle step size{most}{sign}.",
+        f" at the middle step size{most}{sign}. The table has the share of all {len(percent)}; the"
+        " other scenes of the report have no exact answer, or Box2D is exact in them.",
         lambda shown: (
             int((shown.y(box2d, 1) < 1).sum()) == small
             and int((shown.y(box2d, 1) > 10).sum()) == large

@@ -40,8 +40,17 @@ def show_gravity(settings: Settings) -> Shown:
     facts = distances(runs, curves, "m")
     assert scenario.truth is not None
     curves.append(Curve(TRUTH, scenario.times, scenario.truth(scenario.times).position[:, 0, 1]))
+    start = float(scenario.scene.position[0, 1])
+    turns = [[start, *turned(np.asarray(curve.y, float))] for curve in curves]
+    heights = [
+        Curve(curve.name, np.arange(len(found)), found, dots=True)
+        for curve, found in zip(curves, turns)
+    ]
     return Shown(
-        [LessonChart("Height of the centre", "time in s", "m", curves)],
+        [
+            LessonChart("Height of the centre", "time in s", "m", curves),
+            LessonChart("How high it rises", "bounces so far", "m", heights),
+        ],
         filmed(scenario, runs),
         facts,
         bounce_claims(scenario.scene, dt, settings["order"]),
@@ -103,8 +112,12 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
 
 
 def peaks(shown: Shown, name: str) -> Array:
-    """m, the heights at which a bouncing ball turns, at the samples."""
-    y = shown.y(name)
+    """m, the heights at which a bouncing ball turns, as the second chart has them."""
+    return shown.y(name, 1)[1:]
+
+
+def turned(y: Array) -> Array:
+    """m, the heights at which it turns, at the samples."""
     return y[1:-1][(y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])]
 
 

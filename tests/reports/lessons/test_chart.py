@@ -148,3 +148,19 @@ def test_a_name_in_the_table_of_facts_is_clear_of_its_value(page: Page, width: i
 
     assert len(gaps) > 1
     assert min(gaps) > 8, gaps
+
+
+@pytest.mark.parametrize("small", [1.2e-16, 1e-12])
+def test_what_is_0_has_a_place_of_its_own_at_the_foot_of_a_logarithmic_axis(
+    page: Page, small: float
+):
+    """Below every other value and every other tick, within the axis, and called 0."""
+    zero, least, ticks = page.evaluate(
+        f"(() => {{ const axis = new Axis([0, {small}, 1e-3], true, 0, 400);"
+        f" return [axis.place(0), axis.place({small}),"
+        " axis.ticks().map(([v, text]) => [axis.place(v), text])]; })()"
+    )
+
+    assert 0 < zero < least
+    assert ticks[0] == [zero, "0"]
+    assert all(place >= least - 20 > zero for place, _ in ticks[1:])

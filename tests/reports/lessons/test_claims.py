@@ -73,7 +73,7 @@ def test_every_claim_on_a_limit_holds_for_every_engine(case: int):
 
 def distorted(shown: Shown) -> Iterator[Shown]:
     """The same sentences over other curves: of the engines only, each larger by another factor; of
-    all, upside down, scattered, steeper, with the values of the neighbour, standing still."""
+    all, upside down, scattered, steeper, with the values of the neighbour, standing still, 0."""
 
     def others(change: Callable[[int, Curve, np.ndarray, np.ndarray], np.ndarray]) -> Shown:
         charts = []
@@ -92,6 +92,7 @@ def distorted(shown: Shown) -> Iterator[Shown]:
     yield others(lambda _, __, y, ___: y * np.geomspace(1, 1e3, len(y)))
     yield others(lambda _, __, ___, neighbour: neighbour)
     yield others(lambda _, __, y, ___: np.full(len(y), y[0]))
+    yield others(lambda _, __, y, ___: np.zeros(len(y)))
 
 
 def refuted(claim: Claim, shown: Shown) -> bool:
@@ -168,7 +169,11 @@ NO_CLAIM = {
     "threshold": {
         "Raise it": "an instruction; the last claim says whether it is done",
     },
-    "mixing": {"But an engine keeps": "defines a rule"},
+    "mixing": {
+        "But an engine keeps": "defines a rule",
+        "One of them is that of": "the claims name the rule of each",
+        "Two disks with different": "says why there is no exact answer",
+    },
     "order": {"With the same gravity": "says what the scene is"},
     "gravity": {"Box2D plays twice": "says who plays; a claim says at which dt it is needed"},
     "correction": {
@@ -191,7 +196,12 @@ NO_CLAIM = {
         "It tries every order": "test_a_row_whose_outcome_depends_on_the_order_has_no_exact_answer",
         "The masses are equal": "says what the scene is",
     },
+    "horizon": {
+        "There the exact answer ends": "the first claim says when",
+        "What stays comparable": "the last claim",
+    },
     "limits": {
+        "In the names of the cases": "defines letters",
         "It misses": "says what failing is",
         "Then it halves": "test_a_limit_is_bracketed_as_closely_as_the_text_says",
         "A reason counts": "defines what tested means",
@@ -201,7 +211,7 @@ NO_CLAIM = {
         "+16_substeps": "names what is changed",
     },
     "friction": {
-        "J_n = (1 + e) m v_n": "defines both; the first claim has its number",
+        "Jₙ = (1 + e) m vₙ": "defines both; the first claim has its number",
         "An impulse of |slip|": "defines to stick; the list below has its numbers",
         "Coulomb's law allows": "defines the cone; a claim says where the impulse lies",
         "See": "names other lessons",

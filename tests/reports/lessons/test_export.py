@@ -189,7 +189,7 @@ ANSWER = Shown([]).to_json()  # of a lesson that shows nothing
     ("words", "said"),
     [
         (["ordr"], "did you mean order?"),
-        (["xyzzy"], "there are particle, thrust"),
+        (["xyzzy"], "there are 1 particle, 2 thrust"),
         (["order", "--export", "folder"], "--export folder: is a folder; name a file"),
         (["order", "--export", "other.html"], "other.html: exists and is no page of a lesson"),
         (["order", "--export", "nowhere/a.html"], "nowhere/a.html: No such file or directory"),
@@ -258,3 +258,12 @@ def test_a_run_that_fails_ends_the_export_in_one_sentence(
 def fails(*_: object) -> None:
     """What a lesson with a fault does."""
     raise ZeroDivisionError("of a lesson")
+
+
+def test_a_lesson_is_found_by_its_number_and_help_names_all(tmp_path: Path):
+    """As pages and README number them."""
+    shown = " ".join(crosscheck("lesson", "--help", cwd=tmp_path).stdout.split())
+
+    for name, lesson in LESSONS.items():
+        assert command.checked_lesson(lesson.number) == command.checked_lesson(name) == name
+    assert ", ".join(f"{lesson.number} {name}" for name, lesson in LESSONS.items()) in shown

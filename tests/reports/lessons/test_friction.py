@@ -37,7 +37,7 @@ def test_angle_spin_and_friction_leave_the_normal_impulse_as_it_is():
 
 
 def test_the_edge_of_the_cone_lies_between_stick_and_slip():
-    """The exact impulse has a corner at mu (1 + e) (1 + m r2 / I) v_n of slip: 3 m/s of 5 m/s."""
+    """The exact impulse has a corner at mu (1 + e) (1 + m r2 / I) vₙ of slip: 3 m/s of 5 m/s."""
     shown = BOUNCE.at(BOUNCE.start)
     angle, impulse = shown.x(TRUTH, 1), shown.y(TRUTH, 1)
     corner = np.degrees(np.arctan(3 / 5))
@@ -120,7 +120,7 @@ def of_states(*states: State) -> Trajectory:
 
 def test_a_change_of_the_order_moves_the_ablated_reference_onto_box2d():
     """From the exact answer, with one mechanism: restitution after friction."""
-    off, on = CONE_PAGE.at((0, 1, 1)), CONE_PAGE.at((1, 1, 1))
+    off, on = CONE_PAGE.at((0, 1, 2)), CONE_PAGE.at((1, 1, 2))
 
     assert off.gap("reference:ablated") <= 1e-5 < 0.04 < off.gap("reference:ablated", BOX2D_V3)
     assert on.gap("reference:ablated", BOX2D_V3) <= 1e-5 < 0.04 < on.gap("reference:ablated")
