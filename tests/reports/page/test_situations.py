@@ -230,7 +230,7 @@ def test_one_scene_is_described_without_counts_of_scenes():
     engines = off.drop(columns="reference:ordered")
 
     assert findings.closest(engines) == (
-        "Closest to the exact answer of a, by the largest deviation in radii:"
+        "Closest of the ranked engines to the exact answer of a, by the largest deviation in radii:"
         " reference:exercise (0.1), then pymunk:matched (0.2), box2d:shipped (0.3), last"
         " box2d:matched (2)."
     )
