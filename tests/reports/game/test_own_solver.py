@@ -3,6 +3,7 @@ flight leaves the others."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 import subprocess
@@ -105,7 +106,8 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     browser: Browser, tmp_path: Path, act: str, reason: str
 ):
     """Whether it throws or hangs: the page says so in the field and in its row, and the ghost
-    becomes solid."""
+    becomes solid, which the page says, too; a ring shows where its ship was. It is solid again in a
+    new flight."""
     path = solver(tmp_path, AFTER.format(calls=3000, act=act))
     with page_of(browser, path) as page:
         began = monotonic()
@@ -114,7 +116,19 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
         banner = page.locator("#banner").inner_text()
         row = page.locator("tr[data-engine$=':own'] [data-cell=diverged]").inner_text()
         solid, frame = page.evaluate("[game.field.engines[game.now.solid], game.now.frame]")
+        chosen = page.locator("[name=solid]:checked").get_attribute("value")
+        then = page.locator("tr.solid [data-cell=diverged]").inner_text()
+        page.wait_for_function("() => game.sky.last[3].length")
+        [mark] = page.evaluate("game.sky.last[3].map((mark) => mark.text)")
+        page.evaluate("game.field.seen = true")
+        page.keyboard.press("n")
+        page.wait_for_function("() => !game.field.seen")
+        again = page.locator("[name=solid]:checked").get_attribute("value")
 
+    assert (chosen, again) == ("reference:exercise", f"{path}:own")
+    assert re.fullmatch(r"solid since 0\.\d\d s, when Exercise.js left", then)
+    assert mark == "Exercise.js left"
+    assert banner.endswith("; reference:exercise is solid from here on")
     assert frame == 30
     assert solid == "reference:exercise"
     assert row.startswith("left at 0.")

@@ -323,11 +323,17 @@ def test_another_engine_can_be_solid(page: Page):
 
 
 def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
-    """Nothing scrolls sideways but the table; Tab comes to every control, with a visible
-    outline."""
+    """Nothing scrolls sideways, on a phone not even the table; Tab comes to every control, with a
+    visible outline."""
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
     page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
     too_wide = overhang(page)
+    cut = page.evaluate(
+        "(({ scrollWidth: a, clientWidth: b }) => a - b)(document.querySelector('.scroll'))"
+    )
+    headed = page.locator("tr.solid td[data-cell=collisions]").evaluate(
+        "(cell) => getComputedStyle(cell, '::before').content"
+    )
     page.set_viewport_size({"width": 1280, "height": 800})
     too_wide = max(too_wide, overhang(page))
     reached = []
@@ -339,7 +345,7 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     outlined = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
     page.context.close()
 
-    assert too_wide <= 0
+    assert (too_wide <= 0, cut <= 0, headed) == (True, True, '"Collisions"')
     assert {
         "sky",
         "pause",
