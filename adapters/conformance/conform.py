@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from adapters.conformance.contract import CONTRACT
 from adapters.conformance.physics import PHYSICS
@@ -47,7 +48,8 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
     cannot be made or its file cannot be loaded.
 
     Every exception becomes a finding: a refusal (`Unsupported`) counts as not asked, any other
-    exception as a failed probe.
+    exception as a failed probe. A solver of the exercise that raises, or does not return, is a
+    faulty solver and breaks no protocol: its cells fail with the same reason.
     """
     engine, profile = name.split(":")
     with processes_reused():
@@ -61,7 +63,9 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
             return [no_answer(name, "not loaded", str(fault))]
 
 
-def no_answer(name: str, what: str, why: str) -> Finding:
+def no_answer(
+    name: str, what: str, why: str, verdict: Literal["breaks", "departs"] = "breaks"
+) -> Finding:
     """The one finding of an engine that could not be made, or did not survive its probes."""
     engine, profile = name.split(":")
     return Finding(
@@ -72,7 +76,7 @@ def no_answer(name: str, what: str, why: str) -> Finding:
         "no",
         "yes",
         0.0,
-        "breaks",
+        verdict,
         f"{what}: {why}",
     )
 
@@ -90,7 +94,7 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
     except Exception as error:  # an engine may raise anything; the finding records it
         reading, verdict = (
             ProbeReading("raised", "an answer", note=f"{type(error).__name__}: {error}"),
-            missed(name, row) if is_own(row) else "breaks",
+            "departs" if row.exercise else missed(name, row) if is_own(row) else "breaks",
         )
     return Finding(
         engine,

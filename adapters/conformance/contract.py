@@ -2,7 +2,8 @@
 from it.
 
 A solver's own file is played by an adapter of ours. So it breaks the protocol only by what the
-adapter cannot keep from it: state from one call to the next, numbers that are none, no answer.
+adapter cannot keep from it, such as state from one call to the next. One that raises or gives
+numbers that are none is a faulty solver.
 """
 
 from __future__ import annotations
@@ -75,12 +76,12 @@ def read_copies(row: EngineRow) -> ProbeReading:
         engine.step(5)
         late = engine.read()
         for name, array in vars(late).items():
-            if not np.array_equal(getattr(early, name), before[name]):
+            if not np.array_equal(getattr(early, name), before[name], equal_nan=True):
                 faults.add(f"{name} changed by a step")
             kept = array.copy()
             if array.flags.writeable:
                 array.fill(99.0)
-            if not np.array_equal(getattr(engine.read(), name), kept):
+            if not np.array_equal(getattr(engine.read(), name), kept, equal_nan=True):
                 faults.add(f"{name} changed by writing")
     return ProbeReading("; ".join(sorted(faults)) or "copies", "copies")
 
@@ -307,7 +308,10 @@ CONTRACT: dict[str, Probe] = {
         handed_on=True,
     ),
     "stays_finite": Probe(
-        "Is every number finite for 20 steps of a plain scene?", stays_finite, "breaks"
+        "Is every number finite for 20 steps of a plain scene?",
+        stays_finite,
+        "breaks",
+        handed_on=True,
     ),
     "force_lasts_one_step": Probe(
         "How much faster is a disk 3 steps after a force than after its first step?",

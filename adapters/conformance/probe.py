@@ -48,8 +48,8 @@ class Probe:
         failure: "breaks" if a miss means that the adapter breaks the protocol, so that no number of
             the engine may be trusted; "departs" if it means other physics than the scene states.
         handed_on: it reads values that an adapter passes to its library (mass, forces, dt) or from
-            it (collisions). A solver's own file gets these from the harness, so a failure is due to
-            its physics, and departs.
+            it (collisions, numbers that are none). A solver's own file gets these from the harness,
+            so a failure is due to its physics, and departs.
     """
 
     asked: str

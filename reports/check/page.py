@@ -43,11 +43,13 @@ GROUPS: dict[Verdict, tuple[str, str]] = {
     "not asked": ("Not asked", "These could not be asked; each row says why."),
 }
 SCRIPTS = (*ENGINE, "check/check.js")
+SPEEDS = (0.1, 0.25, 0.5, 1)  # of a replay, simulated seconds in a second
+WATCHED = 4.0  # s, long enough to see a collision
 
 
 class SceneShown(NamedTuple):
-    """A smallest scene on the page: in words, as a replay with its layers, and for paper as a
-    picture with its caption."""
+    """A smallest scene on the page: in words, as a replay with its layers and its first speed, and
+    for paper as a picture with its caption."""
 
     smallest: Smallest
     title: str
@@ -55,6 +57,7 @@ class SceneShown(NamedTuple):
     layers: list[str]
     replay: str
     ratio: float
+    speed: float
     picture: str
     caption: str
 
@@ -79,6 +82,7 @@ def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None
         shows=shows,
         together=together,
         unseen=unseen(check, scenes),
+        speeds=SPEEDS,
         dt=shown(DT),
         version=version("crosscheck2d"),
         digest="" if check.solver is None else check.solver.digest,
@@ -102,9 +106,15 @@ def scene_shown(name: str, smallest: Smallest) -> SceneShown:
         [style.TRUTH if run is None else run.name for run, _ in layers],
         pack_layers(scenario, layers),
         ratio_of(scenario, layers),
+        speed_of(scenario.duration),
         data_url(smallest),
         legend(smallest),
     )
+
+
+def speed_of(duration: float) -> float:
+    """The speed at which a replay begins: the highest at which it takes `WATCHED`; 1: real time."""
+    return max((speed for speed in SPEEDS if duration / speed >= WATCHED), default=min(SPEEDS))
 
 
 def layers_of(name: str, smallest: Smallest) -> list[tuple[Run | None, Trajectory]]:

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engines import OWN
+from reports.check.evidence import lines_and_formula
 from reports.check.verdict import check_file
+from reports.page.own_solvers import Said, with_lines
 from reports.run.runner import run_all
 from reports.run.suite import Check
 from reports.run.worker_process import Failure
@@ -29,27 +31,29 @@ def checks_of(engines: Sequence[str]) -> dict[str, Callable[[], Check]]:
 
 
 def checked(path: Path) -> Check:
-    """The check of one file, in few sentences."""
+    """The check of one file, in few sentences, each with the lines of the file."""
     one = check_file(path)
-    return Check(one.passed, one.sentences, one.solver.source if one.solver else "")
+    shown = [lines_and_formula(row) for row in one.findings]
+    return Check(one.passed, one.sentences, shown, one.solver.source if one.solver else "")
 
 
-def said_of(engines: Sequence[str]) -> dict[str, list[str]]:
-    """The check of each solver's file among these engines, also printed on standard error: the game
-    plays them with their faults."""
+def said_of(engines: Sequence[str]) -> dict[str, list[Said]]:
+    """The check of each solver's file among these engines, its sentences also printed on standard
+    error: the game plays them with their faults."""
     tasks: dict[Hashable, Any] = {name: check for name, check in checks_of(engines).items()}
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[Said]] = {}
     if not tasks:
         return found
     with closing(run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)) as results:
         for name, check in results:
+            late = f"It was not checked within {CHECKING:g} s: crosscheck check says more."
             found[name] = (
-                [f"It was not checked within {CHECKING:g} s: crosscheck check says more."]
+                with_lines([late], [])
                 if isinstance(check, Failure)
-                else check.says
+                else with_lines(check.says, check.shown)
             )
     found = {name: found[name] for name in engines if name in found}
-    for line in lines(found):
+    for line in lines({name: [sentence for sentence, _ in found[name]] for name in found}):
         say(line)
     return found
 

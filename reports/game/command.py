@@ -5,18 +5,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from contextlib import closing
-from math import inf
 from pathlib import Path
 from typing import cast
 
-from adapters.engine import Engine
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, OWN
 from adapters.own_engine.engine import row_of_file
 from adapters.own_solver.engine import Student
 from adapters.own_solver.file import KINDS
 from adapters.own_solver.restitution import EXERCISE
-from adapters.runaway import fault_of
 from reports.game.flight import FRAME, field_scenario
 from reports.game.messages import MOST_ENGINES
 from reports.game.server import Game
@@ -51,8 +48,9 @@ def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
 
 
 def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
-    """The rows of solvers' files, `PATH:own`, each tried on a ship and an asteroid, and the
-    restitution that the first of them is written for; exits 2 with a line for each that fails."""
+    """The rows of solvers' files, `PATH:own`, each loaded with a ship and an asteroid, and the
+    restitution that the first of them is written for; exits 2 with a line for each that cannot be
+    loaded. One that fails later leaves the flight, where the page says why."""
     rows, faults, restitutions = {}, [], []
     for name in names:
         path = Path(name.removesuffix(OWN))
@@ -60,7 +58,7 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
         with closing(cast(Student, rows[name].make())) as engine:
             try:
                 restitutions.append(engine.own_restitution)
-                try_out(engine, restitutions[-1])
+                engine.load(field_scenario(asteroids=1, restitution=restitutions[-1]).scene, FRAME)
             except Exception as error:  # somebody's solver may raise anything
                 reason = str(error) or type(error).__name__
                 reason = reason.removeprefix(f"{path.name}: ").removeprefix(f"{path.name} ")
@@ -68,15 +66,6 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
     if faults:
         refuse(faults)
     return rows, next(iter(restitutions), EXERCISE)
-
-
-def try_out(engine: Engine, restitution: float) -> None:
-    """Take a ship and an asteroid through a step; raises what the engine raises, `ValueError` if
-    what it gives cannot be gone on from."""
-    engine.load(field_scenario(asteroids=1, restitution=restitution).scene, FRAME)
-    engine.step()
-    if fault := fault_of(engine.read(), inf):
-        raise ValueError(fault)
 
 
 def read_flight(path: Path) -> Scenario:

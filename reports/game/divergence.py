@@ -1,5 +1,5 @@
-"""Finds the collision at which two engines part: the first after which a disk moves on differently
-in the two."""
+"""Finds the collision at which two engines diverge: the first after which the velocity of a disk
+differs in the two."""
 
 from __future__ import annotations
 
@@ -11,23 +11,34 @@ import numpy as np
 from adapters.engine import ContactImpulse
 from scenarios.model import Array, Scene, State
 
-# m/s: disks that move on differently by less have not diverged, they were found a step early or
-# late
+# m/s: disks whose velocities differ by less have not diverged, they were found a step early or late
 DIVERGED = 0.01
-# frames without a collision of a disk before its velocities are compared: engines find a collision
-# some steps apart
+# frames on end in which a velocity differs before it counts: engines find a collision some steps
+# apart
 WAIT = 6
+NEVER = 2**31  # a frame that no flight has
 
 
-class LastCollision(NamedTuple):
-    """A disk's latest collision: frame, its disks (wall w as -1 - w), and where the two touched,
-    (x, y) m."""
+class FirstCollision(NamedTuple):
+    """The first collision of a disk in a frame: its time, s on the flight's clock, its frame, its
+    disks (wall w as -1 - w), and where the two touched, (x, y) m."""
 
+    t: float
     frame: int
     i: int
     j: int
     x: float
     y: float
+
+    @property
+    def pair(self) -> frozenset[int]:
+        """What collided."""
+        return frozenset((self.i, self.j))
+
+    @property
+    def disks(self) -> set[int]:
+        """Its disks, without a wall."""
+        return {disk for disk in (self.i, self.j) if disk >= 0}
 
 
 class Edge(NamedTuple):
@@ -38,40 +49,66 @@ class Edge(NamedTuple):
     y: float
 
 
-class Divergence(NamedTuple):
-    """Where a ghost left the solid ship's engine: the collision, or the edge that the ship of only
-    one of them left the field by, and whose it was."""
+class Drift(NamedTuple):
+    """A disk whose velocity came to differ without a collision: frame, disk, where it is then,
+    (x, y) m."""
 
-    at: LastCollision | Edge
-    shared: bool  # both engines had it, and made different velocities of it
-    solid_only: bool
+    frame: int
+    disk: int
+    x: float
+    y: float
+
+
+class Divergence(NamedTuple):
+    """Where a ghost diverged from the solid ship's engine, and what happened there.
+
+    Attributes:
+        at: the collision; the edge that a ship left the field by; or where there was neither.
+        solid: the engine that was solid then.
+        only: the engine in which alone it happened; "": in both.
+    """
+
+    at: FirstCollision | Edge | Drift
+    solid: str
+    only: str
 
 
 class Touches:
-    """The latest collision of every disk in one engine, and how many there were.
+    """The first collision of every disk in each of the last frames of one engine, and how many
+    collisions there were.
 
     scene: whose radii tell where two disks touch.
+    dt: s, of a step.
     weight: N s, of `weight_impulse`.
     """
 
-    def __init__(self, scene: Scene, weight: float) -> None:
-        self.radius, self.weight, self.count = scene.radius, weight, 0
-        self.frame = np.full(scene.n, -WAIT)
-        self.last: dict[int, LastCollision] = {}
+    def __init__(self, scene: Scene, dt: float, weight: float) -> None:
+        self.radius, self.dt, self.weight, self.count = scene.radius, dt, weight, 0
+        self.since = 0.0  # s on the flight's clock from which the engine counts its steps
+        self.recent: list[FirstCollision] = []
         # by pair: step of the latest impulse, and size of the strongest
         self.step: dict[tuple[int, int], int] = {}
         self.strongest: dict[tuple[int, int], float] = {}
 
-    def note(self, collisions: Iterable[ContactImpulse], frame: int, state: State) -> None:
-        """`collisions` happened in frame `frame`, which ended in `state`."""
+    def note(
+        self, collisions: Iterable[ContactImpulse], frame: int, before: State, began: float
+    ) -> None:
+        """`collisions` happened in frame `frame`, after `before`, the state at `began` s.
+
+        Where two disks touched is found from `before`: afterwards a faulty solver may have thrown
+        them across the field.
+        """
+        self.recent = [one for one in self.recent if one.frame >= frame - WAIT]
+        struck = {disk for one in self.recent if one.frame == frame for disk in one.disks}
         for collision in collisions:
             i, j = (collision.i, collision.j) if collision.i >= 0 else (collision.j, collision.i)
             self.count += self.begins(collision)
-            x, y = contact(state.position, self.radius, i, j)
-            for disk in (i, j):
-                if disk >= 0:
-                    self.frame[disk] = frame
-                    self.last[disk] = LastCollision(frame, i, j, x, y)
+            t = self.since + (collision.step + 1) * self.dt
+            if not {i, max(i, j)} <= struck:
+                position = before.position + (t - began) * before.velocity
+                place = contact(position, self.radius, i, j)
+                self.recent.append(FirstCollision(t, frame, i, j, *place))
+                struck |= self.recent[-1].disks
 
     def begins(self, collision: ContactImpulse) -> bool:
         """Whether an impulse is a collision of its own, as `first_collisions` counts
@@ -88,12 +125,12 @@ class Touches:
         before, self.step[pair] = self.step.get(pair, -2), collision.step
         return collision.step - before > 1 or size > self.weight
 
-    def begin_again(self, disk: int) -> None:
-        """The engine counts its steps from 0 again, and `disk` is at its start: nothing has struck
-        it yet."""
+    def begin_again(self, disk: int, now: float) -> None:
+        """The engine counts its steps from 0 again, from `now` s of the flight on, and `disk` is
+        placed anew: nothing has struck it yet."""
+        self.since = now
         self.step.clear()
-        self.frame[disk] = -WAIT
-        self.last.pop(disk, None)
+        self.recent = [one for one in self.recent if disk not in one.disks]
 
 
 def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, float]:
@@ -103,22 +140,28 @@ def contact(position: Array, radius: Array, i: int, j: int) -> tuple[float, floa
     return float(x), float(y)
 
 
-def divergence(
-    solid: Touches, ghost: Touches, velocity: Array, other: Array, frame: int
-) -> Divergence | None:
-    """The collision after which the velocities (n, 2) m/s of solid and ghost differ, if they do by
-    frame `frame`."""
-    latest = np.maximum(solid.frame, ghost.frame)
-    diverged = np.hypot(*(velocity - other).T) > DIVERGED
-    found = np.flatnonzero(diverged & (latest >= 0) & (frame - latest >= WAIT))
-    if not len(found):
+def differing_since(since: Array, velocity: Array, other: Array, frame: int) -> Array:
+    """(n,) the frame since which each disk has had another velocity, (n, 2) m/s, in two engines,
+    `NEVER` where it has the same; `since`: the same of the frame before `frame`."""
+    differs = np.hypot(*(velocity - other).T) > DIVERGED
+    return np.where(differs, np.minimum(since, frame), NEVER)
+
+
+def cause_of(
+    since: Array, solid: Touches, ghost: Touches, state: State, frame: int
+) -> tuple[FirstCollision | Drift, bool, bool] | None:
+    """What made a disk differ that has done so for `WAIT` frames by the end of frame `frame`, and
+    whether it happened in the solid engine and in the ghost; None if no disk has. `state`: the
+    ghost's."""
+    first = since.min()
+    if frame - first + 1 < WAIT:
         return None
-    disk = int(found[np.argmin(latest[found])])
-    mine, theirs = solid.last.get(disk), ghost.last.get(disk)
-    both = bool(
-        mine and theirs and {*mine[1:3]} == {*theirs[1:3]} and abs(mine.frame - theirs.frame) < WAIT
-    )
-    solid_later = mine is not None and (theirs is None or mine.frame >= theirs.frame)
-    collision = mine if both or solid_later else theirs
-    assert collision is not None
-    return Divergence(collision, both, not both and solid_later)
+    disks = set(np.flatnonzero(since == first).tolist())
+    noted = [one for one in (*solid.recent, *ghost.recent) if one.frame == first]
+    if not (noted := [one for one in noted if one.disks & disks]):
+        disk = min(disks)
+        return Drift(int(first), disk, *state.position[disk].tolist()), True, True
+    # both its disks, if others of them met a right one in the same frame
+    at = min(noted, key=lambda one: (not one.disks <= disks, one.t))
+    had = [any(one.pair == at.pair for one in touches.recent) for touches in (solid, ghost)]
+    return at, had[0], had[1]

@@ -4,6 +4,7 @@
 const looks = JSON.parse(document.getElementById("looks").textContent);
 const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
 const SHIP = 0;
+const EDGE = 6;  // pixels between a label and the edge of the field
 
 // The same sky and the same rocks on every visit (a linear congruential generator; Numerical Recipes, 7.1).
 function random(seed) {
@@ -230,12 +231,12 @@ class Field {
   drawLabel(pen, { x, y, name, text }, taken) {
     const [px, py] = this.pixel(x, y);
     const line = this.font(pen), width = pen.measureText(text).width, away = this.large ? 24 : 15;
-    const left = px + away + width > this.size[0] ? Math.max(2, px - away - width) : px + away;
+    const left = px + away + width > this.size[0] - EDGE ? Math.max(EDGE, px - away - width) : Math.max(EDGE, px + away);
     const box = (top) => [left, top, left + width, top + line];
     const meets = (one) => taken.some((other) => one[0] < other[2] && other[0] < one[2] && one[1] < other[3] && other[1] < one[3]);
-    const lowest = this.size[1] - line - 2, first = Math.min(lowest, Math.max(2, py - 1.2 * line));
+    const lowest = this.size[1] - line - EDGE, first = Math.min(lowest, Math.max(EDGE, py - 1.2 * line));
     const tops = Array.from({ length: 2 * Math.ceil(this.size[1] / line) }, (_, k) => first + (k % 2 ? -1 : 1) * Math.ceil(k / 2) * line);
-    const free = box(tops.find((top) => top >= 2 && top <= lowest && !meets(box(top))) ?? first);
+    const free = box(tops.find((top) => top >= EDGE && top <= lowest && !meets(box(top))) ?? first);
     this.write(pen, text, free, looks[name].dark);
     return free;
   }
@@ -244,8 +245,8 @@ class Field {
   drawName(pen, { label, at }) {
     const [px, py] = this.pixel(...at[SHIP]), r = this.field.radius[SHIP] * this.scale;
     const line = this.font(pen), width = pen.measureText(label).width;
-    const left = Math.min(Math.max(2, px - width / 2), this.size[0] - width - 2);
-    const top = py + r + 3 + line > this.size[1] ? py - r - 3 - line : py + r + 3;
+    const left = Math.min(Math.max(EDGE, px - width / 2), this.size[0] - width - EDGE);
+    const top = py + r + 3 + line > this.size[1] - EDGE ? py - r - 3 - line : py + r + 3;
     this.write(pen, label, [left, top], "#f2f4f8");
     return [left, top, left + width, top + line];
   }

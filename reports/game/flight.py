@@ -17,10 +17,18 @@ from adapters.engines import ENGINES
 from adapters.first_collisions import weight_impulse
 from adapters.own_solver.engine import Student
 from adapters.runaway import RUNAWAY, fault_of, reach
-from reports.game.divergence import WAIT, Divergence, Edge, Touches, divergence
+from reports.game.divergence import (
+    NEVER,
+    WAIT,
+    Divergence,
+    Edge,
+    Touches,
+    cause_of,
+    differing_since,
+)
 from reports.game.pilot import SHIP, Pilot
 from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
-from scenarios.model import Array, Scenario, State
+from scenarios.model import Array, Scenario, Scene, State
 from scenarios.no_truth import NoTruth
 
 # s; a power of two, so that every instant of a saved flight is a whole number of steps without
@@ -31,6 +39,8 @@ LONGEST = 600.0  # s, of a flight
 EARTH, EARTH_SIZE = (3.5, 1.5), 0.5
 # squared speed and angular velocity below which the exercise says "You won"
 SLOW, SLOW_SPIN = 0.1, 0.1
+# m: distance of the places to which a ship may be set back, and the room that it must have there
+GRID, CLEARANCE = 0.125, 0.01
 
 
 def field_scenario(
@@ -57,13 +67,13 @@ class Flyer:
     Attributes:
         name: `engine:profile`.
         state: at the end of the last frame.
-        touches: the latest collision of every disk, and how many there were.
+        touches: the latest collisions, and how many there were.
         left: why it flies no more, or "".
         left_at: s on the flight's clock, the end of the frame in which it left.
-        since: s on the flight's clock when its own began: at the start, or when its ship was set
-            back.
         edges: where and when its ship left the field, each time.
+        beside: whether the start was taken when its ship was set back last.
         seen: how many of its collisions since then are in `touches`.
+        differs: (n,) frame since which each disk has had another velocity than in the solid one.
         divergence: where it diverged from the solid one.
     """
 
@@ -71,23 +81,38 @@ class Flyer:
     engine: Engine
     state: State
     touches: Touches
+    differs: Array
     left: str = ""
     left_at: float = 0.0
-    since: float = 0.0
     edges: list[Edge] = field(default_factory=list)
+    beside: bool = False
     seen: int = 0
     divergence: Divergence | None = None
 
     @property
     def set_backs(self) -> int:
-        """How often its ship was set back to the start."""
+        """How often its ship was set back."""
         return len(self.edges)
 
     def leave(self, reason: Exception | str, at: float) -> None:
         """Fly no more, from `at` s of the flight on."""
         if isinstance(reason, Exception):
-            reason = on_the_clock(reason, self.since)
+            reason = on_the_clock(reason, self.touches.since)
         self.left, self.left_at = reason, at
+
+
+def free_place(scene: Scene, position: Array) -> Array:
+    """(2,) m, the place nearest to the ship's start where it is `CLEARANCE` away from every other
+    disk; the start, if there is none."""
+    start, radius = scene.position[SHIP], scene.radius[SHIP]
+    low, high = np.array([LOW, HIGH]) + radius * np.array([[1], [-1]])
+    grid = np.stack(np.meshgrid(*(np.arange(*ends, GRID) for ends in zip(low, high))), -1)
+    places = np.concatenate([[start], grid.reshape(-1, 2)])
+    places = places[np.argsort(np.hypot(*(places - start).T), kind="stable")]
+    others = np.delete(position, SHIP, axis=0), np.delete(scene.radius, SHIP)
+    gaps = np.hypot(*(places[:, None] - others[0]).T).T - others[1] - radius
+    free: Array = places[np.append((gaps >= CLEARANCE).all(axis=1).nonzero()[0], 0)[0]]
+    return free
 
 
 SECONDS = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?) s\b")
@@ -108,7 +133,9 @@ class Flight:
 
     The ship that leaves the exercise's field is set back to its start, at rest, at the end of that
     step, as in the exercise, and in each engine by itself: the engine is loaded anew with all else
-    as it is. In any other scene with a wrap disk 0 wraps like the rest, as it does in `play`.
+    as it is. Where the start is taken, the ship goes to the nearest free place, because an event
+    engine cannot begin with an overlap. In any other scene with a wrap disk 0 wraps like the rest,
+    as it does in `play`.
     """
 
     def __init__(self, scenario: Scenario, names: Sequence[str], replayed: bool = False) -> None:
@@ -127,8 +154,9 @@ class Flight:
     def boarded(self, name: str) -> Flyer:
         """An engine with the scene in it; one that cannot be made or refuses says why in `left`."""
         scene = self.scenario.scene
-        touches = Touches(scene, weight_impulse(scene, self.dt))
-        flyer = Flyer(name, None, scene.state, touches)  # type: ignore[arg-type]
+        touches = Touches(scene, self.dt, weight_impulse(scene, self.dt))
+        agreed = np.full(scene.n, NEVER)
+        flyer = Flyer(name, None, scene.state, touches, agreed)  # type: ignore[arg-type]
         try:
             flyer.engine = ENGINES[name].make()
             flyer.engine.load(scene, self.dt)
@@ -141,6 +169,13 @@ class Flight:
     def solid(self) -> Flyer:
         """The first that still flies; the first of all if none does."""
         return next((flyer for flyer in self.flyers if not flyer.left), self.flyers[0])
+
+    @property
+    def solid_since(self) -> float:
+        """s on the flight's clock when the solid one took over from the last that left; 0.0: it has
+        been solid from the start."""
+        left = [flyer.left_at for flyer in self.flyers[: self.flyers.index(self.solid)]]
+        return max(left, default=0.0)
 
     @property
     def over(self) -> bool:
@@ -217,7 +252,7 @@ class Flight:
             flyer.leave(fault, ends)
             return
         if len(collisions) > flyer.seen:
-            flyer.touches.note(collisions[flyer.seen :], self.frame, flyer.state)
+            flyer.touches.note(collisions[flyer.seen :], self.frame, before, step * self.dt)
             flyer.seen = len(collisions)
         if self.ship_left(before, flyer.state):
             self.set_back(flyer, before, (step + count) * self.dt)
@@ -229,18 +264,21 @@ class Flight:
 
     def set_back(self, flyer: Flyer, before: State, now: float) -> None:
         """The ship to its start, all else as it is, at `now` s; it was last seen in `before`."""
+        scene = self.scenario.scene
         arrays: dict[str, Any] = {
             name: np.array(array) for name, array in vars(flyer.state).items()
         }
         for name, array in arrays.items():
-            array[SHIP] = getattr(self.scenario.scene, name)[SHIP]
+            array[SHIP] = getattr(scene, name)[SHIP]
+        arrays["position"][SHIP] = free_place(scene, arrays["position"])
+        flyer.beside = bool((arrays["position"][SHIP] != scene.position[SHIP]).any())
         flyer.edges.append(Edge(self.frame, *before.position[SHIP].tolist()))
-        flyer.touches.begin_again(SHIP)
-        flyer.seen, flyer.since = 0, now
+        flyer.touches.begin_again(SHIP, now)
+        flyer.seen = 0
         try:
-            flyer.engine.load(replace(self.scenario.scene, **arrays), self.dt)
+            flyer.engine.load(replace(scene, **arrays), self.dt)
             flyer.state = flyer.engine.read()
-        except Exception as error:  # say, an event engine, where the start is taken by an asteroid
+        except Exception as error:  # a refusal, or whatever an engine raises
             flyer.leave(f"the ship cannot be set back: {on_the_clock(error, now)}", now)
 
     def compare(self) -> None:
@@ -259,16 +297,21 @@ class Flight:
         Ships are set back one by one, so that a ship is not compared while it was set back in one
         of the two only; one that stays the only one has diverged at the edge.
         """
-        solid = self.solid
-        velocity, other = solid.state.velocity, ghost.state.velocity
+        solid, frame = self.solid, self.frame - 1  # the one that was flown
+        velocity, other = solid.state.velocity.copy(), ghost.state.velocity
+        if solid.set_backs != ghost.set_backs:
+            velocity[SHIP] = other[SHIP]
+        ghost.differs = differing_since(ghost.differs, velocity, other, frame)
+        if found := cause_of(ghost.differs, solid.touches, ghost.touches, ghost.state, frame):
+            at, in_solid, in_ghost = found
+            only = "" if in_solid and in_ghost else solid.name if in_solid else ghost.name
+            return Divergence(at, solid.name, only)
         if solid.set_backs != ghost.set_backs:
             more = max(solid, ghost, key=lambda flyer: flyer.set_backs)
             edge = more.edges[min(solid.set_backs, ghost.set_backs)]
-            if self.frame - edge.frame >= WAIT:
-                return Divergence(edge, False, more is solid)
-            velocity = velocity.copy()
-            velocity[SHIP] = other[SHIP]
-        return divergence(solid.touches, ghost.touches, velocity, other, self.frame)
+            if frame - edge.frame + 1 >= WAIT:
+                return Divergence(edge, solid.name, more.name)
+        return None
 
     @property
     def won(self) -> bool:

@@ -9,6 +9,7 @@ class Game {
   constructor() {
     this.sky = new Field(by("sky"));
     this.rows = [...document.querySelectorAll("tr[data-engine]")];
+    this.chosen = document.querySelector("[name=solid]:checked").value;  // solid when a flight begins
     Object.assign(this, { field: null, frames: [], waiting: 0, owed: 0, paused: reducedMotion.matches, down: new Set(), stopped: new Set(), gone: new Set(), pace: [], drawn: [] });
     this.listen();
     this.connect();
@@ -69,7 +70,9 @@ class Game {
   nameThoseWhoLeave(frame) {
     const left = this.field.engines.filter((name, k) => frame.flyers[k].left && !this.gone.has(name));
     left.forEach((name) => this.gone.add(name));
-    if (left.length) this.announce(left.map((name) => `${shortName(name)} ${farewell(frame.flyers[this.field.engines.indexOf(name)])}`).join("; "));
+    const said = left.map((name) => `${shortName(name)} ${farewell(frame.flyers[this.field.engines.indexOf(name)])}`);
+    if (frame.solid && left.includes(this.field.engines[this.frames[0].solid])) said.push(`${shortName(this.field.engines[frame.solid])} is solid from here on`);
+    if (left.length) this.announce(said.join("; "));
   }
 
   tick(now) {
@@ -103,7 +106,7 @@ class Game {
       name: this.field.engines[k], label: shortName(this.field.engines[k]), gone: flyer.left,
       at: this.field.radius.map((_, disk) => this.between(before.flyers[k], flyer, disk, this.paused ? 1 : share)),
     }));
-    const marks = after.flyers.flatMap((flyer, k) => flyer.diverged ? [this.mark(flyer.diverged, this.field.engines[k])] : []);
+    const marks = after.flyers.flatMap((flyer, k) => this.marksOf(flyer, this.field.engines[k]));
     this.sky.draw(flyers, after.solid, after.force, marks);
     recent(this.drawn, [now, performance.now() - began]);
   }
@@ -118,8 +121,11 @@ class Game {
     ];
   }
 
-  // Its name only, so that labels leave the field free: the table says which disks and when.
-  mark({ x, y }, name) { return { x, y, name, text: shortName(name) }; }
+  // Where it diverged, and where its ship was when it left. Names only, so that labels leave the field free: the table says the rest.
+  marksOf({ diverged, left_at: left, x: [x, y] }, name) {
+    const marks = diverged ? [{ x: diverged.x, y: diverged.y, name, text: shortName(name) }] : [];
+    return left ? [...marks, { x, y, name, text: `${shortName(name)} left` }] : marks;
+  }
 
   show() {
     const frame = this.now;
@@ -128,13 +134,14 @@ class Game {
       const k = this.field.engines.indexOf(row.dataset.engine);
       row.classList.toggle("off", k < 0);
       row.classList.toggle("solid", k === frame.solid);
+      if (k === frame.solid) row.querySelector("[name=solid]").checked = true;
       this.fill(row, frame.flyers[k], k === frame.solid);
     }
     const banner = by("banner");
     banner.classList.toggle("won", frame.won);
     if (frame.won) this.tell("You won");
     else if (frame.over) this.tell(this.field.replayed ? "The flight ends here" : "The flight is over");
-    else if (frame.left_at >= 0 && frame.t - frame.left_at * this.field.interval < 3) this.tell("The ship left the field: back to the start");
+    else if (frame.set_back && frame.t - frame.set_back.t < 3) this.tell(`The ship left the field: back to the ${frame.set_back.beside ? "free place nearest to the start, which is taken" : "start"}`);
     else if (this.paused) this.tell(frame.frame ? "Paused" : "P starts the flight");
     else this.tell("");
     this.showPace(frame);
@@ -155,11 +162,24 @@ class Game {
 
   story(flyer, name) {
     if (flyer.left) return farewell(flyer);
-    if (!flyer.diverged) return "";
-    const { t, i, j, shared, solid_only: mine } = flyer.diverged;
-    const only = shortName(mine ? this.field.engines[this.now.solid] : name);
-    if (i === undefined) return `${t.toFixed(2)} s: the ship leaves the field in ${only} only`;
-    return `${t.toFixed(2)} s: ${pairOf(i, j)} collide in ${shared ? "both" : `${only} only`}`;
+    const { solid, solid_since: since } = this.now;
+    const told = flyer.diverged ? [this.divergence(flyer.diverged, solid)] : [];
+    if (since && name === this.field.engines[solid]) told.push(`solid since ${since.toFixed(2)} s, when ${shortName(this.lastSolid())} left`);
+    return told.join("; ");
+  }
+
+  // The one that the solid one took over from.
+  lastSolid() {
+    const { flyers, solid, solid_since: since } = this.now;
+    return this.field.engines[flyers.slice(0, solid).findLastIndex((flyer) => flyer.left_at === since)];
+  }
+
+  divergence({ t, i, j, disk, solid, only }, now) {
+    const from = solid === this.field.engines[now] ? "" : `, beside ${shortName(solid)}`;
+    const at = `${t.toFixed(2)} s: `;
+    if (disk !== undefined) return `${at}${bodyOf(disk)} gets another velocity without a collision${from}`;
+    if (i === undefined) return `${at}the ship leaves the field in ${shortName(only)} only${from}`;
+    return `${at}${pairOf(i, j)} collide in ${only ? `${shortName(only)} only` : "both"}${from}`;
   }
 
   // Over the last second; the flight is slowed where the engines, the way to the server or the screen are too slow.
@@ -195,8 +215,7 @@ class Game {
 
   begin() {
     const chosen = this.rows.map((row) => row.dataset.engine).filter((name) => this.box(name).checked);
-    const solid = document.querySelector("[name=solid]:checked").value;
-    const engines = [solid, ...chosen.filter((name) => name !== solid)];
+    const engines = [this.chosen, ...chosen.filter((name) => name !== this.chosen)];
     const wishes = by("wishes") ? new FormData(by("wishes")) : new Map();
     if (by("wishes") && !by("wishes").reportValidity()) return;
     const numbers = Object.fromEntries([...wishes.entries()].map(([key, value]) => [key, Number(value)]));
@@ -245,8 +264,8 @@ class Game {
 
   // The solid one always flies.
   choose(box) {
-    const solid = document.querySelector("[name=solid]:checked").value;
-    this.box(solid).checked = true;
+    if (box.name === "solid") this.chosen = box.value;
+    this.box(this.chosen).checked = true;
     box.blur();  // so that the keys steer again
     this.begin();
   }

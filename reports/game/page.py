@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from adapters.engines import ENGINES, OWN
-from reports.game.divergence import DIVERGED
+from reports.game.divergence import DIVERGED, WAIT
 from reports.game.flight import FRAME, SUBSTEPS
 from reports.page.documents import render
+from reports.page.own_solvers import Said
 from reports.page.style import looks_of
 from scenarios.model import Scenario
 
@@ -18,7 +19,7 @@ def game_page(
     file: Scenario | None,
     mark: str,
     restitution: float,
-    said: Mapping[str, Sequence[str]],
+    said: Mapping[str, Sequence[Said]],
 ) -> str:
     """The page, which begins with these engines, in a field of this restitution.
 
@@ -42,6 +43,7 @@ def game_page(
         file=file,
         mark=mark,
         diverged=DIVERGED,
+        wait=WAIT,
         restitution=restitution,
         said=said,
     )

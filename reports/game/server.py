@@ -17,6 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from reports.game.page import game_page
 from reports.game.session import Session, as_json
+from reports.page.own_solvers import Said
 from reports.page.server import MOST_TABS, NAMES, in_thread
 from scenarios.model import Scenario
 
@@ -59,7 +60,7 @@ class Game:
     engines: Sequence[str]
     file: Scenario | None = None
     restitution: float = 0.9
-    said: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    said: Mapping[str, Sequence[Said]] = field(default_factory=dict)
     tabs: int = 0
     mark: str = field(default_factory=lambda: token_hex(8))
 

@@ -90,6 +90,7 @@ class Session:
             "frame": flight.frame,
             "t": flight.frame * flight.scenario.sample_interval,
             "solid": flight.flyers.index(flight.solid),
+            "solid_since": flight.solid_since,
             "flyers": [self.to_json(flyer) for flyer in flight.flyers],
             "ship": [
                 *ship.position[SHIP].tolist(),
@@ -100,8 +101,16 @@ class Session:
             "force": self.force(),
             "won": flight.won,
             "over": flight.over,
-            "left_at": flight.left_at,
+            "set_back": self.set_back(),
         }
+
+    def set_back(self) -> dict[str, Any] | None:
+        """When the solid ship was set back last, s, and whether beside its start; None: never."""
+        solid = self.flight.solid
+        if not solid.edges:
+            return None
+        ends = (solid.edges[-1].frame + 1) * self.flight.scenario.sample_interval
+        return {"t": ends, "beside": solid.beside}
 
     def force(self) -> list[float]:
         """What drives the ship: force N in the world frame, torque N m."""
@@ -124,12 +133,9 @@ class Session:
         """One engine's disks, its measures, and where it diverged or why it left."""
         diverged = None
         if flyer.divergence is not None:
-            at, shared, solid_only = flyer.divergence
-            diverged = at._asdict() | {
-                "t": (at.frame + 1) * self.flight.scenario.sample_interval,
-                "shared": shared,
-                "solid_only": solid_only,
-            }
+            at, solid, only = flyer.divergence
+            ends = (at.frame + 1) * self.flight.scenario.sample_interval
+            diverged = at._asdict() | {"t": ends, "solid": solid, "only": only}
         return self.flight.measures(flyer) | {
             "x": rounded(flyer.state.position.ravel()),
             "angle": rounded(flyer.state.angle),

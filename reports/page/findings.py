@@ -169,7 +169,8 @@ def closest(off: pd.DataFrame) -> str:
     )
     if len(off) == 1:
         return (
-            f"Closest to the exact answer of {off.index[0]}, by the largest deviation in radii:"
+            f"Closest of the ranked engines to the exact answer of {off.index[0]}, by the largest"
+            " deviation in radii:"
             f" {best}{ranking}."
         )
     # within 1 % counts as equal

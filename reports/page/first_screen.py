@@ -10,6 +10,7 @@ import numpy as np
 from reports.compare.comparison import Comparison
 from reports.page import cost_points, error_cost, pooled, situations
 from reports.page.charts import Drawing, packed_charts
+from reports.page.own_solvers import Said
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class FirstScreen:
         far_off: position error, radii, above which a disk is visibly off.
         pooled: the pictures of all scenes at once.
         charted: the engines with a mark in one of `pooled`.
+        failed: an engine -> where it failed first, and why.
         findings: the sentences below.
     """
 
@@ -53,7 +55,7 @@ class FirstScreen:
     rough_cells: int
     steps: tuple[float, float]
     versions: Mapping[str, str]
-    said: Mapping[str, Sequence[str]]
+    said: Mapping[str, Sequence[Said]]
     error_cost: error_cost.ErrorCost | None
     error_cost_charts: Pictures
     no_times: str
@@ -63,6 +65,7 @@ class FirstScreen:
     far_off: float
     pooled: Pictures
     charted: Sequence[str]
+    failed: Mapping[str, str]
     findings: Sequence[str]
 
 
@@ -71,7 +74,7 @@ def first_screen(
     untrusted: Set[str],
     clock: cost_points.RunTimes,
     findings: Sequence[str],
-    said: Mapping[str, Sequence[str]],
+    said: Mapping[str, Sequence[Said]],
 ) -> FirstScreen:
     """The first screen for `comparisons`; an engine in `untrusted` is not ranked.
 
@@ -102,6 +105,7 @@ def first_screen(
         far_off=situations.FAR_OFF,
         pooled=pictures(pooled.KEY, drawings),
         charted=pooled.with_marks(drawings),
+        failed=failed(comparisons),
         findings=findings,
     )
 
@@ -109,6 +113,16 @@ def first_screen(
 def pictures(key: str, drawings: Mapping[str, Drawing]) -> Pictures:
     """The drawings with their data, packed."""
     return Pictures(key, drawings, packed_charts(drawings))
+
+
+def failed(comparisons: Sequence[Comparison]) -> dict[str, str]:
+    """An engine -> the first scene in which it failed, and why."""
+    return {
+        run.name: f"{run.scenario}: {run.reason.removeprefix('SolverFailed: ')}"
+        for comparison in reversed(comparisons)
+        for run in reversed(comparison.runs)
+        if run.status not in ("ok", "unsupported")
+    }
 
 
 def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:

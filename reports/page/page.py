@@ -15,6 +15,7 @@ from reports.page.charts import NOISE, POINTS
 from reports.page.documents import CHARTED, render
 from reports.page.first_screen import first_screen
 from reports.page.links import neighbours
+from reports.page.own_solvers import Said
 from reports.page.page_tables import page_tables
 from reports.page.panels import MARKED, panels
 from reports.page.sections import by_family, sections_of
@@ -35,7 +36,7 @@ def write_page(
     about: Mapping[str, Any],
     lessons: Mapping[str, Any],
     clock: cost_points.RunTimes = cost_points.NO_CLOCK,
-    said: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    said: Mapping[str, Sequence[Said]] = MappingProxyType({}),
     on_paper: Sequence[str] = (),
 ) -> None:
     """Write the page of `comparisons`, in reading order, to `path`.

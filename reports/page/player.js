@@ -56,7 +56,8 @@ function placeOf(pack, layer, frame, disk, axis) {
 
 class Player {
   constructor(element, pack, looks) {
-    Object.assign(this, { element, looks, playing: false, speed: 1, hidden: new Set() });
+    const speed = Number(element.querySelector(".speed").value);
+    Object.assign(this, { element, looks, playing: false, speed, hidden: new Set() });
     this.canvas = element.querySelector("canvas");
     this.slider = element.querySelector(".scrub");
     this.clock = element.querySelector(".clock");

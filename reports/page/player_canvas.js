@@ -4,6 +4,9 @@
 const COLLISION_LASTS = 0.12;  // s of the wall clock at speed 1: long enough to be seen
 const FEW = 24;  // more disks than this are drawn without paths and centre marks
 
+// A length in m as text, to two digits; from a million on as a power of ten.
+const distance = (metres) => metres < 1e6 ? `${Number(metres.toPrecision(2))} m` : `${metres.toExponential(0).replace("e+", "·10^")} m`;
+
 Object.assign(Player.prototype, {
   fit() {
     const { clientWidth: width, clientHeight: height } = this.canvas;  // page.css fits the height to the view
@@ -34,6 +37,7 @@ Object.assign(Player.prototype, {
     if (few) layers.forEach((layer) => this.drawPath(pen, layer));
     layers.forEach((layer, k) => this.ended(layer) || this.drawDisks(pen, layer, few, layers.length - k));
     layers.forEach((layer) => this.drawCollisions(pen, layer));
+    if (few) layers.forEach((layer) => this.ended(layer) || this.drawAway(pen, layer));
     this.drawEvent(pen, layers);
     this.drawScaleBar(pen);
     this.note.textContent = layers.filter((layer) => this.ended(layer))
@@ -147,6 +151,29 @@ Object.assign(Player.prototype, {
       pen.stroke();
       pen.globalAlpha = 1;
     }
+  },
+
+  // Where a disk is that has left the picture: an arrow at the edge, and how far beyond it the disk's centre is.
+  drawAway(pen, layer) {
+    const [width, height] = this.size, edge = 14;
+    pen.strokeStyle = pen.fillStyle = this.colour(layer);
+    pen.font = "600 12px system-ui, sans-serif";
+    pen.textBaseline = "middle";
+    this.pack.radius.forEach((radius, disk) => {
+      if (this.pack.static[disk]) return;
+      const [x, y] = this.pixel(this.place(layer, disk)), r = radius * this.scale;
+      if (x > -r && x < width + r && y > -r && y < height + r) return;
+      const at = [Math.max(edge, Math.min(x, width - edge)), Math.max(edge, Math.min(y, height - edge))];
+      const beyond = Math.hypot(x - at[0], y - at[1]) / this.scale;
+      pen.save();
+      pen.translate(...at);
+      pen.rotate(Math.atan2(y - at[1], x - at[0]));
+      pen.beginPath(); pen.moveTo(10, 0); pen.lineTo(-6, 7); pen.lineTo(-6, -7); pen.closePath(); pen.fill();
+      pen.restore();
+      pen.textAlign = at[0] > width / 2 ? "right" : "left";
+      pen.fillText(`${distance(beyond)} away`, at[0] + (at[0] > width / 2 ? -16 : 16), at[1]);
+    });
+    pen.textBaseline = "alphabetic";
   },
 
   // What broke: a ring around its disk of the first layer, from the instant on.

@@ -12,6 +12,7 @@ import pandas as pd
 from reports.compare.comparison import Comparison
 from reports.page.cost_points import RunTimes
 from reports.page.findings import findings, not_counted
+from reports.page.own_solvers import with_lines
 from reports.page.page import write_page
 from reports.run.archive import Archive
 from reports.run.made import writing
@@ -94,8 +95,8 @@ def made_report(
     }
     untrusted = set(broken)
     sentences = [*findings(comparisons, untrusted), *not_counted(broken)]
-    said = {
-        name: archive.checked[name]["checked"]["says"]
+    checks = {
+        name: archive.checked[name]["checked"]
         for name in header["engines"]
         if name in archive.checked
     }
@@ -109,10 +110,11 @@ def made_report(
         about=header | {"seconds": archive.seconds},
         clock=RunTimes(tables.timed, noise_floor(archive), header["timings"]),
         lessons=lessons,
-        said=said,
+        said={name: with_lines(one["says"], one.get("shown", [])) for name, one in checks.items()},
         on_paper=on_paper,
     )
-    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, said)
+    says = {name: one["says"] for name, one in checks.items()}
+    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, says)
 
 
 def how_broken(row: Mapping[str, Any]) -> str:

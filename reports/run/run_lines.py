@@ -122,11 +122,12 @@ class KnownAnswerLine(Line):
 
 
 class Checked(Line):
-    """What `crosscheck check` says of a solver's file: whether it found no fault, and its
-    sentences."""
+    """What `crosscheck check` says of a solver's file: whether it found no fault, its sentences,
+    and for each the lines of the file and the exercise's formula."""
 
     passed: bool
     says: list[Words]
+    shown: list[list[Words]] = Field(default_factory=list)  # runs of 0.1 have none
 
 
 class CheckedLine(Line):

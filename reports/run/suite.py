@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from adapters.conformance.conform import no_answer
 from adapters.engine_row import EngineRow
@@ -43,11 +43,13 @@ class Check(NamedTuple):
     Attributes:
         passed: whether it found no fault.
         says: its sentences, the most important first.
+        shown: for each sentence the lines of the file and the exercise's formula, a text each.
         source: `EngineRow.source` of the text that was checked; "" if there is none.
     """
 
     passed: bool
     says: list[str]
+    shown: list[list[str]]
     source: str
 
 
@@ -313,7 +315,9 @@ def keep_answer(
         }
         said = f"known answer: {task.column} at dt {task.dt_s:g} s"
     else:
-        findings = [no_answer(task, status, reason)] if failure else result
+        faulty = plan.engines[task].exercise  # a solver that hangs breaks no protocol
+        verdict: Literal["departs", "breaks"] = "departs" if faulty else "breaks"
+        findings = [no_answer(task, status, reason, verdict)] if failure else result
         line = {"conformance": [asdict(finding) for finding in findings]}
         said = f"conformance of {task}"
     # No key matches "": a failure outside the engine is tried again when the run is resumed.
@@ -328,14 +332,17 @@ def keep_check(
     """Write the verdict of `crosscheck check` on an engine's file to the journal; returns the task
     in words, its status, and the reason of a failure."""
     said, status, reason = f"check of {engine}", "ok", ""
-    passed, says, key = False, ["It was saved while the run began: check it by itself."], ""
+    shown: list[list[str]]
+    passed, says, shown, key = False, ["It was saved while the run began: check it again."], [], ""
     if isinstance(result, Failure):
         says = [f"It could not be checked: {result.reason}"]
         status, reason = result.status, result.reason
     elif result.source == plan.engines[engine].source:
-        passed, says, key = result.passed, result.says, answer_key(plan, engine)
+        passed, says, shown, _ = result
+        key = answer_key(plan, engine)
     # No key matches "": the file is checked again when the run is resumed.
-    journal.append({"checked": {"passed": passed, "says": says}, "of": engine, "key": key})
+    verdict = {"passed": passed, "says": says, "shown": shown}
+    journal.append({"checked": verdict, "of": engine, "key": key})
     return said, status, reason
 
 

@@ -184,6 +184,8 @@ def test_a_faulty_file_is_played(tmp_path: Path, mutant: Mutant):
 
 NO_WALLS = "the exercise has no walls"
 FALLS_UP = {"sphere.velocity.y += sphere.force.y": "sphere.velocity.y -= sphere.force.y"}
+GIVES_NAN = {"sphere.force.y / sphere.mass * dt": "sphere.force.z / sphere.mass * dt"}
+THROWS = {"sphere.force.y / sphere.mass * dt": "(() => { throw Error('not today'); })()"}
 FORGETS_NOTHING = {  # its acceleration grows with the number of calls
     "function integrate(": "let steps = 0;\nfunction integrate(",
     "sphere.force.y / sphere.mass * dt": "sphere.force.y / sphere.mass * dt * (1 + steps++)",
@@ -208,26 +210,29 @@ def changed(folder: Path, changes: dict[str, str]) -> Path:
         (FALLS_UP, "load_forgets", "keeps", ""),
         (FORGETS_NOTHING, "load_forgets", "breaks", ""),
         ({}, "load_forgets", "keeps", ""),
+        (GIVES_NAN, "stays_finite", "departs", ""),
+        (GIVES_NAN, "read_copies", "keeps", ""),
+        (THROWS, "read_copies", "departs", "SolverFailed: Error: not today"),
         ({}, "walls_are_reported", "not asked", NO_WALLS),
     ],
 )
 def test_a_probe_tells_wrong_physics_from_a_broken_protocol_in_a_file(
     tmp_path: Path, changes: dict[str, str], probe: str, verdict: str, note: str
 ):
-    """What is wrong in the file's physics departs and is scored; state that it keeps breaks; what
-    the exercise has not is not asked."""
+    """What is wrong in the file's physics departs and is scored, also what throws or gives no
+    numbers; state that it keeps breaks; what the exercise has not is not asked."""
     found = ask("x", "own", probe, engine_file(changed(tmp_path, changes)))
 
-    assert (found.verdict, found.note) == (verdict, note)
+    assert (found.verdict, found.note.partition(" (line")[0]) == (verdict, note)
 
 
 # wrong in every way that a basic probe can see
 WRONG_PHYSICS = ("integrate_empty.py", "dt_missing.py", "dt_squared.js", "force_cleared.py")
 WRONG_PHYSICS += ("force_not_by_mass.py", "torque_by_mass.py", "damped.js", "b_forgotten.py")
+WRONG_PHYSICS += ("typo_in_c.py",)  # it throws where two collide
 BREAKING = {
     "state_in_a_list.py": "load_forgets",
     "state_in_integrate.js": "load_forgets",
-    "typo_in_c.py": "stays_finite",  # it throws where two collide
 }
 IN_THE_GATE = ("dt_squared.js", "state_in_a_list.py")  # one of each kind
 

@@ -19,8 +19,18 @@ from adapters.engines import ENGINES
 from adapters.first_collisions import first_collisions
 from adapters.own_solver.engine import Student
 from adapters.play import play
-from reports.game.divergence import Edge, Touches
-from reports.game.flight import EARTH, FRAME, Flight, field_scenario
+from reports.game.divergence import (
+    NEVER,
+    WAIT,
+    Drift,
+    Edge,
+    FirstCollision,
+    Touches,
+    cause_of,
+    contact,
+    differing_since,
+)
+from reports.game.flight import EARTH, FRAME, Flight, field_scenario, free_place
 from reports.game.pilot import SHIP
 from scenarios.families.exercise import SHIP as START
 from scenarios.files.scene_file import read_scene_file, scene_text
@@ -271,9 +281,11 @@ def test_the_marker_names_the_first_collision():
     t, i, j = truth.collisions.t[0], truth.collisions.i[0], truth.collisions.j[0]
 
     assert ghost.divergence is not None
-    assert (ghost.divergence.at.i, ghost.divergence.at.j) in ((i, j), (j, i))
+    assert isinstance(ghost.divergence.at, FirstCollision)
+    assert ghost.divergence.at.pair == {i, j}
     assert ghost.divergence.at.frame == int(t / FRAME)
-    assert ghost.divergence.shared
+    assert 0 <= ghost.divergence.at.t - t <= flight.dt
+    assert ghost.divergence.only == ""
     assert matched.divergence is None or matched.divergence.at.frame > ghost.divergence.at.frame
 
 
@@ -310,7 +322,7 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
     flight.advance(10)
 
     assert flight.flyers[0].left == "out of fuel"
-    assert flight.solid.name == "reference:exercise"
+    assert (flight.solid.name, flight.solid_since) == ("reference:exercise", 3 * FRAME)
     assert flight.frame == 10
 
 
@@ -404,8 +416,8 @@ def test_an_engine_leaves_by_the_flights_clock(monkeypatch: pytest.MonkeyPatch):
 
     assert left.set_backs == 1
     assert 222 < frame < 240
-    assert left.left == f"they accumulate at {left.since + Accumulating.AT:.4g} s"
-    assert left.left_at - FRAME <= left.since + Accumulating.AT <= left.left_at + FRAME
+    assert left.left == f"they accumulate at {left.touches.since + Accumulating.AT:.4g} s"
+    assert left.left_at - FRAME <= left.touches.since + Accumulating.AT <= left.left_at + FRAME
 
 
 class Accumulating(Failing):
@@ -434,7 +446,8 @@ def test_ghosts_are_compared_after_the_ship_was_set_back():
     state = struck.engine.read()
     state.velocity[SHIP] += 0.5
     struck.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
-    struck.touches.note([ContactImpulse(0, SHIP, -1, 1.0)], flight.frame, state)
+    ahead = ContactImpulse(0, SHIP, -1, 1.0)  # of the next frame
+    struck.touches.note([ahead], flight.frame, state, flight.frame * FRAME)
     flight.advance(20)
 
     assert together == [(1, None)] * 3
@@ -448,7 +461,7 @@ def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
     flight = flown(["reference:exercise", "pymunk:matched"], 200, [(0, "s", True)], asteroids=0)
     slow = flight.flyers[1]
     state = slow.engine.read()
-    state.velocity[SHIP] = 0.0
+    state.position[SHIP, 0] += 0.3
     slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
     while flight.left_at < 0:
         flight.advance()
@@ -460,7 +473,77 @@ def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
     assert isinstance(slow.divergence.at, Edge)
     assert slow.divergence.at.frame == flight.left_at
     assert slow.divergence.at.x == pytest.approx(-5.0, abs=0.01)
-    assert slow.divergence.solid_only
+    assert slow.divergence.only == "reference:exercise"
+
+
+def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
+    """As a solver with a wrong sign has it, whose disks stay in each other, and one of which then
+    strikes another; the place is that of the collision, not where the disks were thrown to."""
+    scene = field_scenario().scene
+    solid, ghost = Touches(scene, 1 / 1024, 0.0), Touches(scene, 1 / 1024, 0.0)
+    before, thrown = scene.state, np.zeros((scene.n, 2))
+    since, found = np.full(scene.n, NEVER), []
+    for frame in range(10, 20):
+        first = 16 * frame  # step
+        again = [ContactImpulse(first + k, 3, 4, 1.0) for k in range(16)]
+        solid.note([*again, ContactImpulse(first + 15, 4, 5, 1.0)], frame, before, first / 1024)
+        ghost.note(again[:1] if frame == 10 else [], frame, before, first / 1024)
+        thrown[[3, 4]] = 1e3 * frame
+        thrown[5] = 1.0 if frame > 12 else 0.0
+        since = differing_since(since, thrown, np.zeros_like(thrown), frame)
+        found.append(cause_of(since, solid, ghost, before, frame))
+    assert found[: WAIT - 1] == [None] * (WAIT - 1)
+    at, in_solid, in_ghost = found[WAIT - 1]  # type: ignore[misc]
+
+    assert (at.frame, at.i, at.j) == (10, 3, 4)
+    assert (at.x, at.y) == pytest.approx(
+        contact(before.position + before.velocity / 1024, scene.radius, 3, 4)
+    )
+    assert (in_solid, in_ghost) == (True, True)
+
+
+def test_a_velocity_that_differs_without_a_collision_is_said_to():
+    """Not blamed on a collision of long ago: a ghost whose ship was slowed by hand."""
+    names = ["reference:exercise", "pymunk:matched"]
+    flight = flown(names, 40, [(0, "w", True), (20, "w", False)], asteroids=0)
+    slow = flight.flyers[1]
+    state = slow.engine.read()
+    state.velocity[SHIP] *= 0.5
+    slow.engine.load(replace(flight.scenario.scene, **vars(state)), flight.dt)
+    flight.advance(WAIT)
+
+    assert slow.divergence is not None
+    assert slow.divergence.at == Drift(40, SHIP, *slow.state.position[SHIP])
+
+
+@pytest.mark.parametrize("name", ["reference:exercise", "event_driven:float64", "pymunk:matched"])
+def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
+    """In every engine alike, also in one that cannot begin with an overlap: an asteroid is over the
+    start when the ship leaves."""
+    scenario = field_scenario(asteroids=1)
+    scene = replace(
+        scenario.scene,
+        position=np.array([START, [START[0], 0.9]]),
+        velocity=np.array([[-8.0, 0.0], [0.0, -4.8]]),
+    )
+    flight = Flight(replace(scenario, scene=scene), [name])
+    while flight.left_at < 0 and flight.frame < 20:
+        flight.advance()
+    flyer = flight.solid
+    ship, rock = flyer.state.position
+
+    assert (flyer.left, flyer.set_backs, flyer.beside) == ("", 1, True)
+    assert np.hypot(*(ship - rock)) >= scene.radius.sum()
+    assert np.hypot(*(ship - START)) < 2 * scene.radius.sum()
+
+
+def test_a_ship_whose_start_is_free_goes_there():
+    """And to the start, too, where no place is free."""
+    scene = field_scenario(asteroids=1).scene
+    crowd = replace(scene, radius=np.array([scene.radius[0], 20.0]))
+
+    assert free_place(scene, scene.position).tolist() == list(START)
+    assert free_place(crowd, crowd.position).tolist() == list(START)
 
 
 def test_collisions_are_counted_as_a_run_counts_them():
@@ -468,9 +551,9 @@ def test_collisions_are_counted_as_a_run_counts_them():
     whose pair collides in every step."""
     flight = flown(["reference:exercise", "pymunk:matched", "event_driven:float64"], 380)
     every = [ContactImpulse(k, 1, 2, 1e-3) for k in range(100)]
-    counted = Touches(flight.scenario.scene, 2e-3)
+    counted = Touches(flight.scenario.scene, flight.dt, 2e-3)
     for one in every:
-        counted.note([one], 0, flight.solid.state)
+        counted.note([one], 0, flight.solid.state, 0.0)
 
     for flyer in flight.flyers:
         whole = first_collisions(flyer.engine.collisions(), flight.dt)

@@ -3,6 +3,7 @@ flight leaves the others."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 import subprocess
@@ -23,6 +24,7 @@ from adapters.own_engine.engine import TEMPLATES
 from adapters.own_solver.engine import engine_file
 from adapters.own_solver.process import SolverProcess
 from reports.check.verdict import check_file
+from reports.commands.own_solvers import checked
 from reports.commands.serve import application
 from reports.game.command import PATIENCE, game_of, own_rows
 from reports.game.flight import FRAME, Flight, field_scenario
@@ -30,6 +32,7 @@ from reports.game.page import labels
 from reports.game.server import Game
 from reports.game.session import Session
 from reports.page import server
+from reports.page.own_solvers import with_lines
 from tests.bench.game import measure
 from tests.reports.game.test_page import fly
 from tests.reports.page.browsing import opened, served
@@ -103,7 +106,8 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     browser: Browser, tmp_path: Path, act: str, reason: str
 ):
     """Whether it throws or hangs: the page says so in the field and in its row, and the ghost
-    becomes solid."""
+    becomes solid, which the page says, too; a ring shows where its ship was. It is solid again in a
+    new flight."""
     path = solver(tmp_path, AFTER.format(calls=3000, act=act))
     with page_of(browser, path) as page:
         began = monotonic()
@@ -112,7 +116,19 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
         banner = page.locator("#banner").inner_text()
         row = page.locator("tr[data-engine$=':own'] [data-cell=diverged]").inner_text()
         solid, frame = page.evaluate("[game.field.engines[game.now.solid], game.now.frame]")
+        chosen = page.locator("[name=solid]:checked").get_attribute("value")
+        then = page.locator("tr.solid [data-cell=diverged]").inner_text()
+        page.wait_for_function("() => game.sky.last[3].length")
+        [mark] = page.evaluate("game.sky.last[3].map((mark) => mark.text)")
+        page.evaluate("game.field.seen = true")
+        page.keyboard.press("n")
+        page.wait_for_function("() => !game.field.seen")
+        again = page.locator("[name=solid]:checked").get_attribute("value")
 
+    assert (chosen, again) == ("reference:exercise", f"{path}:own")
+    assert re.fullmatch(r"solid since 0\.\d\d s, when Exercise.js left", then)
+    assert mark == "Exercise.js left"
+    assert banner.endswith("; reference:exercise is solid from here on")
     assert frame == 30
     assert solid == "reference:exercise"
     assert row.startswith("left at 0.")
@@ -143,14 +159,6 @@ def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path):
         ("function integrate(sphere, dt) {", "SyntaxError"),
         ("var nothing = 0;", "has neither the functions of the exercise"),
         ("throw new Error('not today')", "not today"),
-        (
-            SOLVER.read_text() + "\nintegrate = function () { throw new TypeError('of what?'); };",
-            "of what?",
-        ),
-        (
-            SOLVER.read_text() + "\nintegrate = function (s) { s.position.x = NaN; };",
-            "position of disk 0 is not finite",
-        ),
         ("\0\1\2", "is not text"),
     ],
 )
@@ -167,6 +175,30 @@ def test_a_file_that_cannot_fly_is_reported_before_anything_is_served(
     assert done.stderr.count("Exercise.js") == 1
     assert said in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("act", "reason"),
+    [
+        ("throw new TypeError('of what?')", "TypeError: of what?"),
+        ("s.position.x = NaN", "position of disk 0 is not finite"),
+    ],
+)
+def test_a_file_that_fails_in_its_first_step_starts_and_leaves(
+    tmp_path: Path, act: str, reason: str
+):
+    """So that the page says what `check` says of it; the right solver beside it flies on."""
+    path = solver(tmp_path, AFTER.format(calls=0, act=act))
+    rows, _ = own_rows([f"{path}:own"])
+    ENGINES.update(rows)
+    flight = Flight(field_scenario(), [*rows, "reference:exercise"])
+    flight.advance(2)
+    left, right = flight.flyers
+    flight.close()
+
+    assert left.left.startswith(reason)
+    assert left.left_at == FRAME
+    assert (right.left, flight.solid, flight.frame) == ("", right, 2)
 
 
 def test_every_file_that_cannot_fly_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -289,7 +321,7 @@ def test_a_faulty_solver_is_the_solid_ship_and_named(browser: Browser, tmp_path:
     [faulty] = [mutant for mutant in MUTANTS if mutant.name == "normal_long.js"]
     files = [faulty.write(tmp_path), solver(tmp_path)]
     game = game_of(None, ["pymunk:shipped", "box2d:shipped", *map(str, files)])
-    game.said = {f"{file}:own": check_file(file).sentences for file in files}
+    game.said = {f"{file}:own": with_lines(*checked(file)[1:3]) for file in files}
     with served(application(game)) as url:
         page, heard = opened(
             browser, url, viewport={"width": 1280, "height": 900}, reduced_motion="reduce"
@@ -299,6 +331,7 @@ def test_a_faulty_solver_is_the_solid_ship_and_named(browser: Browser, tmp_path:
         solid = page.evaluate("game.field.engines[game.now.solid]")
         label = page.evaluate("game.sky.last[0][game.sky.last[1]].label")
         said = page.locator(".said").all_inner_texts()
+        inside = page.locator(".said details").first.evaluate("(box) => box.textContent")
         bottom = page.evaluate("document.querySelector('.engines').getBoundingClientRect().bottom")
         left = page.evaluate("game.now.flyers.map((flyer) => flyer.left)")
         page.context.close()
@@ -309,6 +342,8 @@ def test_a_faulty_solver_is_the_solid_ship_and_named(browser: Browser, tmp_path:
     assert check_file(files[0]).sentences[0] in said[0]
     assert faulty.cause in said[0]
     assert "No fault found" in said[1]
+    assert f"crosscheck check {files[0]}" in inside
+    assert "exercise: " in inside
     assert bottom <= 900
 
 

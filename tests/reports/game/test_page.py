@@ -159,16 +159,20 @@ def test_every_number_of_the_table_has_four_digits(first_frame: Page):
 def test_the_last_collision_before_a_divergence_is_named(first_frame: Page):
     """Its bodies, its time, and in which engine it is."""
     story = "(diverged) => game.story({ diverged }, 'pymunk:shipped')"
-    last = {"t": 2.351, "shared": False, "solid_only": True}
+    last = {"t": 2.351, "only": FLOWN[0], "solid": FLOWN[0]}
     said = [
         first_frame.evaluate(story, last | pair)
-        for pair in ({"i": 3, "j": SHIP}, {"i": SHIP, "j": -3}, {"i": 2, "j": 5, "shared": True})
+        for pair in ({"i": 3, "j": SHIP}, {"i": SHIP, "j": -3}, {"i": 2, "j": 5, "only": ""})
     ]
+    said.append(first_frame.evaluate(story, last | {"disk": SHIP}))
+    said.append(first_frame.evaluate(story, last | {"i": 2, "j": 5, "solid": "pymunk:shipped"}))
 
     assert said == [
         "2.35 s: ship and disk 3 collide in reference:exercise only",
         "2.35 s: ship and wall 2 collide in reference:exercise only",
         "2.35 s: disk 2 and disk 5 collide in both",
+        "2.35 s: ship gets another velocity without a collision",
+        "2.35 s: disk 2 and disk 5 collide in reference:exercise only, beside pymunk:shipped",
     ]
 
 
@@ -319,11 +323,17 @@ def test_another_engine_can_be_solid(page: Page):
 
 
 def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
-    """Nothing scrolls sideways but the table; Tab comes to every control, with a visible
-    outline."""
+    """Nothing scrolls sideways, on a phone not even the table; Tab comes to every control, with a
+    visible outline."""
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
     page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
     too_wide = overhang(page)
+    cut = page.evaluate(
+        "(({ scrollWidth: a, clientWidth: b }) => a - b)(document.querySelector('.scroll'))"
+    )
+    headed = page.locator("tr.solid td[data-cell=collisions]").evaluate(
+        "(cell) => getComputedStyle(cell, '::before').content"
+    )
     page.set_viewport_size({"width": 1280, "height": 800})
     too_wide = max(too_wide, overhang(page))
     reached = []
@@ -335,7 +345,7 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     outlined = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
     page.context.close()
 
-    assert too_wide <= 0
+    assert (too_wide <= 0, cut <= 0, headed) == (True, True, '"Collisions"')
     assert {
         "sky",
         "pause",

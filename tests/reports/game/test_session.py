@@ -76,7 +76,7 @@ def test_another_scene_with_a_wrap_is_played_as_the_harness_plays_it():
 
     assert run.trajectory is not None
     assert session.flight.solid.state.position.tolist() == run.trajectory.position[-1].tolist()
-    assert (reported["left_at"], reported["won"], session.field()["earth"]) == (-1, False, None)
+    assert (reported["set_back"], reported["won"], session.field()["earth"]) == (None, False, None)
 
 
 def test_the_flame_is_against_a_thrust_that_turns_with_the_ship():

@@ -15,6 +15,8 @@ from adapters.run import Run
 from reports.compare.comparison import compare
 from reports.page.charts import ChartLine, Drawing, figure_of
 from reports.page.findings import early_ends, not_counted, unranked_sentence
+from reports.page.first_screen import failed
+from reports.page.own_solvers import with_lines
 from reports.page.page_tables import conformance_matrix
 from reports.page.pooled import with_marks
 from reports.page.report import how_broken
@@ -47,6 +49,31 @@ def test_who_is_not_counted_is_named_with_the_probe_that_it_missed():
         " from a fresh one after load? Position after 10 steps; expected: nowhere."
     ]
     assert not_counted({}) == []
+
+
+def test_each_sentence_has_its_lines():
+    """And none where the check has none, as of a file without a fault."""
+    assert with_lines(["One.", "Two."], [["line 3: x = 1"], []]) == [
+        ("One.", ["line 3: x = 1"]),
+        ("Two.", []),
+    ]
+    assert with_lines(["No fault found."], []) == [("No fault found.", [])]
+
+
+def test_the_first_failure_of_an_engine_is_named():
+    """Its scene and its reason; who refuses has not failed."""
+    scene = scenario("head_on_equal_e09")
+    runs = [
+        Run("a.js", "own", scene.name, 0.1 / k, status, reason)
+        for k, (status, reason) in enumerate(
+            [("error", "SolverFailed: TypeError: x"), ("timeout", "was stopped")], 1
+        )
+    ]
+    refused = Run("pymunk", "shipped", scene.name, 0.1, "unsupported", "no walls")
+
+    assert failed([compare(scene, [*runs, refused])]) == {
+        "a.js:own": "head_on_equal_e09: TypeError: x"
+    }
 
 
 def test_a_file_is_not_asked_where_the_exercise_does_not_ask():

@@ -21,6 +21,7 @@ from reports.page.cost_points import NO_CLOCK, RunTimes, with_times
 from reports.page.first_screen import situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
+from reports.page.own_solvers import with_lines
 from reports.page.page_tables import summaries
 from reports.page.pooled import by_situation, scores
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
@@ -230,7 +231,7 @@ def test_one_scene_is_described_without_counts_of_scenes():
     engines = off.drop(columns="reference:ordered")
 
     assert findings.closest(engines) == (
-        "Closest to the exact answer of a, by the largest deviation in radii:"
+        "Closest of the ranked engines to the exact answer of a, by the largest deviation in radii:"
         " reference:exercise (0.1), then pymunk:matched (0.2), box2d:shipped (0.3), last"
         " box2d:matched (2)."
     )
@@ -524,7 +525,7 @@ def test_your_solver_comes_before_the_engines(comparisons: list[Comparison], tmp
     table.loc[table.engine == "reference", list(whose)] = list(whose.values())
     write_small(page, [one])
     without = page.read_text(encoding="utf-8")
-    said = {"mine.py:own": ["No fault found."]}
+    said = {"mine.py:own": with_lines(["No fault found."], [])}
     write_small(page, [replace(one, runs=runs, table=table)], said=said)
     text = page.read_text(encoding="utf-8")
     places = [text.index(word) for word in ("No fault found", ">Your solver<", ">Best engine")]

@@ -29,14 +29,15 @@ def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
     name = f"{path}:own"
     plan = cast(RunPlan, type("Plan", (), {"engines": {name: engine_file(path)}}))
     right = checked(path)
-    later = Check(True, ["No fault found."], "another text")
+    later = Check(True, ["No fault found."], [], "another text")
     with Journal(tmp_path) as journal:
         for result in (right, later, Failure("timeout", "was stopped")):
             keep_check(journal, plan, name, result)
     kept = [json.loads(line) for line in (tmp_path / JOURNAL).read_text().splitlines()]
 
     assert FAULTY.cause in right.says[0]
-    assert kept[0]["checked"] == {"passed": False, "says": right.says}
+    assert kept[0]["checked"] == {"passed": False, "says": right.says, "shown": right.shown}
+    assert any(line.startswith("exercise: ") for line in right.shown[0])
     assert [bool(line["key"]) for line in kept] == [True, False, False]
     assert [line["checked"]["passed"] for line in kept] == [False] * 3
     assert "was saved" in kept[1]["checked"]["says"][0]
@@ -80,6 +81,8 @@ def test_a_run_says_what_check_says(tmp_path: Path):
     assert FAULTY.cause in first
     assert first in " ".join(done.stdout.split())
     assert html.escape(first) in page.replace("&#39;", "'")
+    assert "<li>exercise: <code>" in page
+    assert f"crosscheck check {path.name}" in page
     assert {row["status"] for row in rows if row["engine"] == path.name} == {"ok"}
     assert again.returncode == 0, again.stderr
     assert journal.count('"checked"') == 1

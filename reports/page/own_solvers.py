@@ -1,0 +1,20 @@
+"""What a page says of a solver's own file: the sentences of `crosscheck check`, with their
+evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class Said(NamedTuple):
+    """A sentence of the check, and the lines of the file and the exercise's formula behind it."""
+
+    sentence: str
+    shown: Sequence[str]
+
+
+def with_lines(says: Sequence[str], shown: Sequence[Sequence[str]]) -> list[Said]:
+    """Each sentence with what is shown of it; a sentence that is no fault has nothing."""
+    none: list[Sequence[str]] = [[]] * len(says)
+    return [Said(*each) for each in zip(says, [*shown, *none])]

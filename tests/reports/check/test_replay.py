@@ -1,0 +1,59 @@
+"""The replay of a smallest scene: slow enough to be watched, and it says where a sphere has gone;
+and the rows below it on paper."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from reports.check.page import WATCHED, speed_of, write_page
+from reports.check.verdict import FileCheck
+from tests.reports.check.test_outputs import faults_in
+from tests.reports.check.test_picture import smallest
+from tests.reports.page.browsing import opened
+
+# what the picture writes at a time, but for its scale bar
+WRITTEN = """t => {
+  const texts = [], write = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = (text) => texts.push(text);
+  players[1].seek(t);
+  CanvasRenderingContext2D.prototype.fillText = write;
+  return texts.filter((text) => text.includes("away"));
+}"""
+
+
+@pytest.mark.parametrize(("duration", "speed"), [(0.3, 0.1), (1.0, 0.25), (2.0, 0.5), (9.0, 1)])
+def test_a_short_scene_is_played_slowly(duration: float, speed: float):
+    """So that it lasts long enough, where the slowest speed suffices; never faster than it is."""
+    assert speed_of(duration) == speed
+    assert duration / speed >= min(WATCHED, duration / 0.1)
+
+
+def test_where_a_sphere_has_gone_is_said(browser: Browser, tmp_path: Path):
+    """At the edge of the picture, by an arrow and its distance, as long as it is outside; the page
+    begins at the speed of its scene, and on paper a heading stays with its table."""
+    one = smallest()
+    position = one.yours.position.copy()
+    position[-1, 0] += [40.0, 0.0]
+    gone = replace(one, yours=replace(one.yours, position=position))
+    page_path = tmp_path / "page.html"
+    write_page(page_path, FileCheck(tmp_path / "a.js", faults_in("2c")), [gone])
+    page, heard = opened(browser, page_path.as_uri(), viewport={"width": 1280, "height": 800})
+    page.wait_for_function("() => window.players[1]")
+    [early, late] = [page.evaluate(WRITTEN, t) for t in (0.0, one.scenario.duration)]
+    speed, chosen = page.evaluate("[players[1].speed, document.querySelector('.speed').value]")
+    page.emulate_media(media="print")
+    breaks = page.evaluate(
+        "['h2', 'h2+p'].map((each) => getComputedStyle(document.querySelector(each)).breakAfter)"
+    )
+    page.context.close()
+
+    assert heard == []
+    assert early == []
+    assert len(late) == 1
+    assert 35 < float(late[0].split()[0]) < 40
+    assert speed == float(chosen) == speed_of(one.scenario.duration)
+    assert breaks == ["avoid"] * 2
