@@ -71,14 +71,9 @@ class Toy:
 # one, and those of tables and marks.
 SELECTED = ("toy", "table_has_every_engine", "front_page", "no_mark_of")
 PYTEST = [
-    *(
-        "-q",
-        "--tb=short",
-        "--import-mode=importlib",
-        "-p",
-        "no:cacheprovider",
-    ),
-    *("-k", " or ".join(SELECTED)),
+    *["-q", "--tb=short", "--import-mode=importlib", "--noconftest", "-p", "no:cacheprovider"],
+    "-k",
+    " or ".join(SELECTED),
     "tests/adapters/test_engines.py",
     "tests/adapters/test_impact_table.py",
     "tests/reports/page/test_colours.py",
