@@ -12,6 +12,7 @@ NOT_READABLE = "not readable"  # the binding has no getter
 PASSED = "passed with every step"  # an argument of the step, which the engine does not store
 KEPT = "kept by the adapter"  # the adapter does it, the engine has no such setting
 NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
+SILENT = "not reported"  # the setting "collisions" of an engine that reports none
 
 
 class Unsupported(Exception):
@@ -23,8 +24,7 @@ class NotLoaded(Unsupported):
 
 
 class NotStarted(Exception):
-    """The process of an engine could not be started, for example for want of memory. This is not a
-    result of the engine."""
+    """The process of an engine could not be started; this is not a result of the engine."""
 
     outside = True
 
@@ -61,11 +61,11 @@ class Engine(Protocol):
         """Float64 copies, all at the same instant, in the scene's order, including static disks."""
 
     def collisions(self) -> list[ContactImpulse]:
-        """Every impulse of a contact since `load`, in order of steps."""
+        """Every impulse of a contact since `load`, in order of steps. An engine that reports none
+        returns [] and has `"collisions": (None, SILENT)` in its settings: they are not judged."""
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Setting -> (asked for, resolved by the engine), after `load`; asked None: the engine's
-        own default."""
+        """After `load`: setting -> (asked for, resolved); asked None: the engine's own default."""
 
     def versions(self) -> dict[str, str]:
         """Library -> version, of every library that affects the numbers."""

@@ -14,13 +14,13 @@ FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53  # the relative rounding of a number
 
 
 class Mark(NamedTuple):
-    """How an engine is drawn: hex colour on a light and on a dark page, a shape of `PATHS` of
-    reports/page/style.py.
+    """How an engine is drawn: hex colour on a light and on a dark page, and a shape of `PATHS` of
+    reports/page/style.py that neither another row nor `PALETTE` there has.
 
     Each colour has a contrast above 3 : 1 to the page, as WCAG 2 requires for graphics. Any two
     colours differ by at least 0.06 in OKLab, also with protan-, deuteran- and tritanopia (matrices
     of Machado et al., IEEE TVCG 15, 1291, 2009). Without colour the shape distinguishes the
-    engines.
+    engines. Where a colour or shape is taken, tests/reports/page/test_colours.py names free ones.
     """
 
     light: str
@@ -68,8 +68,9 @@ class EngineRow:
         rounding: the relative rounding of the engine's numbers.
         leaves_state: whether an earlier scene changes the next results, so that each cell needs a
             new process; False for all of `ENGINES` (a test plays each after others, bit for bit).
+        outside: it is a library; else it is listed among the solvers of this project.
         distributions: the installed packages, by their names in pip, whose versions affect its
-            numbers.
+            numbers; numba, numpy and mini-racer affect those of all engines and need no mention.
         mark: how it is drawn, the same for all profiles of an engine; None: a colour and a shape
             are chosen that no other engine has.
         dash: what tells its lines from those of the engine's other profiles: lengths of stroke and
@@ -104,6 +105,7 @@ class EngineRow:
     alpha: float
     rounding: float
     leaves_state: bool = False
+    outside: bool = False
     distributions: tuple[str, ...] = ()
     mark: Mark | None = None
     dash: tuple[int, ...] = ()

@@ -116,6 +116,7 @@ def _what_moves_is_a_bullet(engine: Any) -> None:
 _Reference = partial(EngineRow, mark=Mark("#0a4f9e", "#6cb8ff", "circle"))
 _Pymunk = partial(
     EngineRow,
+    outside=True,
     distributions=("pymunk",),
     mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
     searched=_pymunk_searched,
@@ -123,6 +124,7 @@ _Pymunk = partial(
 )
 _Box2D = partial(
     EngineRow,
+    outside=True,
     distributions=(BOX2D,),
     mark=Mark("#00876c", "#5be0b5", "square"),
     searched=_box2d_searched,
@@ -130,6 +132,7 @@ _Box2D = partial(
 )
 _Box2DV3 = partial(
     EngineRow,
+    outside=True,
     distributions=("pyb2d3",),
     mark=Mark("#b84fb0", "#c46bd8", "diamond"),
     searched=_box2d_v3_searched,
@@ -137,18 +140,21 @@ _Box2DV3 = partial(
 )
 _Planck = partial(
     EngineRow,
+    outside=True,
     package="planck",
     mark=Mark("#6940da", "#8472fe", "triangle-right"),
     searched=partial(_javascript_searched, "planck"),
 )
 _Matter = partial(
     EngineRow,
+    outside=True,
     package="matter-js",
     mark=Mark("#ec4f90", "#e39bcd", "star-diamond"),
     searched=partial(_javascript_searched, "matter"),
 )
 _Rapier = partial(
     EngineRow,
+    outside=True,
     package="@dimforge/rapier2d-compat",
     mark=Mark("#6d9154", "#8cf078", "diamond-wide"),
     searched=partial(_javascript_searched, "rapier2d"),

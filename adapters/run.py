@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from adapters.engine import SILENT
 from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
-# The setting "collisions" of an engine that reports none, whose collisions are then not judged:
-SILENT = "not reported"
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
 
 

@@ -21,6 +21,8 @@ SOURCE = ("adapters", "reference_impl", "reports", "scenarios")
 TOY = """
 import numpy as np
 
+from adapters.engine import SILENT, Unsupported
+from adapters.friction import must_be_frictionless
 from scenarios.model import State
 
 
@@ -28,12 +30,17 @@ class Toy:
     listening, wrapping = True, 0.0
 
     def load(self, scene, dt):
+        must_be_frictionless(scene, "a toy")
+        if scene.wrap is not None:
+            raise Unsupported("a toy has no edges")
         self.scene, self.dt = scene, dt
         self.state = [np.array(scene.position), np.array(scene.velocity), np.array(scene.angle)]
+        self.spin = np.array(scene.angular_velocity)
         self.acting = np.zeros_like(scene.position)
 
     def apply_force(self, disk, force, torque):
         self.acting[disk] += force / self.scene.mass[disk]
+        self.spin[disk] += torque / self.scene.inertia[disk] * self.dt
 
     def step(self, count=1):
         moving = ~self.scene.static[:, None]
@@ -41,17 +48,17 @@ class Toy:
             a = (self.scene.gravity + self.acting) * moving
             self.state[0] += self.state[1] * self.dt + a * self.dt**2 / 2
             self.state[1] += a * self.dt
-            self.state[2] += self.scene.angular_velocity * self.dt
+            self.state[2] += self.spin * self.dt
             self.acting[:] = 0.0
 
     def read(self):
-        return State(*(each.copy() for each in self.state), np.array(self.scene.angular_velocity))
+        return State(*(each.copy() for each in self.state), self.spin.copy())
 
     def collisions(self):
         return []
 
     def settings(self):
-        return {"collisions": (None, "none")}
+        return {"collisions": (None, SILENT)}
 
     def versions(self):
         return {"toyland": "1.5"}
@@ -59,6 +66,18 @@ class Toy:
     def close(self):
         pass
 """
+
+# What turns red for an engine that a test has not thought of: the tests of every engine, for this
+# one, and those of tables and marks.
+SELECTED = ("toy", "table_has_every_engine", "front_page", "no_mark_of")
+PYTEST = [
+    *["-q", "--tb=short", "--import-mode=importlib", "--noconftest", "-p", "no:cacheprovider"],
+    "-k",
+    " or ".join(SELECTED),
+    "tests/adapters/test_engines.py",
+    "tests/adapters/test_impact_table.py",
+    "tests/reports/page/test_colours.py",
+]
 
 
 class Added(NamedTuple):
@@ -80,8 +99,9 @@ ADDED: dict[str, list[Added]] = {
         Added(
             "adapters/engines.py",
             '    "toy:plain": EngineRow(_toy, "flies through everything", 0.5, FLOAT64,'
-            ' distributions=("typer",),\n                     options={"as it is": {}},'
-            ' variants={"as_it_is": Variant({}, "nothing")}),\n',
+            ' outside=True, distributions=("typer",),\n'
+            '                     options={"as it is": {}},\n'
+            '                     variants={"as_it_is": Variant({}, "nothing")}),\n',
             "}\n\n# engines whose numbers",
         ),
     ],
@@ -148,8 +168,9 @@ ADDED: dict[str, list[Added]] = {
 def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the source, compiled kernels included, with one of everything added."""
     folder = tmp_path_factory.mktemp("grown")
-    for name in SOURCE:
+    for name in (*SOURCE, "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("out", "*.png"))
+    shutil.copy(ROOT / "README.md", folder)
     for additions in ADDED.values():
         for added in additions:
             path = folder / added.file
@@ -194,6 +215,13 @@ def test_the_table_of_contributing_names_what_is_added_here_and_where():
         assert all(any(file.startswith(name) for file in written) for name in files), what
 
 
+def test_the_command_after_an_engine_is_the_one_that_is_run_here():
+    """As CONTRIBUTING.md and the README of the adapters have it."""
+    for page in ("CONTRIBUTING.md", "adapters/README.md"):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        assert "uv run python -m adapters.conformance.impact_table NAME" in text, page
+
+
 def test_nothing_of_it_is_in_the_source_itself():
     """Negative control: what is looked for below comes from what was added."""
     assert [
@@ -210,6 +238,9 @@ def test_all_that_is_added_is_known_everywhere(grown: Path):
     changed its look."""
     code = """
 import json
+import runpy
+import sys
+import pytest
 from adapters.conformance.conform import conform
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import OPTIONS
@@ -217,17 +248,22 @@ from reports.compare.metrics import METRICS
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.pages import lesson_page
 from reports.page.charts import CHARTS
-from reports.page.style import PALETTE, look
+from reports.page.style import PALETTE, look, mark_of_file
 from reports.run.cells import versions
 from reports.speed.budget import budget_of
 from reports.stability.variants import VARIANTS
 from scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
+sys.argv[1:] = ["toy"]
+runpy.run_module("adapters.conformance.impact_table", run_name="__main__")
+tests = pytest.main(PYTEST)
 print(json.dumps({
     "names": ["toy:plain" in ENGINES, "toy_scene" in SCENARIOS, "toy_metric" in METRICS,
               "toy_chart" in CHARTS],
     "look": look("toy", "plain")[:2] + look("toy", "plain")[3:4] == PALETTE[0],
     "version": versions()["typer"],
+    "file": PALETTE[0] in [mark_of_file(f"{k}.js") for k in range(20)],
+    "tests": tests,
     "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
     "option": [each.change for each in OPTIONS if each.engine == "toy:plain"],
     "variant": VARIANTS["toy:plain+as_it_is"].change,
@@ -236,12 +272,18 @@ print(json.dumps({
     "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).to_json()),
 }))
 """
-    found = json.loads(python(grown, "-c", code).splitlines()[-1])
+    *printed, line = python(grown, "-c", f"PYTEST = {PYTEST}\n{code}").splitlines()
+    found = json.loads(line)
 
     assert found["names"] == [True] * 4
     assert found["look"]
     assert found["alike"] == ["toy:plain"]
     assert found["version"] == version("typer")
+    assert not found["file"]
+    assert found["tests"] == 0, "\n".join(printed)
+    for page in ("README.md", "adapters/README.md"):
+        assert "| `toy" in (grown / page).read_text(encoding="utf-8"), page
+    assert found["verdicts"]["collisions_are_reported"] == "not asked"
     assert found["option"] == ["as it is"]
     assert found["variant"] == "nothing"
     assert "friction" in found["contributions"]

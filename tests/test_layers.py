@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from adapters.engines import ENGINES
+
 ROOT = Path(__file__).parent.parent
 MAY_IMPORT = {
     "reference_impl": {"reference_impl"},
@@ -26,7 +28,7 @@ LAYERS = {
         "engine",
         "advance engine_row first_collisions float32 friction library_versions run runaway",
         "play",
-        "reference pymunk box2d box2d_v3 event_driven npm_packages",
+        f"{' '.join({name.partition(':')[0] for name in ENGINES})} npm_packages",
         "own_solver",
         "javascript own_engine",
         "engines",

@@ -3,18 +3,20 @@ impact_table.csv.
 
 `uv run --extra js python -m adapters.conformance.impact_table` asks all engines again, and writes
 the file, the table of adapters/README.md and the short one of README.md; it takes half a minute.
+With names of engines behind it, it asks only those, and keeps the rows of all others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from datetime import date
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -138,13 +140,9 @@ COLUMNS: dict[str, ImpactColumn] = {
 }
 
 SHORT = ("threshold", "energy", "friction_unasked", "friction_1", "spin", "e_small")
-OUTSIDE = list(  # the engines from outside this project
-    dict.fromkeys(
-        name.partition(":")[0]
-        for name, row in (ENGINES | FETCHED).items()
-        if row.distributions or row.package
-    )
-)
+ROWS = ENGINES | FETCHED
+# the engines from outside this project
+OUTSIDE = list(dict.fromkeys(name.partition(":")[0] for name, row in ROWS.items() if row.outside))
 
 
 def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
@@ -187,25 +185,33 @@ def in_markdown(table: pd.DataFrame) -> str:
         cells = [f"`{row['engine']}`", *(cell(key, row[key]) for key in COLUMNS), row["numbers"]]
         lines.append(f"| {' | '.join(cells)} |")
     versions = dict.fromkeys(", ".join(table.versions).split(", "))
-    read = f"Read on {table.date.max()} with {', '.join(versions)}."
+    read = f"Read on {days(table)} with {', '.join(versions)}."
     return "\n".join([*lines, "", *wrap(read, 120)]) + "\n"
 
 
 def short_form(table: pd.DataFrame) -> str:
-    """A row for each outside engine with the columns of `SHORT`: as shipped, and after an arrow as
-    matched if that differs."""
-    rows = {str(row["engine"]): row for row in table.to_dict("records")}
-    headings = [f"read on {table.date.max()}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
+    """A row for each outside engine with the columns of `SHORT`: a number for each of its profiles,
+    with an arrow between those that differ."""
+    headings = [f"read on {days(table)}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
-    for engine in OUTSIDE:
-        profiles = [rows[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
-        library = str(profiles[0]["versions"]).partition(",")[0]
-        cells = [f"`{engine}` ({library})"]
-        cells += [
-            " → ".join(dict.fromkeys(cell(key, row[key]) for row in profiles)) for key in SHORT
-        ]
-        lines.append(f"| {' | '.join([*cells, str(profiles[0]['numbers'])])} |")
+    for engine, rows in table.groupby(table.engine.str.partition(":")[0], sort=False):
+        if engine in OUTSIDE:
+            lines.append(short_row(str(engine), rows.to_dict("records")))
     return "\n".join(lines)
+
+
+def short_row(engine: str, profiles: list[dict[Any, Any]]) -> str:
+    """The row of an engine in the short form, from those of its profiles."""
+    cells = [f"`{engine}` ({profiles[0]['versions'].partition(',')[0]})"]
+    for key in SHORT:
+        numbers = [cell(key, row[key]) for row in profiles]
+        cells.append(" → ".join(numbers) if len({*numbers}) > 1 else numbers[0])
+    return f"| {' | '.join([*cells, profiles[0]['numbers']])} |"
+
+
+def days(table: pd.DataFrame) -> str:
+    """The day on which the rows were read, or the first and the last one."""
+    return " to ".join(dict.fromkeys((table.date.min(), table.date.max())))
 
 
 def cell(column: str, value: float) -> str:
@@ -234,13 +240,23 @@ def placed(text: str, begin: str, what: str, end: str) -> str:
     return before + begin + what + end + after
 
 
-def main() -> None:
-    """Probe all engines, and write the file and both tables."""
-    table = table_of(ENGINES | FETCHED)
+def with_anew(engines: Sequence[str]) -> pd.DataFrame:
+    """The table as it was last written, with new rows of these engines, in the order of `ROWS`."""
+    anew = table_of({name: row for name, row in ROWS.items() if name.split(":")[0] in engines})
+    was = kept()
+    both = pd.concat([was[~was.engine.isin(anew.engine)], anew]).set_index("engine", drop=False)
+    return both.loc[[name for name in ROWS if name in both.index]]
+
+
+def main(*engines: str) -> None:
+    """Probe these engines, or all if none is named, and write the file and both tables."""
+    if unknown := {*engines} - {name.partition(":")[0] for name in ROWS}:
+        sys.exit(f"no engine is called {', '.join(sorted(unknown))}")
+    table = with_anew(engines) if engines else table_of(ROWS)
     table.to_csv(KEPT, index=False, float_format="%.10g")
     for path, filled in ((README, with_table), (FRONT, with_short_form)):
         path.write_text(filled(path.read_text(encoding="utf-8"), kept()), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

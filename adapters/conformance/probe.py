@@ -11,10 +11,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.engine import Engine, Unsupported
+from adapters.engine import SILENT, Engine, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.first_collisions import first_collisions
-from adapters.run import SILENT
 from scenarios.model import Array, Scene, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states

@@ -29,7 +29,7 @@ from reports.run.runner import run_all
 from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.terminal.console import Console
-from reports.terminal.counts import counted
+from reports.terminal.counts import counted, listed
 from reports.terminal.exits import DONE, FAILED, refuse, stoppable
 from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
@@ -56,7 +56,10 @@ def compare_bits(out: Path | None) -> NoReturn:
     kept = KEPT.read_text(encoding="utf-8")
     found, both = differences(read(kept), read(written(rows, made_by)))
     console = Console()
-    show(console, found, Counter((both.engine + ":" + both.profile).tolist()))
+    counts = Counter((both.engine + ":" + both.profile).tolist())
+    show(console, found, counts)
+    if new := {f"{row['engine']}:{row['profile']}" for row in rows} - {*counts}:
+        console.print(f"No bits are kept of {listed(sorted(new))}.", highlight=False)
     others = [
         f"{key} {value} (here {made_by.get(key)})"
         for key, value in about_of(kept).items()

@@ -153,7 +153,7 @@ def grouped(names: Iterable[str]) -> dict[str, list[str]]:
         row = ENGINES.get(name)
         if name.endswith(OWN_PROFILE):
             groups[YOURS].append(name)
-        elif row is None or row.distributions:
+        elif row is None or row.outside:
             groups[ENGINE].append(name)
         else:
             groups[EXACT if row.orders_collisions else OWN].append(name)

@@ -52,7 +52,8 @@ class Look(NamedTuple):
 
 OF_TRUTH = Mark("#16191d", "#f4f4f2", "circle")
 # The shapes as SVG paths about the origin, as large as an 8 px mark of plotly, by plotly's names.
-# Those of `PALETTE` are for rows without a mark and for files, not for a row to choose.
+# Those of `PALETTE`, such as the cross, are for rows without a mark and for files, not for a row to
+# choose.
 PATHS = {
     "circle": "M4,0A4,4 0 1 1 -4,0A4,4 0 1 1 4,0Z",
     "triangle-up": "M0,-4.6L4.3,3H-4.3Z",
@@ -143,15 +144,22 @@ def mark_of(engine: str) -> Mark:
             marks.setdefault(name.partition(":")[0], row.mark)
     if engine not in marks:
         return _files.get(engine) or _files.setdefault(engine, mark_of_file(engine))
-    unnamed = [name for name, mark in marks.items() if mark is None]
-    return marks[engine] or PALETTE[unnamed.index(engine) % len(PALETTE)]
+    return marks[engine] or PALETTE[unmarked().index(engine) % len(PALETTE)]
+
+
+def unmarked() -> list[str]:
+    """The engines without a mark in their row."""
+    rows = {**FETCHED, **ENGINES}.items()
+    engines = [name.partition(":")[0] for name, row in rows if not (row.mark or name.endswith(OWN))]
+    return list(dict.fromkeys(engines))
 
 
 def mark_of_file(path: str) -> Mark:
     """The first free mark, starting with the one that the name of the file selects."""
     first = crc32(encoded(PurePath(path).name)) % len(PALETTE)
     marks = PALETTE[first:] + PALETTE[:first]
-    return next((mark for mark in marks if mark not in _files.values()), marks[0])
+    taken = (*_files.values(), *PALETTE[: len(unmarked())])
+    return next((mark for mark in marks if mark not in taken), marks[0])
 
 
 def heat(value: float) -> int:

@@ -23,7 +23,7 @@ TEXT = frozenset(
         "change",
         "status",
         "reason",
-        "part",
+        "contribution",
         "note",
         "truth",
         "stopped",

@@ -246,9 +246,7 @@ class SpeedTaskLine(Line):
             )
         low, high = PARTS[model]
         if not low <= len(task) <= high:
-            raise ValueError(
-                f"task = {str(task)[:60]}: must have as many contributions as one of its kind"
-            )
+            raise ValueError(f"task = {str(task)[:60]}: must have as many parts as one of its kind")
         try:
             found: Any = model.model_validate({"result": self.result})
         except ValidationError as error:

@@ -16,14 +16,18 @@ from functools import partial
 from math import isnan
 
 from adapters.mechanisms.table import (
+    AIR,
     DIGITS,
     FLIGHT,
     FRICTION,
     IMPULSE,
     KNOWN,
     POSITION_CORRECTION,
+    RECYCLING,
     RESTITUTION,
+    SIDES,
     SKIN,
+    SWEPT,
     Mechanism,
     mechanisms_of,
     with_mechanisms,
@@ -64,6 +68,14 @@ SENTENCES = (
     (RESTITUTION, "box2d:*", THRESHOLD, THRESHOLDS["box2d"]),
     (RESTITUTION, "box2d_v3:*", THRESHOLD, THRESHOLDS["box2d_v3"]),
     (RESTITUTION, "planck:*", THRESHOLD, "planck Settings.velocityThreshold"),
+    (
+        RESTITUTION,
+        "rapier2d:*",
+        "a contact that bore an impulse in the step before does not bounce unless e is 1",
+        OWN_ORDER,
+    ),
+    (RESTITUTION, "*", "not every collision has the restitution that the scene states", OWN_ORDER),
+    (RECYCLING, "*", "a pair that has hardly moved is not looked at again", OWN_ORDER),
     (IMPULSE, "reference:*", "walls come first, then pairs", "reference_impl/lesson.py"),
     (IMPULSE, "*", TOGETHER, OWN_ORDER),
     (POSITION_CORRECTION, "reference:*", AT_ONCE, "exercise 11, task 2"),
@@ -76,8 +88,11 @@ SENTENCES = (
     (FRICTION, "*", "friction reduces the speed along the contact", "the engine's default"),
     (SKIN, "*", "walls are thicker than the scene states", B2_SETTINGS + "b2_polygonRadius"),
     (DIGITS, "*", "numbers are float32", "IEEE 754"),
+    (SWEPT, "*", "a fast disk is swept along its path, a slow one sleeps", OWN_ORDER),
+    (AIR, "*", "friction of the air slows every disk", OWN_ORDER),
+    (SIDES, "*", "disks are polygons, so that an impulse acts at a corner", OWN_ORDER),
 )
-"""Mechanism, engines, what it does, and the source."""
+"""Mechanism, engines, what it does, and the source; the last row of each mechanism is for "*"."""
 
 
 def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> str:
@@ -173,13 +188,18 @@ class Ablations:
         return judge(self.case.predicate, *self.case.play(ablation, scenario))
 
 
+def words_of(mechanism: str, engine: str) -> tuple[str, str, str, str]:
+    """The row of `SENTENCES` for a mechanism of an engine; raises `KeyError` if it is none."""
+    for row in SENTENCES:
+        if row[0] == mechanism and fnmatch(engine, row[1]):
+            return row
+    raise KeyError(mechanism)
+
+
 def reason_by_ablation(limit: Limit) -> tuple[str, str, str]:
     """The reason that the ablation gives, its source, and how it was tested."""
     names = limit.mechanisms.split(", ")
-    rows = [
-        next(row for row in SENTENCES if row[0] == name and fnmatch(limit.engine, row[1]))
-        for name in names
-    ]
+    rows = [words_of(name, limit.engine) for name in names]
     text, source = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
     if limit.mechanisms == END_OF_STEP:
         return (

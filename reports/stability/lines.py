@@ -264,8 +264,8 @@ def impossible(limit: Limit, case: Case) -> str:
     try:
         if limit.mechanisms:
             reason_by_ablation(limit)
-    except StopIteration:
-        return f"limit.mechanisms = {limit.mechanisms[:60]!r}: must name mechanisms of the engine"
+    except KeyError:
+        return f"limit.mechanisms = {limit.mechanisms[:60]!r}: must name mechanisms"
     return ""
 
 

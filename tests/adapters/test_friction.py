@@ -17,7 +17,7 @@ from tests.reports.terminal.command_line import crosscheck
 
 FLOAT32 = 2.0**-24
 FLOOR = [[[-8.0, 0.0], [8.0, 0.0]]]
-ENGINES_OUTSIDE = [name for name in ENGINES if not name.startswith(("reference", "event"))]
+WITH_OPTION = [name for name in ENGINES if name.startswith(("pymunk", "box2d"))]  # friction=
 OWN_DEFAULT = {"box2d:shipped": 0.2, "box2d_v3:shipped": 0.6}  # of who states no friction
 
 
@@ -133,7 +133,7 @@ def test_each_cause_is_shown_by_an_ablation(name, rate, e, mu, off, explained):
     assert np.abs(gone - engine)[1] == pytest.approx(explained, rel=0.02, abs=rounding)
 
 
-@pytest.mark.parametrize("name", ENGINES_OUTSIDE)
+@pytest.mark.parametrize("name", WITH_OPTION)
 def test_a_scene_without_friction_is_played_as_before(name):
     """To the bit as with the friction that the engine has of its own; matched has none."""
     for scene in (scenario("oblique_e09"), scenario("box_billiard")):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from adapters.conformance import impact_table
@@ -76,31 +77,57 @@ def test_the_front_page_shows_the_short_form():
     """Every outside engine in a row of its own, with the date and its version; a number that is not
     in the file would be noticed."""
     text = FRONT.read_text("utf-8")
-    ours = {"reference", "event_driven"}
+    ours = {name.split(":")[0] for name, row in ROWS.items() if not row.outside}
     other = kept()
     other.loc[other.engine == "planck:matched", "energy"] += 1
 
     assert impact_table.with_short_form(text, kept()) == text
     assert impact_table.with_short_form(text, other) != text
     assert set(OUTSIDE) == {name.split(":")[0] for name in ROWS} - ours
+    assert {"reference", "event_driven"} <= ours
 
 
 @pytest.mark.parametrize("engine", OUTSIDE)
-def test_a_row_of_the_short_form_has_both_profiles_where_they_differ(engine):
-    """Before the arrow the number as shipped, behind it as matched; one number where both agree."""
+def test_a_row_of_the_short_form_has_all_profiles_where_they_differ(engine):
+    """Before the arrow the number as shipped, behind it as matched; one number where all agree."""
     row = short_form(kept()).splitlines()[2 + OUTSIDE.index(engine)].strip("| ").split(" | ")
     shown = dict(zip(SHORT, (each.split(" → ") for each in row[1:-1]), strict=True))
-    both = [TABLE.loc[f"{engine}:{profile}"] for profile in ("shipped", "matched")]
+    profiles = [TABLE.loc[name] for name in ROWS if name.split(":")[0] == engine]
 
-    assert str(both[0].versions).split(",")[0] in row[0]
+    assert str(profiles[0].versions).split(",")[0] in row[0]
     for key, texts in shown.items():
         numbers = [float(each.removesuffix(" %")) if each != "-" else np.nan for each in texts]
-        expected = [each[key] for each in both]
+        expected = [each[key] for each in profiles]
         # three digits, or a tenth of a percent
         near = partial(pytest.approx, rel=5e-3, abs=0.051 if key == "energy" else 1e-6, nan_ok=True)
-        assert numbers == near(expected[: len(numbers)]), key
-        if len(numbers) == 1:
-            assert numbers == near(expected[1:]), key
+        assert (numbers if len(numbers) > 1 else numbers * len(profiles)) == near(expected), key
+
+
+def test_an_engine_with_one_profile_or_three_of_any_name_has_a_row(monkeypatch):
+    """With one number, or one of each; an engine of this project has none."""
+    one = kept().iloc[:1].assign(engine="toy:plain", spin=3.0)
+    two, three = one.assign(engine="toy:b"), one.assign(engine="toy:c", spin=4.0)
+    monkeypatch.setattr(impact_table, "OUTSIDE", ["toy"])
+
+    def spins(table):
+        return [line.split(" | ")[5] for line in short_form(table).splitlines()[2:]]
+
+    assert spins(pd.concat([kept(), one])) == ["3"]
+    assert spins(pd.concat([kept(), one, two])) == ["3"]
+    assert spins(pd.concat([kept(), one, two, three])) == ["3 → 3 → 4"]
+
+
+def test_one_engine_is_asked_and_the_rows_of_the_others_are_kept(monkeypatch):
+    """In their order; a name that is none is refused."""
+    anew = kept().iloc[5:6].assign(date="2100-01-01")
+    monkeypatch.setattr(impact_table, "table_of", lambda rows: anew if len(rows) == 2 else None)
+    table = impact_table.with_anew(["pymunk"]).reset_index(drop=True)
+
+    assert table.date.ne(kept().date).sum() == 1
+    assert table.drop(columns="date").equals(kept().drop(columns="date"))
+    assert "Read on 2026-11-23 to 2100-01-01 with" in in_markdown(table)
+    with pytest.raises(SystemExit, match="no engine is called pimunk"):
+        impact_table.main("pimunk")
 
 
 def test_the_table_takes_its_place_and_leaves_the_rest_of_a_text():

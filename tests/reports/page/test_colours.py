@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from collections import Counter
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 
 from adapters.engine_row import Mark
 from adapters.engines import ENGINES, FETCHED
-from reports.page.style import PALETTE
+from reports.page.style import PALETTE, PATHS
 from scenarios.model import Array
 
 MARKS = {
@@ -105,7 +106,49 @@ def test_two_engines_have_colours_that_everybody_can_tell_apart(cones: str, page
     """All engines with a colour in their row, also without one kind of cones."""
     marks = {name: mark for name, mark in MARKS.items() if not name.startswith("file")}
 
-    assert close(marks, page, SEEN[cones]) == {}
+    assert close(marks, page, SEEN[cones]) == {}, (
+        f"nearer to each other than {LEAST_DISTANCE}; free on a {page} page: {free(marks, page)}"
+    )
+
+
+def free(marks: dict[str, Mark], page: str) -> str:
+    """The first colour of a grid that stands out from the page and that everybody can tell from
+    those of all marks."""
+    taken = [getattr(mark, page) for mark in marks.values()]
+    levels = range(0, 256, 51)
+    return next(
+        colour
+        for r, g, b in product(levels, levels, levels)
+        if contrast(colour := f"#{r:02x}{g:02x}{b:02x}", PAGES[page]) >= LEAST_CONTRAST
+        and all(
+            distance(colour, other, seen) >= LEAST_DISTANCE
+            for other in taken
+            for seen in SEEN.values()
+        )
+    )
+
+
+def test_a_free_colour_is_free():
+    """On both pages, beside all engines."""
+    marks = {name: mark for name, mark in MARKS.items() if not name.startswith("file")}
+    new = Mark(free(marks, "light"), free(marks, "dark"), "")
+
+    for page, seen in product(PAGES, SEEN.values()):
+        assert close(marks | {"new": new}, page, seen) == {}
+        assert contrast(getattr(new, page), PAGES[page]) >= LEAST_CONTRAST
+
+
+def test_a_row_has_no_mark_of_a_solvers_file_and_no_shape_of_another_engine():
+    """Nor a colour of `PALETTE`, fetched or not."""
+    rows = {name: row for name, row in {**FETCHED, **ENGINES}.items() if row.mark}
+    shapes = {(name.partition(":")[0], row.shape or row.mark.shape) for name, row in rows.items()}
+    taken = Counter(shape for _, shape in shapes) + Counter(mark.shape for mark in PALETTE)
+    unused = PATHS.keys() - taken.keys()
+
+    assert not {row.mark.light for row in rows.values()} & {mark.light for mark in PALETTE}
+    assert {shape: count for shape, count in taken.items() if count > 1} == {}, (
+        f"free: {', '.join(sorted(unused)) or 'none, draw another in PATHS'}"
+    )
 
 
 def test_two_colours_that_some_take_for_one_are_noticed():

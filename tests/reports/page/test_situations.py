@@ -25,7 +25,7 @@ from reports.page.own_solvers import with_lines
 from reports.page.page_tables import summaries
 from reports.page.pooled import by_situation, scores
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
-from reports.page.style import PALETTE, PATHS, TRUTH, Look, look, looks_of, mark_of, number
+from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of, number
 from reports.run.timing import noise_of
 from reports.run.timing_pass import COLUMNS as TIMED
 from reports.run.timing_pass import SCENES
@@ -302,14 +302,6 @@ def test_every_engine_is_told_without_colour():
     # the control: with the shape of its engine alone, one of reference's would be another's mark
     alike = {(mark_of(name.split(":")[0]).shape, each.filled) for name, each in MARKS.items()}
     assert len(alike) < len(MARKS)
-
-
-def test_a_solvers_file_has_no_mark_of_an_engine():
-    """Nor its colour, whatever the file is called, fetched or not."""
-    colours = {each.light for each in MARKS.values()}
-
-    assert not colours & {mark.light for mark in PALETTE}
-    assert not {each.shape for each in MARKS.values()} & {mark.shape for mark in PALETTE}
 
 
 def test_a_solvers_file_is_drawn_alike_everywhere_and_unlike_its_neighbour(

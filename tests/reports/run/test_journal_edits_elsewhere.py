@@ -216,6 +216,7 @@ def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
         ),
         ("measured", 1, ("task", 2), "../../../x.toml", "must be of a scene that is measured"),
         ("measured", 1, ("task", 0), "x", "must begin as one of error scene"),
+        ("measured", 1, ("task",), ["budget", "free_fall"], "must have as many parts as one of"),
         ("measured", 3, ("result", 0, "round"), 7, "must have each round"),
         ("measured", 3, ("result", 0, "engine"), "other", "must have each round"),
         ("measured", 3, ("result", 0, "cost"), 1e300, "result[0].cost = 1e+300: must be less than"),

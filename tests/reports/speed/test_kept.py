@@ -11,10 +11,10 @@ import pytest
 
 from adapters.engines import read_row
 from reports.run.journal import Journal
-from reports.speed import ladder, measure
+from reports.speed import ladder, lines, measure
 from reports.speed.command import kept_of
 from reports.speed.effort import QUICK
-from reports.speed.kept import Kept
+from reports.speed.kept import TEXT, Kept, numbered
 from reports.speed.measure import done
 from reports.speed.plan import SpeedPlan
 from reports.terminal import progress as terminal
@@ -143,3 +143,14 @@ def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
 def interrupted(*_: object) -> None:
     """As Ctrl-C does."""
     raise KeyboardInterrupt
+
+
+def test_every_column_of_text_is_known_and_no_other():
+    """A text such as "nan" is no number when the journal is read again."""
+    rows = (lines.ErrorRow, lines.BudgetRow, lines.SampleRow, lines.Closed)
+    fields = [(name, field) for row in rows for name, field in row.model_fields.items()]
+    text = {name for name, field in fields if field.annotation is str}
+
+    assert text | {"status", "stopped", "task"} == TEXT
+    assert {"contribution", "note", "reason"} <= text
+    assert numbered({"contribution": "nan"}) == {"contribution": "nan"}

@@ -14,8 +14,11 @@ from adapters.engines import ENGINES
 from adapters.mechanisms.table import (
     FLIGHT,
     FRICTION,
+    KNOWN,
     MECHANISMS,
+    NAMES,
     POSITION_CORRECTION,
+    RECYCLING,
     RESTITUTION,
     mechanisms_of,
 )
@@ -25,6 +28,7 @@ from reports.stability.ablations import (
     Ablations,
     reason_by_ablation,
     sufficient_mechanisms,
+    words_of,
 )
 from reports.stability.cases import CASES
 from reports.stability.explain import explained
@@ -161,3 +165,16 @@ def test_every_mechanism_has_words(engine: str):
         reason_by_ablation(replace(limit, mechanisms=", ".join(names)))[0].count("; ")
         >= len(names) - 1
     )
+
+
+@pytest.mark.parametrize("engine", [*KNOWN, "new:plain"])
+def test_every_name_of_a_mechanism_has_words(engine: str):
+    """Whatever engine has it, fetched or new; a name that is none has none."""
+    limit = Limit("slow_collision", engine, "quick", "never works", nan, 1.0, ())
+
+    for name in NAMES:
+        assert words_of(name, engine)[2:] != ("", "")
+    both = reason_by_ablation(replace(limit, mechanisms=f"{RESTITUTION}, {RECYCLING}"))[0]
+    assert both.endswith("; a pair that has hardly moved is not looked at again")
+    with pytest.raises(KeyError):
+        words_of("magic", engine)
