@@ -87,8 +87,8 @@ def caption(scenes: int, clock: RunTimes) -> str:
     left = "fewer steps" if clock.fault else "cheaper"
     said += (
         f". Lower is nearer to the exact answer, further left is {left}. A dotted line that ends in"
-        " a cross: smaller steps bring this engine no nearer, so an error below it is not reached"
-        " at any step size."
+        " a cross: the smallest of these steps brings this engine less than a tenth nearer than the"
+        " largest; an error below the line is reached at none of the step sizes of this run."
     )
     if clock.fault:
         return said

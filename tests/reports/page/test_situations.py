@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,11 +16,12 @@ from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES, FETCHED
 from adapters.play import play
-from reports.commands.report import medians
+from reports.commands.report import medians, never_played
 from reports.compare.comparison import Comparison, compare
+from reports.compare.view import cut
 from reports.page import charts, findings, overview, situations
 from reports.page.cost_points import NO_CLOCK, RunTimes, with_times
-from reports.page.first_screen import situated
+from reports.page.first_screen import early_ends, situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
 from reports.page.page_tables import summaries
@@ -90,6 +93,38 @@ def test_who_models_no_friction_is_not_shown_as_failed(with_friction):
     assert (row[0].text, row[0].failed) == (overview.NO_FRICTION, False)
     assert {each.outcome for each in overview.failures(rough[0])} == {overview.NO_FRICTION}
     assert overview.outcome_cell(("refused", "collisions accumulate")).failed
+
+
+def test_a_refusal_of_friction_is_no_failure_unless_the_engine_was_asked_for(with_friction):
+    """In a run of scenes with friction alone: not in the findings, nor in the exit status."""
+    _, rough = with_friction
+    said = " ".join(findings.findings(rough, set()))
+
+    assert "reference:exercise" not in said
+    assert "every cell was played to its end" in said
+    assert never_played(rough, by_name=False) == []
+    assert never_played(rough, by_name=True) == ["reference:exercise"]
+
+
+def test_an_exact_answer_of_less_than_a_tenth_of_a_scene_ranks_nobody(with_friction):
+    """In so short a part of a pile nothing has come to rest."""
+    [whole, _], _ = with_friction
+    least = math.ceil(0.1 * whole.scenario.intervals)
+    ends_early, enough = (replace(whole, truth=cut(whole.truth, k + 1)) for k in (least - 1, least))
+
+    assert scores([ends_early]).empty
+    assert situations.answers(with_times(scores([ends_early]), NO_CLOCK), {}, set()) == []
+    assert "so no engine is scored" in findings.findings([ends_early], set())[0]
+    assert not scores([enough]).empty
+
+
+def test_the_end_of_the_exact_answer_stands_beside_the_name():
+    """Where it ends before the scene."""
+    pile = SimpleNamespace(name="pile", duration=3.0)
+    ends = [SimpleNamespace(scenario=pile, truth=SimpleNamespace(horizon=h)) for h in (0.244, 3.0)]
+
+    assert early_ends(ends[:1]) == {"pile": "up to 0.24 of 3 s"}
+    assert early_ends(ends[1:]) == {}
 
 
 def test_the_terminal_names_who_models_no_friction_below_the_numbers_with_units(with_friction):
@@ -401,7 +436,7 @@ def test_every_engine_of_the_table_has_its_worst_scene(
     asked = situations.answers(found[found.middle].assign(cost=np.nan), placed, set())
 
     assert "median error of the scenes" in heads
-    assert "off by more than 1 radius (1 rad): by how many" in heads
+    assert "off by more than 1 radius: by how many" in heads
     for row in asked:
         shown = [row.best, *(row.others if row.best.median <= 1 else []), *filter(None, [row.own])]
         said = [
