@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.compare.comparison import Comparison
+from reports.compare.fast_disks import can_pass
 from reports.page import cost_points, error_cost, pooled, situations
 from reports.page.charts import Drawing, packed_charts
 from reports.page.style import number
@@ -40,6 +41,8 @@ class FirstScreen:
         no_times: why no times are shown, or "".
         timed: the scenes that were timed, if times are shown.
         answers: the engines ranked, a row for each situation.
+        fast: the scenes in which a disk can pass through another, or a wall, in a coarsest step.
+        flukes: (scene, engine) of `pooled.flukes`.
         early: scene -> up to when its exact answer goes, where that is before its end.
         whole: the row of all situations together.
         far_off: position error, radii, above which a disk is visibly off.
@@ -61,6 +64,8 @@ class FirstScreen:
     no_times: str
     timed: Sequence[str]
     answers: Sequence[situations.Recommendation]
+    fast: Sequence[str]
+    flukes: Sequence[tuple[str, str]]
     early: Mapping[str, str]
     whole: situations.Recommendation | None
     far_off: float
@@ -101,6 +106,8 @@ def first_screen(
         no_times=clock.fault,
         timed=[] if clock.fault else list(dict.fromkeys(clock.table.scenario)),
         answers=answers,
+        fast=[each.scenario.name for each in comparisons if can_pass(each)],
+        flukes=pooled.flukes(scores[~scores.name.isin(untrusted)]),
         early=early_ends(comparisons),
         whole=situations.whole(answers),
         far_off=situations.FAR_OFF,

@@ -16,6 +16,8 @@ from reports.page.charts import ChartLine, Drawing, figure_of
 from scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
+# times the errors at the neighbouring step sizes: more says where collisions fall in a step
+FLUKE = 5.0
 ERROR, ANGLE = "position_max_radii", "angle_max"
 SCORES = ["scenario", "name", "error", "angle", "dt_s", "step_size", "middle"]
 
@@ -54,6 +56,19 @@ def scored(comparison: Comparison) -> bool:
     start: before that, the disks of a pile have met nothing."""
     truth, intervals = comparison.truth, comparison.scenario.intervals
     return truth is not None and len(truth) - 1 >= max(1.0, LEAST_SHARE * intervals)
+
+
+def flukes(found: pd.DataFrame) -> list[tuple[str, str]]:
+    """(scenario, `engine:profile`) of the `scores` at the middle step size that are more than
+    `FLUKE` times those at both neighbouring ones, and wrong."""
+    marked = []
+    for (scenario, name), group in found.groupby(["scenario", "name"], sort=False):
+        group = group.sort_values("step_size")
+        errors, k = group.error.to_numpy(), int(np.argmax(group.middle.to_numpy()))
+        between = 0 < k < len(errors) - 1
+        if between and errors[k] > max(situations.RIGHT, FLUKE * max(errors[k - 1], errors[k + 1])):
+            marked.append((str(scenario), str(name)))
+    return marked
 
 
 def drawings(

@@ -25,7 +25,8 @@ from reports.page.first_screen import early_ends, situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
 from reports.page.page_tables import summaries
-from reports.page.pooled import by_situation, scores
+from reports.page.pooled import SCORES, by_situation, flukes, scores
+from reports.page.sections import sections_of
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
 from reports.page.style import PALETTE, PATHS, TRUTH, Look, look, looks_of, mark_of, number
 from reports.run.timing import noise_of
@@ -116,6 +117,47 @@ def test_an_exact_answer_of_less_than_a_tenth_of_a_scene_ranks_nobody(with_frict
     assert situations.answers(with_times(scores([ends_early]), NO_CLOCK), {}, set()) == []
     assert "so no engine is scored" in findings.findings([ends_early], set())[0]
     assert not scores([enough]).empty
+
+
+def test_an_error_far_above_both_neighbouring_step_sizes_is_marked():
+    """Of the middle step size only, and only if it is wrong at all."""
+
+    def at(errors: list[float], name: str) -> list[tuple]:
+        steps = enumerate(errors)
+        return [("a", name, error, np.nan, 0.1 / 2**k, k, k == 2) for k, error in steps]
+
+    chance = at([0.165, 0.098, 6.1, 0.023], "pymunk:matched")
+    falls = at([8.0, 4.0, 2.0, 1.0], "pymunk:shipped")
+    rises = at([0.1, 0.1, 6.0, 6.0], "box2d:matched")
+    right = at([1e-15, 1e-15, 1e-13, 1e-15], "event_driven:float64")
+    found = pd.DataFrame([*chance, *falls, *rises, *right], columns=SCORES)
+
+    assert flukes(found) == [("a", "pymunk:matched")]
+
+
+def test_an_engine_with_nothing_in_a_scene_has_no_column_there(with_friction):
+    """One that was not asked, or models no friction; in the map it has."""
+    smooth, rough = with_friction
+    first, *_, last = sections_of([*smooth, *rough])
+
+    assert "reference:coulomb" not in first.columns
+    assert "reference:exercise" in first.columns
+    assert last.columns == ["pymunk:matched", "reference:coulomb"]
+    assert all(len(cells) == 2 for *_, cells in last.table)
+
+
+@pytest.mark.parametrize(
+    ("metric", "remark", "says"),
+    [
+        ("collisions_missed", "43 of 86 collisions judged", "43 of 86 judged"),
+        ("collisions_missed", "86 of 86 collisions judged", ""),
+        ("collision_count_error", "48 of 86", "48 of 86"),
+        ("energy_error", "43 of 86 samples", ""),
+    ],
+)
+def test_of_how_many_collisions_a_count_speaks_stands_below_it(metric, remark, says):
+    """-38 too few beside none missed: those that a step cannot resolve are not judged."""
+    assert overview.share_of(metric, remark) == says
 
 
 def test_the_end_of_the_exact_answer_stands_beside_the_name():
