@@ -23,6 +23,7 @@ class ErrorCost(NamedTuple):
     """What the page shows.
 
     Attributes:
+        names: the engines that have a point, or a failure, in one of the pictures.
         drawings: scenario, or `POOLED` -> its picture. sentences: three, on speed and error, or two
         on error.
         fault: why there are no times, or "".
@@ -30,6 +31,7 @@ class ErrorCost(NamedTuple):
         costs: a row for each engine, see `costs_of`; empty without times.
     """
 
+    names: Sequence[str]
     drawings: Mapping[str, Drawing]
     sentences: Sequence[str]
     fault: str
@@ -55,7 +57,8 @@ def error_cost(scores: pd.DataFrame, clock: RunTimes, untrusted: Set[str]) -> Er
     }
     said = sentences(found, next(iter(tables.values())), clock.fault)
     costs = [] if clock.fault else costs_of(found, next(iter(tables.values())))
-    return ErrorCost(drawings, said, clock.fault, caption(len(scenes), clock), costs)
+    names = list(dict.fromkeys(found.name))
+    return ErrorCost(names, drawings, said, clock.fault, caption(len(scenes), clock), costs)
 
 
 def costs_of(found: pd.DataFrame, table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ class PageTables:
     """The tables between the first screen and the scenarios, in their order.
 
     Attributes:
-        columns: of the table of medians. summaries: the tables of medians: without friction, and
+        columns: of the tables of medians. summaries: the tables of medians: without friction, and
         with friction if there are both.
         heat_map: scenario -> a cell for each engine: its largest position error.
         flukes: whether a cell of it is one of `pooled.flukes`.
@@ -62,9 +62,11 @@ def page_tables(
 ) -> PageTables:
     """All tables of `comparisons`; an engine in `untrusted` is not scored."""
     heat_map = overview.heat_map(comparisons, overview.names_of(comparisons))
+    medians = summaries(*situations.by_friction(comparisons), untrusted)
+    shown = [column for table in medians for column in table.columns]
     return PageTables(
-        columns=overview.SUMMARY,
-        summaries=summaries(*situations.by_friction(comparisons), untrusted),
+        columns={key: column for key, column in overview.SUMMARY.items() if column in shown},
+        summaries=medians,
         heat_map=heat_map,
         flukes=any(cell.fluke for row in heat_map.values() for cell in row),
         heat_bounds=style.HEAT_BOUNDS,

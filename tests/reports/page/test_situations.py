@@ -658,6 +658,15 @@ def test_rounding_noise_takes_less_than_a_third_of_an_axis():
     assert axis["ticktext"][-1] == "< 10<sup>−9</sup>"
 
 
+def test_a_broken_axis_is_struck_through_at_the_break():
+    """Two strokes at the upper edge of the grey band, so that the jump is seen."""
+    axis, floor = charts.broken_axis(np.array([0.1, 1.0, 1e-9]), 1e-6)
+    band, *strokes = charts.marked_break(axis, floor)["shapes"]
+
+    assert [stroke["type"] for stroke in strokes] == ["line", "line"]
+    assert strokes[0]["y0"] < band["y1"] < strokes[0]["y1"]
+
+
 def test_an_axis_of_rounding_alone_is_not_broken():
     """There is nothing larger to make room for."""
     axis, floor = charts.broken_axis(np.array([1e-16, 2e-15]), charts.NOISE)
