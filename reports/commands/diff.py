@@ -12,7 +12,7 @@ from reports.run.diff import FACTOR, Change, Difference, Timing, difference
 from reports.run.folders import found
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse
+from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.tables import print_list, print_table
 
 SHOWN = 12  # changes, the worst first
@@ -29,19 +29,27 @@ HEADINGS = (
 
 
 def show_difference(before: Path, after: Path) -> NoReturn:
-    """Print the difference; exits 0, 1 (something got worse) or 2 (a folder cannot be used)."""
+    """Print the difference; exits 0, 1 (something got worse, or the runs share no cell) or 2 (a
+    folder cannot be used)."""
     try:
         changed = difference(found(before), found(after))
     except OSError as fault:
         refuse([f"{fault.filename or f'{before}, {after}'}: {fault.strerror or fault}"])
     except (FolderTaken, ValueError) as fault:
         refuse([str(fault)])
+    if not changed.shared:
+        say(
+            f"{before} and {after} share no cell (scene, engine and step size), so that nothing can"
+            " be compared"
+        )
+        sys.exit(FAILED)
     console = Console()
     for warning in changed.warnings:
         console.print(
             f"differs in {warning}" if ":" in warning else warning, style="yellow", highlight=False
         )
-    print_table(console, HEADINGS, by_engine(changed), "What changed", left=HEADINGS[-1:])
+    title = "What changed; a number between two engines counts for both"
+    print_table(console, HEADINGS, by_engine(changed), title, left=HEADINGS[-1:])
     console.print()
     total = len(changed.statuses) + len(changed.numbers)
     if worst := sorted((*changed.statuses, *changed.numbers), key=severity)[:SHOWN]:
@@ -59,12 +67,13 @@ def by_engine(changed: Difference) -> list[list[str]]:
     every = (
         *changed.same,
         *(change.engine for change in (*changed.statuses, *changed.numbers)),
+        *(change.beside for change in changed.numbers if change.beside),
         *timings,
     )
     rows = []
     for engine in dict.fromkeys(every):
         statuses, numbers = (
-            [one for one in kind if one.engine == engine]
+            [one for one in kind if engine in (one.engine, one.beside)]
             for kind in (changed.statuses, changed.numbers)
         )
         counts = [

@@ -66,7 +66,8 @@ def replay(
     )
     status, reason, after = again(record, row, continued(scenario, substeps, before, k), timeout)
     step = k * substeps + (len(after) - 1 if after is not None else 0)
-    show(f"now:     {ending(status, reason)}")
+    since = f" (times from {scenario.times[k]:g} s on)" if k and reason else ""
+    show(f"now:     {ending(status, reason)}{since}")
     show(f"reached: step {step} of {scenario.intervals * substeps}, {step * record['dt_s']:g} s")
     if record["status"] == status == "ok":
         show(f"bits:    {'as' if same(before, after, substeps) else 'not as'} recorded")

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import NoReturn
 
+from adapters.friction import REFUSAL
 from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
 from reports.commands.own_solvers import lines
@@ -18,7 +19,7 @@ from reports.page import overview
 from reports.page.report import Report, make_report
 from reports.page.situations import by_friction
 from reports.run.archive import Archive
-from reports.run.arguments import refusing
+from reports.run.arguments import of_main_job, refusing
 from reports.run.folders import found
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
@@ -30,9 +31,8 @@ from reports.terminal.tables import print_list, print_table
 def finish(report: Report, out: Path) -> NoReturn:
     """Print the summary; exit 1 if an engine or a scene is not compared completely."""
     print_summary(report, str((out / "report.html").resolve()))
-    runs = [run for comparison in report.comparisons for run in comparison.runs]
-    played = {run.name for run in runs if run.status == "ok"}
-    if lost := sorted({run.name for run in runs} - played):
+    by_name = report.archive.header["engines"] != of_main_job()
+    if lost := never_played(report.comparisons, by_name):
         say(
             f"no cell of {', '.join(lost)} was played to its end: see the status column of"
             f" {out / 'runs.csv'}"
@@ -40,6 +40,15 @@ def finish(report: Report, out: Path) -> NoReturn:
     for name, why in report.unjudged.items():
         say(f"{name} is not judged: {why}")
     sys.exit(FAILED if lost or report.unjudged else DONE)
+
+
+def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
+    """The engines of which no cell was played to its end. One that models no friction may refuse
+    it, unless engines were asked for `by_name`."""
+    runs = [run for comparison in comparisons for run in comparison.runs]
+    played = {run.name for run in runs if run.status == "ok"}
+    asked = {run.name for run in runs if by_name or REFUSAL not in run.reason}
+    return sorted(asked - played)
 
 
 def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:

@@ -11,6 +11,8 @@ from adapters.run import Run
 from reports.compare.comparison import Comparison
 from scenarios.model import Array, Scenario, Scene
 
+# of a speed: a smaller difference from a cap is rounding
+ROUNDED = 1 - 1e-6
 SPEED_CAP = "speed cap in m/s"  # the setting of engines that have one and tell it
 
 
@@ -23,6 +25,11 @@ def fast_note(comparison: Comparison) -> str:
     )
 
 
+def can_pass(comparison: Comparison) -> bool:
+    """Whether in the coarsest step a disk can pass through another, or through a wall."""
+    return bool(passing(comparison.scenario, fastest_two(comparison)))
+
+
 def passing(scenario: Scenario, fastest: Array) -> list[str]:
     """At most one sentence: the coarsest step size at which a disk can pass through another or a
     wall, and one at which it cannot."""
@@ -31,10 +38,10 @@ def passing(scenario: Scenario, fastest: Array) -> list[str]:
     if ratio <= 1.0:
         return []
     return [
-        f"In a step of {dt:.4g} s two disks, or a disk and a wall, can approach by"
-        f" {ratio:.2g} times the distance at which they touch. In an engine that tests for overlap"
-        " at the end of a step one can pass through the other (tunnelling). With steps of"
-        f" {rounded_down(dt / ratio):g} s it cannot."
+        f"In a step of {plain(dt, 4)} s two disks, or a disk and a wall, can approach by"
+        f" {plain(ratio, 2)} times the distance at which they touch. In an engine that tests for"
+        " overlap at the end of a step one can pass through the other (tunnelling). With steps of"
+        f" {plain(rounded_down(dt / ratio))} s it cannot."
     ]
 
 
@@ -44,14 +51,14 @@ def capped(runs: Sequence[Run], fastest: float) -> list[str]:
     caps: dict[float, list[str]] = {}
     for run in runs:
         cap = run.settings.get(SPEED_CAP, (None, None))[1]
-        if run.status == "ok" and isinstance(cap, (int, float)) and cap < fastest:
-            caps.setdefault(run.dt, []).append(f"{run.name} {cap:.3g} m/s")
+        if run.status == "ok" and isinstance(cap, (int, float)) and cap < ROUNDED * fastest:
+            caps.setdefault(run.dt, []).append(f"{run.name} {plain(cap)} m/s")
     if not caps:
         return []
     dt = max(caps)
     return [
-        f"The fastest disk has {fastest:.3g} m/s; in steps of {dt:.4g} s some engines allow less:"
-        f" {', '.join(caps[dt])}."
+        f"The fastest disk has {plain(fastest)} m/s; in steps of {plain(dt, 4)} s some engines"
+        f" allow less: {', '.join(caps[dt])}."
     ]
 
 
@@ -93,6 +100,11 @@ def step_displacement(scene: Scene, fastest: Array, dt: float) -> float:
     if len(scene.walls):
         approach.append(float(fastest[:, -1].max() * dt / radii[0]))
     return max(approach)
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """To so many significant digits, without an exponent."""
+    return np.format_float_positional(float(f"{value:.{digits}g}"), trim="-")
 
 
 def rounded_down(value: float) -> float:

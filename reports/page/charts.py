@@ -339,13 +339,20 @@ def broken_axis(values: Array, bound: float) -> tuple[dict[str, Any], float]:
 
 
 def marked_break(axis: Mapping[str, Any], floor: float) -> dict[str, Any]:
-    """The layout that shades what is below the break of a `broken_axis`; {} where there is none."""
+    """The layout that shades what is below the break of a `broken_axis`, and strikes the axis
+    through there; {} where there is none."""
     if not axis or floor <= ZERO:
         return {}
-    ends = {"y0": 10.0 ** axis["range"][0], "y1": floor * 10**0.4}
-    band = {"x0": 0, "x1": 1, "xref": "paper"} | ends
+    top = floor * 10**0.4
+    band = {"x0": 0, "x1": 1, "xref": "paper", "y0": 10.0 ** axis["range"][0], "y1": top}
     look = {"fillcolor": style.look(style.TRUTH).light, "opacity": 0.07, "line": {"width": 0}}
-    return {"shapes": [{"type": "rect", "layer": "below"} | band | look]}
+    strokes = [
+        {"type": "line", "xref": "paper", "x0": -0.01, "x1": 0.01}
+        | {"y0": top * 10 ** (at - 0.05), "y1": top * 10 ** (at + 0.05)}
+        | {"line": {"width": 1.5, "color": "#888"}}
+        for at in (0.0, 0.1)
+    ]
+    return {"shapes": [{"type": "rect", "layer": "below"} | band | look, *strokes]}
 
 
 def decades(values: Array) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def halving(table: pd.DataFrame, timed: bool) -> str:
     if not nearer and not stuck:
         return "At every step size all engines are right to a millionth of a radius."
     spent = ", at more cost" if timed else ""
-    lost = f"bring{{}} {', '.join(stuck)} no nearer to the exact answer{spent}."
+    lost = f"bring{{}} {', '.join(stuck)} no nearer to the exact answer here{spent}."
     if not nearer:
         return f"Smaller steps {lost.format('')}"
     costs = f"multiplies the time by {span(dearer)} and " if timed else ""

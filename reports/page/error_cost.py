@@ -23,6 +23,7 @@ class ErrorCost(NamedTuple):
     """What the page shows.
 
     Attributes:
+        names: the engines that have a point, or a failure, in one of the pictures.
         drawings: scenario, or `POOLED` -> its picture. sentences: three, on speed and error, or two
         on error.
         fault: why there are no times, or "".
@@ -30,6 +31,7 @@ class ErrorCost(NamedTuple):
         costs: a row for each engine, see `costs_of`; empty without times.
     """
 
+    names: Sequence[str]
     drawings: Mapping[str, Drawing]
     sentences: Sequence[str]
     fault: str
@@ -55,7 +57,8 @@ def error_cost(scores: pd.DataFrame, clock: RunTimes, untrusted: Set[str]) -> Er
     }
     said = sentences(found, next(iter(tables.values())), clock.fault)
     costs = [] if clock.fault else costs_of(found, next(iter(tables.values())))
-    return ErrorCost(drawings, said, clock.fault, caption(len(scenes), clock), costs)
+    names = list(dict.fromkeys(found.name))
+    return ErrorCost(names, drawings, said, clock.fault, caption(len(scenes), clock), costs)
 
 
 def costs_of(found: pd.DataFrame, table: pd.DataFrame) -> list[dict[str, Any]]:
@@ -84,8 +87,8 @@ def caption(scenes: int, clock: RunTimes) -> str:
     left = "fewer steps" if clock.fault else "cheaper"
     said += (
         f". Lower is nearer to the exact answer, further left is {left}. A dotted line that ends in"
-        " a cross means that smaller steps bring this engine no nearer: no step size has an error"
-        " below the cross."
+        " a cross means that the smallest of these steps brings this engine less than a tenth"
+        " nearer than the largest: no step size of this run has an error below the cross."
     )
     if clock.fault:
         return said

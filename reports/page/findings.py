@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import OWN as OWN_PROFILE
+from adapters.friction import REFUSAL
 from reports.compare.comparison import Comparison
 from reports.page import pooled
 from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
@@ -39,7 +40,7 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
     scores = pooled.scores(comparisons)
     scores = scores[scores.middle & ~scores.name.isin(untrusted)]
     groups = grouped(dict.fromkeys(scores.name))
-    refused = own_refusals(comparisons)
+    refused = not_asked(comparisons)
     off = position_errors(scores, comparisons)
     for name in refused.keys() & off.columns:
         off.loc[off.index.isin(refused[name]), name] = np.nan
@@ -50,13 +51,14 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
         for run in comparison.runs
         if comparison.scenario.name not in refused.get(run.name, {})
     ]
+    everyone, engines = engines is off, engines.dropna(axis="columns", how="all")
     sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
     own = [
         unranked_sentence(name, off, FAR_OFF, refused.get(name, {}))
         for name in groups.get(YOURS, [])
     ]
     exact = [unranked_sentence(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
-    return sentences if engines is off else [*own, *sentences, *exact]
+    return sentences if everyone else [*own, *sentences, *exact]
 
 
 def early_ends(comparisons: Sequence[Comparison]) -> list[str]:
@@ -77,13 +79,16 @@ def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFra
     return off if len(unranked) == off.shape[1] else off.drop(columns=unranked)
 
 
-def own_refusals(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
-    """A solver's own file -> the scenes that it refuses, and why. The exercise does not ask for
-    these."""
+def not_asked(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
+    """Engine -> the scenes whose refusal is no failure, and why: those that a solver's own file
+    refuses, as the exercise does not ask for them, and those with friction, which an engine need
+    not model."""
     found: dict[str, dict[str, str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
-            if run.name.endswith(OWN_PROFILE) and run.status == "unsupported":
+            if run.status == "unsupported" and (
+                run.name.endswith(OWN_PROFILE) or REFUSAL in run.reason
+            ):
                 found.setdefault(run.name, {})[comparison.scenario.name] = run.reason
     return found
 
@@ -98,17 +103,12 @@ def not_counted(broken: Mapping[str, str]) -> list[str]:
 
 
 def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row for each scenario with an
-    exact answer, a column for each `engine:profile`.
+    """Largest deviation from the truth in radii at the middle dt: a row for each scenario that is
+    scored, a column for each `engine:profile`.
 
     `inf` for an engine without a result, so that refusing a hard scene is no advantage.
     """
-    # A truth with its horizon before the second sample has only the start, which is exact for all.
-    scored = [
-        comparison.scenario.name
-        for comparison in comparisons
-        if comparison.truth is not None and len(comparison.truth) > 1
-    ]
+    scored = [each.scenario.name for each in comparisons if pooled.scored(each)]
     names = list(dict.fromkeys(scores.name))
     table = scores.pivot(index="scenario", columns="name", values="error")
     return table.reindex(index=scored, columns=names)
@@ -152,8 +152,8 @@ def closest(off: pd.DataFrame) -> str:
         )
     if off.empty:
         return (
-            "No scene here has an exact answer, so no engine is scored. The page shows violations"
-            " of the laws of physics and differences between engines."
+            "No scene here has an exact answer for a tenth of its samples, so no engine is scored."
+            " The page shows violations of the laws of physics and differences between engines."
         )
     medians = off.median().sort_values()
     if np.isinf(medians.iloc[0]):
@@ -161,7 +161,12 @@ def closest(off: pd.DataFrame) -> str:
             "No engine was played to its end in half of the scenes with an exact answer, so engines"
             " are not ranked."
         )
-    best, *others = (f"{name} ({number(value, 2)})" for name, value in medians.items())
+    # within 1 % counts as equal
+    wins = {str(name): int((off[name] <= 1.01 * off.min(axis=1)).sum()) for name in off.columns}
+    best, *others = (
+        f"{name} ({number(value, 2)}{f', unbeaten in {wins[str(name)]}' if len(off) > 1 else ''})"
+        for name, value in medians.items()
+    )
     ranking = (
         f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "")
         if others
@@ -173,12 +178,9 @@ def closest(off: pd.DataFrame) -> str:
             " deviation in radii:"
             f" {best}{ranking}."
         )
-    # within 1 % counts as equal
-    wins = int((off[medians.index[0]] <= off.min(axis=1) * 1.01).sum())
     return (
         "Closest to the exact answers, by the largest deviation in radii as a median over"
-        f" {len(off)} scenes: {best}{ranking}. In {counted(wins, 'scene')} no engine is more than"
-        f" 1 % closer than {medians.index[0]}."
+        f" {len(off)} scenes: {best}{ranking}."
     )
 
 

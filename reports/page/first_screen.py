@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.compare.comparison import Comparison
+from reports.compare.fast_disks import can_pass
 from reports.page import cost_points, error_cost, pooled, situations
 from reports.page.charts import Drawing, packed_charts
 from reports.page.own_solvers import Said
+from reports.page.style import number
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,9 @@ class FirstScreen:
         no_times: why no times are shown, or "".
         timed: the scenes that were timed, if times are shown.
         answers: the engines ranked, a row for each situation.
+        fast: the scenes in which a disk can pass through another, or a wall, in a coarsest step.
+        flukes: (scene, engine) of `pooled.flukes`.
+        early: scene -> up to when its exact answer goes, where that is before its end.
         whole: the row of all situations together.
         far_off: position error, radii, above which a disk is visibly off.
         pooled: the pictures of all scenes at once.
@@ -61,6 +66,9 @@ class FirstScreen:
     no_times: str
     timed: Sequence[str]
     answers: Sequence[situations.Recommendation]
+    fast: Sequence[str]
+    flukes: Sequence[tuple[str, str]]
+    early: Mapping[str, str]
     whole: situations.Recommendation | None
     far_off: float
     pooled: Pictures
@@ -101,6 +109,9 @@ def first_screen(
         no_times=clock.fault,
         timed=[] if clock.fault else list(dict.fromkeys(clock.table.scenario)),
         answers=answers,
+        fast=[each.scenario.name for each in comparisons if can_pass(each)],
+        flukes=pooled.flukes(scores[~scores.name.isin(untrusted)]),
+        early=early_ends(comparisons),
         whole=situations.whole(answers),
         far_off=situations.FAR_OFF,
         pooled=pictures(pooled.KEY, drawings),
@@ -130,6 +141,15 @@ def situated(comparisons: Sequence[Comparison]) -> dict[str, list[str]]:
     return {
         each.scenario.name: situations.situations_of(each.scenario, each.truth)
         for each in comparisons
+    }
+
+
+def early_ends(comparisons: Sequence[Comparison]) -> dict[str, str]:
+    """Scene -> "up to 0.24 of 3 s", where its exact answer ends before the scene."""
+    return {
+        scenario.name: f"up to {number(truth.horizon, 2)} of {number(scenario.duration)} s"
+        for scenario, truth in ((each.scenario, each.truth) for each in comparisons)
+        if truth is not None and truth.horizon < scenario.duration
     }
 
 

@@ -3,6 +3,7 @@ of a scenario."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import NamedTuple
 
@@ -32,13 +33,16 @@ NO_FRICTION = "no friction"  # text for an engine without a model of friction
 
 class OverviewCell(NamedTuple):
     """A cell of a table: text, a longer remark, a step of the heat ramp (-1: none), failed, the
-    best; for a median also its value, the worst value as text and its scene."""
+    best, one of `pooled.flukes`, of how many collisions it speaks; for a median also its value, the
+    worst value as text and its scene."""
 
     text: str
     remark: str = ""
     heat: int = -1
     failed: bool = False
     best: bool = False
+    fluke: bool = False
+    share: str = ""
     value: float = np.nan
     worst: str = ""
     worst_in: str = ""
@@ -293,6 +297,7 @@ def heat_map(
     """scenario -> a cell for each name: the largest position error in radii, or why there is
     none."""
     rows = {}
+    flukes = set(pooled.flukes(pooled.scores(comparisons)))
     for comparison in comparisons:
         found, failed = values(comparison), outcome_at_middle_dt(comparison)
         played = {run.name for run in comparison.middle_runs}
@@ -303,7 +308,12 @@ def heat_map(
             elif (name, MAPPED) in found:
                 value, remark, judged = found[name, MAPPED]
                 cells.append(
-                    OverviewCell(number(value, 2), remark, heat(value))
+                    OverviewCell(
+                        number(value, 2),
+                        remark,
+                        heat(value),
+                        fluke=(comparison.scenario.name, name) in flukes,
+                    )
                     if judged
                     else OverviewCell(NOT_JUDGED, remark)
                 )
@@ -335,13 +345,23 @@ def scenario_table(
         cells = []
         for name in names:
             if (name, key) in found:
-                cells.append(OverviewCell(found[name, key].text, found[name, key].remark))
+                text, remark = found[name, key].text, found[name, key].remark
+                cells.append(OverviewCell(text, remark, share=share_of(key, remark)))
             else:
                 cells.append(outcome_cell(failed[name]) if name in failed else OverviewCell("–"))
         unit = "" if metric.unit == "1" else metric.unit
         better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
         rows.append((key, unit, better, cells))
     return rows
+
+
+def share_of(metric: str, remark: str) -> str:
+    """For a metric that counts collisions: "43 of 86 judged", or for their number "48 of 86", where
+    the two differ; else ""."""
+    found = re.search(r"(\d+) of (\d+)( collisions)?( judged)?", remark)
+    if not metric.startswith("collision") or found is None or found[1] == found[2]:
+        return ""
+    return f"{found[1]} of {found[2]}{found[4] or ''}"
 
 
 def between_engines(comparison: Comparison, names: Sequence[str]) -> dict[str, list[OverviewCell]]:

@@ -23,9 +23,10 @@ class PageTables:
     """The tables between the first screen and the scenarios, in their order.
 
     Attributes:
-        columns: of the table of medians. summaries: the tables of medians: without friction, and
+        columns: of the tables of medians. summaries: the tables of medians: without friction, and
         with friction if there are both.
         heat_map: scenario -> a cell for each engine: its largest position error.
+        flukes: whether a cell of it is one of `pooled.flukes`.
         heat_bounds: the errors at which the colour of a cell changes, radii.
         trust: heading -> how far to trust it.
         known_answers, known_answers_text: reproduced published numbers, and what they are.
@@ -40,6 +41,7 @@ class PageTables:
     columns: Mapping[str, overview.SummaryColumn]
     summaries: Sequence[Summary]
     heat_map: Mapping[str, Sequence[overview.OverviewCell]]
+    flukes: bool
     heat_bounds: Sequence[float]
     trust: Mapping[str, str]
     known_answers: Sequence[Mapping[str, Any]]
@@ -59,10 +61,14 @@ def page_tables(
     known_answers: pd.DataFrame,
 ) -> PageTables:
     """All tables of `comparisons`; an engine in `untrusted` is not scored."""
+    heat_map = overview.heat_map(comparisons, overview.names_of(comparisons))
+    medians = summaries(*situations.by_friction(comparisons), untrusted)
+    shown = [column for table in medians for column in table.columns]
     return PageTables(
-        columns=overview.SUMMARY,
-        summaries=summaries(*situations.by_friction(comparisons), untrusted),
-        heat_map=overview.heat_map(comparisons, overview.names_of(comparisons)),
+        columns={key: column for key, column in overview.SUMMARY.items() if column in shown},
+        summaries=medians,
+        heat_map=heat_map,
+        flukes=any(cell.fluke for row in heat_map.values() for cell in row),
         heat_bounds=style.HEAT_BOUNDS,
         trust=how_far_to_trust(comparisons),
         known_answers=records(known_answers),

@@ -10,18 +10,20 @@ import pandas as pd
 from adapters.engines import OWN
 from adapters.run import Run
 from reports.compare.comparison import Comparison
-from reports.compare.view import NOT_JUDGED
+from reports.compare.view import LEAST_SHARE, NOT_JUDGED
 from reports.page import situations, style
 from reports.page.charts import ChartLine, Drawing, figure_of
 from scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
+# times the errors at the neighbouring step sizes: more says where collisions fall in a step
+FLUKE = 5.0
 ERROR, ANGLE = "position_max_radii", "angle_max"
 SCORES = ["scenario", "name", "error", "angle", "dt_s", "step_size", "middle"]
 
 
 def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """A row for each run of a scene with an exact answer: columns `SCORES`.
+    """A row for each run of a scene that is scored: columns `SCORES`.
 
     error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
     step_size counts from the coarsest, dt_s is its length, middle: whether it is the middle step
@@ -29,8 +31,7 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
     """
     rows = []
     for comparison in comparisons:
-        # a truth with its horizon before the second sample has only the start, exact for all
-        if comparison.truth is None or len(comparison.truth) < 2:
+        if not scored(comparison):
             continue
         table, scenario = comparison.table, comparison.scenario.name
         judged = table[(table.versus == style.TRUTH) & table.metric.isin([ERROR, ANGLE])]
@@ -48,6 +49,26 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
             step_size = steps.index(run.dt)
             rows.append((scenario, run.name, error, angle, run.dt, step_size, middle))
     return pd.DataFrame(rows, columns=SCORES).astype({"middle": bool})
+
+
+def scored(comparison: Comparison) -> bool:
+    """Whether a scene has an exact answer for at least `LEAST_SHARE` of its samples after the
+    start: before that, the disks of a pile have met nothing."""
+    truth, intervals = comparison.truth, comparison.scenario.intervals
+    return truth is not None and len(truth) - 1 >= max(1.0, LEAST_SHARE * intervals)
+
+
+def flukes(found: pd.DataFrame) -> list[tuple[str, str]]:
+    """(scenario, `engine:profile`) of the `scores` at the middle step size that are more than
+    `FLUKE` times those at both neighbouring ones, and wrong."""
+    marked = []
+    for (scenario, name), group in found.groupby(["scenario", "name"], sort=False):
+        group = group.sort_values("step_size")
+        errors, k = group.error.to_numpy(), int(np.argmax(group.middle.to_numpy()))
+        between = 0 < k < len(errors) - 1
+        if between and errors[k] > max(situations.RIGHT, FLUKE * max(errors[k - 1], errors[k + 1])):
+            marked.append((str(scenario), str(name)))
+    return marked
 
 
 def drawings(

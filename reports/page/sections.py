@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from adapters.friction import REFUSAL
 from adapters.run import Run
 from adapters.thrust_grid import off_grid_note
 from reports.compare.comparison import Comparison
@@ -38,7 +39,9 @@ class ScenarioSection:
         ratio: width of the replay over its height.
         drawings: key -> chart.
         charts: the data of the drawings, packed.
-        table: metric, unit, which value is better, a cell for each engine.
+        columns: the engines of `table` and `pairs`: all but those that were not asked to play this
+            scene, or model no friction where it has some.
+        table: metric, unit, which value is better, a cell for each of `columns`.
         pairs: engine -> its largest deviation from each engine before it.
         settings: engine -> its (setting, asked, used) that differ from scenario to scenario.
     """
@@ -57,6 +60,7 @@ class ScenarioSection:
     ratio: float
     drawings: dict[str, Drawing]
     charts: str
+    columns: list[str]
     table: list[tuple[str, str, str, list[overview.OverviewCell]]]
     pairs: dict[str, list[overview.OverviewCell]]
     settings: dict[str, list[tuple[str, str, str]]]
@@ -77,6 +81,8 @@ def section_of(
     own = {key: pair for key, pair in overview.settings(comparison).items() if key not in common}
     drawings = {key: chart.draw(comparison) for key, chart in CHARTS.items()}
     layers = played(comparison)
+    asked = {run.name for run in comparison.runs if REFUSAL not in run.reason}
+    columns = [name for name in names if name in asked]
     return ScenarioSection(
         comparison=comparison,
         family=family_of(scenario.name) or OWN,
@@ -92,8 +98,9 @@ def section_of(
         ratio=ratio_of(scenario, layers),
         drawings=drawings,
         charts=packed_charts(drawings),
-        table=overview.scenario_table(comparison, names),
-        pairs=overview.between_engines(comparison, names),
+        columns=columns,
+        table=overview.scenario_table(comparison, columns),
+        pairs=overview.between_engines(comparison, columns),
         settings=by_name(own),
     )
 

@@ -34,7 +34,7 @@ MACHINE = ("system", "architecture", "processor", "cores")
 
 class Change(NamedTuple):
     """A difference: the engine, what changed, its value before and after, and the verdict "better",
-    "worse" or "other"."""
+    "worse" or "other"; of a number between two engines also the other one."""
 
     engine: str
     what: str
@@ -42,6 +42,7 @@ class Change(NamedTuple):
     after: str
     verdict: str
     factor: float = 1.0
+    beside: str = ""
 
 
 class Timing(NamedTuple):
@@ -79,7 +80,9 @@ class Difference:
     Attributes:
         warnings: reasons other than the engines why the two may differ.
         statuses, numbers: what changed.
-        same: `engine:profile` -> number of values that are equal bit for bit.
+        same: `engine:profile` -> number of values that are equal bit for bit; one between two
+            engines counts for both.
+        shared: the number of cells (scene, engine and step size) that both runs have.
         timings: of the engines timed in both runs, if the machine is the same.
     """
 
@@ -87,6 +90,7 @@ class Difference:
     statuses: list[Change]
     numbers: list[Change]
     same: Counter[str]
+    shared: int
     timings: list[Timing]
 
     @property
@@ -119,7 +123,8 @@ def difference(before: Path, after: Path) -> Difference:
         for archive in busy
     ]
     timed = timings_of(one, other, *cells) if like and not busy else []
-    return Difference(warnings, statuses, numbers, same, timed)
+    shared = len(cells[0].keys() & cells[1].keys())
+    return Difference(warnings, statuses, numbers, same, shared, timed)
 
 
 def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
@@ -259,9 +264,19 @@ def changed_numbers(
         if NOT_JUDGED in (was_said, now_said):
             verdict, note = "other", ""
         changes.append(
-            Change(row["name"], what + note, was_said, now_said, verdict, ratio(was, now))
+            Change(
+                row["name"],
+                what + note,
+                was_said,
+                now_said,
+                verdict,
+                ratio(was, now),
+                beside="".join(engines_of(row)[1:]),
+            )
         )
-    return changes, Counter(both[~differs].name)
+    equal_rows = both[~differs]
+    between = equal_rows.versus.str.contains(":", regex=False)
+    return changes, Counter([*equal_rows.name, *equal_rows.versus[between]])
 
 
 def said_of(value: str, note: str) -> str:

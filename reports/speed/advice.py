@@ -1,11 +1,10 @@
 """The cheapest engine and step size that keep a given error in one scene, and the engine options
-that
-the scene does not need: all measured in runs of the scene itself."""
+that the scene does not need: all measured in runs of the scene itself."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -25,10 +24,12 @@ from reports.compare.pareto import kept_from
 from reports.compare.view import beside
 from reports.run.machine import busy_cores
 from reports.run.scenes import open_scene
+from reports.run.stepping import Stepping
+from reports.run.timing import Sample, Timed, interleaved
 from reports.run.worker_process import Failure
-from reports.speed import ladder
 from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
 from reports.speed.effort import doublings
+from reports.speed.ladder import scored
 from reports.speed.measure import done
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
@@ -43,6 +44,7 @@ ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
 # `FEW`, as a step with them costs no less
 MOST_WORK, FEW = 1_000_000, 10
 TOO_FAR_OFF, SAVES_TIME, NEARER, NO_GAIN = "too far off", "saves time", "more accurate", "no gain"
+ONLY_HERE = "only at this dt"
 # Times are not compared if the noise, or the number of cores kept busy by others, is above these.
 # An option is timed in separate runs, so that less than a tenth cannot be resolved on a quiet
 # machine.
@@ -94,26 +96,35 @@ class Attempt:
 
 class ChangedOption(NamedTuple):
     """An engine with one option changed, and the engine without the change, at the same step
-    size."""
+    size; and the errors (without, with) at the next coarser and the next finer one."""
 
     plain: Attempt
     changed: Attempt
+    nearby: Sequence[tuple[float, float]] = ()
 
     def verdict(self, bound: float, floor: float) -> str:
         """The effect of the change: on the error, or else on the cost, if the cost changes by more
-        than the fraction `floor`."""
+        than the fraction `floor`.
+
+        The error of a single step size depends on where in a step each collision falls: it counts
+        as smaller only if it is smaller at the neighbouring step sizes, too.
+        """
         ratio = self.changed.cost / self.plain.cost
         if not self.changed.keeps(bound):
             return TOO_FAR_OFF
         if ratio < 1 - floor:
             return SAVES_TIME
-        return NEARER if self.changed.error <= HALF * self.plain.error else NO_GAIN
+        if self.changed.error > HALF * self.plain.error:
+            return NO_GAIN
+        return NEARER if all(new <= HALF * old for old, new in self.nearby) else ONLY_HERE
 
 
 class OutOfReach(NamedTuple):
-    """An engine that keeps the error at no step size: its best attempt, and the reason."""
+    """An engine that does not keep the error: its best attempt, its error at the finest step size,
+    and the reason."""
 
     best: Attempt
+    finest: float
     why: str
 
 
@@ -125,9 +136,11 @@ class Advice:
         scene: the name of the scene.
         until, duration: s, how far the exact answer goes and how long the scene is.
         step_sizes: s, those that were tried, coarse to fine.
-        keeping: for every engine that keeps the error the coarsest step size at which it does, as
-            at every finer one; cheapest first.
+        keeping: for every engine that keeps the error, and plays the whole scene, the coarsest step
+            size at which it keeps it, as at every finer one; cheapest first.
         short: the engines that do not keep it.
+        partial: those that keep it where it is judged, but do not play the whole scene; the reason
+            of each says how far it gets.
         changes: options of the engines that keep it, changed one at a time.
         noise: the upper quartile of |log(cost / cost of its own copy)| over the engines.
         busy: cores that others kept busy when the timing began; nan where unknown.
@@ -139,6 +152,7 @@ class Advice:
     step_sizes: Sequence[float]
     keeping: Sequence[Attempt]
     short: Sequence[OutOfReach]
+    partial: Sequence[Attempt]
     changes: Sequence[ChangedOption]
     noise: float
     busy: float
@@ -166,8 +180,9 @@ def advise(
     """Which of the engines `names` keeps the error of a purpose of `PURPOSES` within `bound` at the
     least cost.
 
-    Every engine is played at every step size of the scene's ladder; those that keep the error are
-    timed, together with their options, alone on the machine.
+    Every engine is played at every step size of the scene's ladder, up to the horizon of the exact
+    answer. Those that keep the error play the whole scene and are timed in it, together with their
+    options, alone on the machine.
 
     Raises:
         NoAdvice: the scene has no exact answer, or the timing failed.
@@ -176,12 +191,22 @@ def advise(
     scenario = scored_scenario(scene, seed)
     step_sizes = ladder_of(scenario)
     tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
-    found = [(ladder, those_that_keep(ladder, bound)) for ladder in by_engine(tried)]
-    keeping = [kept[0] for _, kept in found if kept]
-    changed = run([(one.name, change, one.substeps) for one in keeping for change in changes(one)])
-    priced, differences, busy = timed(scene, seed, [*keeping, *changed], progress)
+    found = [(one, those_that_keep(one, bound)) for one in by_engine(tried)]
+    keeping, partly = to_the_end(
+        scene, seed, workers, progress, [kept[0] for _, kept in found if kept]
+    )
+    error_at = {one.task: one.error for one in [*tried, *run(options_of(keeping, step_sizes))]}
+    changed = [
+        replace(one, change=change, error=error_at[one.name, change, one.substeps])
+        for one in keeping
+        for change in changes(one)
+    ]
+    able, _ = to_the_end(scene, seed, workers, progress, changed)
+    priced, differences, busy = timed(scene, seed, [*keeping, *able], progress)
     plain = {one.name: one for one in priced if one.change == PLAIN}
-    short = [min(ladder, key=smallest) for ladder, kept in found if not kept]
+    short = [
+        OutOfReach(min(one, key=smallest), one[-1].error, "") for one, kept in found if not kept
+    ]
     return Advice(
         scenario.name,
         scenario.duration,
@@ -189,16 +214,48 @@ def advise(
         [scenario.dt(k) for k in step_sizes],
         sorted(plain.values(), key=lambda one: one.cost),
         reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
-        [ChangedOption(plain[one.name], one) for one in priced if one.change != PLAIN],
+        partly,
+        [
+            ChangedOption(plain[one.name], one, errors_nearby(one, step_sizes, error_at))
+            for one in priced
+            if one.change != PLAIN
+        ],
         float(np.percentile([*differences.values()], 75)) if differences else nan,
         busy,
     )
 
 
+def options_of(keeping: Sequence[Attempt], ladder: Sequence[int]) -> list[tuple[str, str, int]]:
+    """The engines with each of their options changed, at the step size of each and its
+    neighbours."""
+    return [
+        (one.name, change, k)
+        for one in keeping
+        for change in changes(one)
+        for k in (*neighbours(one.substeps, ladder), one.substeps)
+    ]
+
+
+def neighbours(substeps: int, ladder: Sequence[int]) -> list[int]:
+    """The next coarser and the next finer step size of the ladder, those that there are."""
+    k = ladder.index(substeps)
+    return [*ladder[max(k - 1, 0) : k], *ladder[k + 1 : k + 2]]
+
+
+def errors_nearby(
+    one: Attempt, ladder: Sequence[int], error_at: Mapping[tuple[str, str, int], float]
+) -> list[tuple[float, float]]:
+    """The errors of the engine without a change and with it, at the neighbouring step sizes."""
+    return [
+        (error_at[one.name, PLAIN, k], error_at[one.name, one.change, k])
+        for k in neighbours(one.substeps, ladder)
+    ]
+
+
 def scored_scenario(scene: str, seed: int) -> Scenario:
     """The scenario up to the horizon of its exact answer; raises `NoAdvice` if it has none."""
     try:
-        return ladder.scored(scene, seed).scenario
+        return scored(scene, seed).scenario
     except NoTruth as refusal:
         raise NoAdvice(
             f"no exact answer: {refusal}. To compare the engines with each other and with the laws"
@@ -258,7 +315,7 @@ def attempts(
 
 def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, str]:
     """The error of one run up to the horizon; inf and the reason if it failed."""
-    scenario, truth = ladder.scored(scene, seed)
+    scenario, truth = scored(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
     if run.status != "ok" or run.trajectory is None:
         return inf, f"{run.status}: {run.reason}"
@@ -266,11 +323,38 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
     return error, "" if not isnan(error) else "too little of it can be judged"
 
 
+def to_the_end(
+    scene: str, seed: int, workers: int, progress: Progress, wanted: Sequence[Attempt]
+) -> tuple[list[Attempt], list[Attempt]]:
+    """The attempts that play the whole scene, beyond the horizon of its exact answer, too; and
+    those that do not, each with the reason."""
+    tasks = {one.task: partial(end_of, scene, seed, one) for one in wanted}
+    outcomes = dict(done(tasks, workers, progress, "playing to the end", PATIENCE))
+    able: list[Attempt] = []
+    partly: list[Attempt] = []
+    for one in wanted:
+        outcome = outcomes[one.task]
+        why = f"{outcome.status}: {outcome.reason}" if isinstance(outcome, Failure) else outcome
+        (partly if why else able).append(replace(one, reason=why))
+    return able, partly
+
+
+def end_of(scene: str, seed: int, one: Attempt) -> str:
+    """Why the attempt does not play the whole scene, and how far it gets; "" if it does."""
+    scenario = open_scene(scene, seed)
+    run = play_once(one.make, one.name, scenario, one.dt)
+    if run.status == "ok":
+        return ""
+    until = f", up to {run.trajectory.t[-1]:.3g} s" if run.trajectory is not None else ""
+    return f"{run.status}{until}: {run.reason}"
+
+
 def timed(
     scene: str, seed: int, played: Sequence[Attempt], progress: Progress
 ) -> tuple[list[Attempt], dict[tuple[str, int], float], float]:
-    """The attempts with their costs; for each engine and step size the difference of two timings of
-    the same engine, |log(cost / cost of its copy)|; and the number of cores that others used."""
+    """The attempts with their costs in the whole scene; for each engine and step size the
+    difference of two timings of the same engine, |log(cost / cost of its copy)|; and the number of
+    cores that others used."""
     if not played:
         return [], {}, nan
     makes = {
@@ -278,7 +362,7 @@ def timed(
         for one in played
         for copy in ((0, 1) if one.change == PLAIN else (0,))
     }
-    task = partial(ladder.times_of, scene, seed, makes, ROUNDS, BUDGET)
+    task = partial(times_of_whole, scene, seed, makes)
     busy = busy_cores()
     [(_, samples)] = done({("time",): task}, 1, progress, "timing", ALL_ROUNDS)
     if isinstance(samples, Failure):
@@ -294,11 +378,24 @@ def timed(
     return priced, differences, busy
 
 
+def times_of_whole(
+    scene: str, seed: int, makes: Mapping[tuple[Any, int, int], Callable[[], Engine]]
+) -> list[Sample]:
+    """Timing samples, s per simulated second, by (who, substeps, copy), over the whole scene: what
+    comes after the horizon of its exact answer may cost more than what comes before."""
+    scenario = open_scene(scene, seed)
+    what = [
+        Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
+        for key, make in makes.items()
+    ]
+    return interleaved(what, ROUNDS, BUDGET, seed)
+
+
 def reasons(
     scene: str,
     seed: int,
     purpose: str,
-    short: Sequence[Attempt],
+    short: Sequence[OutOfReach],
     finest: int,
     workers: int,
     progress: Progress,
@@ -307,7 +404,7 @@ def reasons(
     budget."""
     tasks = {
         one.task: partial(budget_of, scene, seed, played_as(one.name), finest)
-        for one in short
+        for one, _, _ in short
         if played_as(one.name) in KNOWN and isfinite(one.error)
     }
     budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
@@ -315,11 +412,12 @@ def reasons(
     return [
         OutOfReach(
             one,
+            error,
             one.reason
             or (ASK_THE_EXERCISE if row_of(one.name).exercise else "")
             or largest(budgets.get(one.task), measure),
         )
-        for one in short
+        for one, error, _ in short
     ]
 
 

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from adapters.engines import ENGINES
 from reports.page.style import number
 from reports.run.arguments import checked_engines, checked_scenes, unknown
-from reports.speed.advice import Advice, Attempt, NoAdvice, advise
+from reports.speed.advice import BUSY, LOUD, Advice, Attempt, NoAdvice, advise
 from reports.speed.purposes import PURPOSES
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
@@ -68,7 +68,11 @@ def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
         "duration_s": advice.duration,
         "dt_s_tried": list(advice.step_sizes),
         "cheapest_first": [row_of_attempt(one) for one in advice.keeping],
-        "not_within": [row_of_attempt(short.best) | {"why": short.why} for short in advice.short],
+        "not_within": [
+            row_of_attempt(short.best) | {"error_at_finest": finite(short.finest), "why": short.why}
+            for short in advice.short
+        ],
+        "not_to_the_end": [row_of_attempt(one) | {"why": one.reason} for one in advice.partial],
         "changes": [
             row_of_attempt(change.changed)
             | {
@@ -114,7 +118,15 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     if advice.keeping:
         print_choices(console, advice)
     else:
-        console.print("No engine keeps this error at any step size tried.", style="bold")
+        which = "engine that plays the whole scene" if advice.partial else "engine"
+        console.print(f"No {which} keeps this error at any step size tried.", style="bold")
+    if advice.partial:
+        console.print()
+        print_texts(
+            console,
+            {one.name: one.reason for one in advice.partial},
+            "No advice, as they do not play the whole scene",
+        )
     if advice.short:
         console.print()
         print_short(console, advice)
@@ -132,23 +144,35 @@ def print_choices(console: Console, advice: Advice) -> None:
         for one in advice.keeping[:SHOWN]
     ]
     headings = ["engine", "dt, ms", "error", "µs per\nsimulated s"]
-    print_table(console, headings, rows, "Cheapest first")
+    print_table(console, headings, rows, "Cheapest first, in the whole scene")
     if dearer := advice.keeping[SHOWN:]:
         names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for one in dearer)
         console.print(f"Also within it: {names}.", highlight=False)
 
 
 def print_short(console: Console, advice: Advice) -> None:
-    """Print the engines that keep the error at no step size."""
+    """Print the engines that do not keep the error. One that keeps it at a coarser step size than
+    the finest does so by chance: a step size counts only if every finer one keeps it, too."""
     coarse, *_, fine = advice.step_sizes
-    title = f"Not within it at any step size from {number(coarse * 1e3)} to {number(fine * 1e3)} ms"
+    title = f"Not within it at {number(fine * 1e3)} ms, the finest of the step sizes tried"
     rows = [
-        [best.name, number(best.error), number(best.dt * 1e3) if isfinite(best.error) else "–"]
-        for best, _ in advice.short
+        [
+            best.name,
+            number(finest),
+            number(best.error),
+            number(best.dt * 1e3) if isfinite(best.error) else "–",
+        ]
+        for best, finest, _ in advice.short
     ]
-    print_table(console, ["engine", "least error", "at dt, ms"], rows, title)
+    headings = ["engine", f"error at\n{number(fine * 1e3)} ms", "least\nerror", "at dt,\nms"]
+    print_table(console, headings, rows, title)
+    console.print(
+        f"Tried: {number(coarse * 1e3)} to {number(fine * 1e3)} ms. A step size counts only if"
+        " every finer one keeps the error, too.",
+        highlight=False,
+    )
     console.print()
-    print_texts(console, {best.name: why for best, why in advice.short}, "Why")
+    print_texts(console, {best.name: why for best, _, why in advice.short}, "Why")
 
 
 def print_changes(console: Console, advice: Advice, bound: float) -> None:
@@ -167,10 +191,14 @@ def print_changes(console: Console, advice: Advice, bound: float) -> None:
 
 
 def sentence_on_times(advice: Advice) -> str:
-    """A sentence on the noise of the times."""
-    said = f"Two timings of the same engine differ by {advice.noise:.0%}."
+    """A sentence on how far the times can be compared."""
+    said = f"Two timings of the same engine differ by {advice.noise:.0%}"
     if advice.quiet:
-        return f"{said} Costs that differ by less than {advice.floor:.0%} are the same."
+        return f"{said}. Costs that differ by less than {advice.floor:.0%} are the same."
+    causes = [said] if advice.noise > LOUD else []
+    if advice.busy > BUSY:
+        causes.append(f"Other programs keep {advice.busy:.1f} of {os.cpu_count()} cores busy")
     return (
-        f"{said} The machine is busy, so times cannot be compared: measure again when it is idle."
+        f"{', and '.join([causes[0], *(each[0].lower() + each[1:] for each in causes[1:])])}, so"
+        " times cannot be compared: measure again when the machine is idle."
     )

@@ -55,6 +55,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         looks=looks,
         plotly=True,
         names=results.names,
+        played=played(results.points),
         about=about,
         pooled=pooled_section(results),
         rough=sum(situations.FRICTION in places for places in situated(results).values()),
@@ -92,6 +93,13 @@ def middle_scores(results: Results) -> pd.DataFrame:
     middle = points.scenario.map({name: sorted(k)[len(k) // 2] for name, k in sizes.items()})
     here = points[points.step_size == middle]
     return here.assign(name=here.engine + ":" + here.profile, angle=np.nan)[situations.COLUMNS]
+
+
+def played(points: pd.DataFrame) -> list[str]:
+    """The engines with an error in one of the scenes; one that only adds friction has none in
+    scenes without."""
+    found = points[np.isfinite(points.error)]
+    return list(dict.fromkeys(found.engine + ":" + found.profile))
 
 
 def situated(results: Results) -> dict[str, list[str]]:

@@ -146,7 +146,7 @@ def write_files(folder: Path) -> StabilityResults:
 def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[str], list[str]]:
     """The cases, maps and scenes of touching disks that were asked for; if a name is wrong,
     prints one line for each fault and exits 2."""
-    faults = [unknown("--vary", what, VARIES) for what in vary if what not in VARIES]
+    faults = [not_varied(what) for what in vary if what not in VARIES]
     cases: list[str] = []
     maps, touching = (
         [name for name in names if name in MAPS],
@@ -174,6 +174,12 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
         if names
         else (list(CASES), list(MAPS), list(TOUCHING))
     )
+
+
+def not_varied(what: str) -> str:
+    """A sentence on a word that `--vary` does not take, with those that it does."""
+    said = unknown("--vary", what, VARIES).removesuffix("; see: crosscheck list")
+    return f"{said}; allowed: {', '.join(VARIES)}"
 
 
 def varied_of(path: str, vary: Sequence[str]) -> tuple[list[str], list[str]]:

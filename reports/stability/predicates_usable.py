@@ -8,11 +8,12 @@ from reports.compare import laws, scales
 from reports.compare.collisions import match, pair_keys, who
 from reports.compare.view import cut
 from reports.stability.predicates import Predicate, Reading, first_above
-from scenarios.model import Collisions, Scenario, Trajectory
+from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
 from scenarios.no_truth import answered
 
 MOST_RISE, MOST_OVERLAP, MOST_LOST = 0.05, 0.1, 0.5  # of the energy at hand; radii; of a distance
 LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding
+STEADY = 1e-9  # of a velocity; a smaller change between two samples is the rounding of the answer
 
 
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
@@ -22,7 +23,7 @@ def _usable(scenario: Scenario, played: Trajectory) -> Reading:
             _rise(scenario, played),
             _overlap(scenario, played),
             _escape(scenario, played),
-            _stuck(scenario, played),
+            _slowed(scenario, played),
             _wrong_collisions(scenario, played),
         )
         if part is not None
@@ -74,23 +75,21 @@ def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
     )
 
 
-def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
-    """The largest part of its distance that a disk loses in a sample interval although it keeps its
-    velocity, because its position has too few digits.
+def _slowed(scenario: Scenario, played: Trajectory) -> Reading | None:
+    """The largest part of its distance that a disk loses in a sample interval of free flight: its
+    position has too few digits, or the engine caps its speed.
 
-    Only before the first collision of a disk: two collisions between two samples may restore its
-    velocity.
+    The distance is that of the exact answer, as long as the disk has met nothing but walls, as
+    often as there: its speed must be the same. It is also that of the engine's own velocity, before
+    the first collision of a disk: two collisions between two samples may restore its velocity.
     """
-    scene, v, collisions = scenario.scene, played.velocity, played.collisions
+    scene = scenario.scene
     if len(played) < 2 or scene.wrap is not None:
         return None
-    first_collision = np.full(scene.n, np.inf)
-    for disks in (collisions.i, collisions.j):
-        np.minimum.at(first_collision, disks[disks >= 0], collisions.t[disks >= 0])
-    steady = (v[1:] == v[:-1]).all(axis=2) & ~scene.static & (played.t[1:, None] < first_collision)
-    ought = np.linalg.norm(v[1:], axis=2) * scenario.sample_interval / scene.radius
+    ought = np.maximum(own_distance(scenario, played), exact_distance(scenario, played))
+    ought /= scene.radius
     went = np.linalg.norm(np.diff(played.position, axis=0), axis=2) / scene.radius
-    lost = np.where(steady & (ought > LEAST_WAY), 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
+    lost = np.where(ought > LEAST_WAY, 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
     event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
     return Reading(
@@ -100,6 +99,51 @@ def _stuck(scenario: Scenario, played: Trajectory) -> Reading | None:
         "wrong distance",
         disk=int(disk),
     )
+
+
+def own_distance(scenario: Scenario, played: Trajectory) -> Array:
+    """(samples - 1, n) m, how far each disk moves between two samples by its own velocity, where
+    that stays the same and the disk has not yet collided; else 0."""
+    scene, v = scenario.scene, played.velocity
+    steady = (v[1:] == v[:-1]).all(axis=2) & ~collided(played, scene, played.t[1:]).any(axis=2)
+    return np.where(
+        steady & ~scene.static,
+        np.linalg.norm(v[1:], axis=2) * scenario.sample_interval,
+        0.0,
+    )
+
+
+def exact_distance(scenario: Scenario, played: Trajectory) -> Array:
+    """(samples - 1, n) m, how far each disk moves between two samples of the exact answer, where it
+    flies freely there and in the run, and has met the same walls as often, and no disk; else 0."""
+    distance = np.zeros((len(played) - 1, scenario.scene.n))
+    _, true = answered(scenario)
+    if true is None or len(true) < 2:
+        return distance
+    t, v = true.t, true.velocity
+    met, ought = (collided(each, scenario.scene, t) for each in (played, true))
+    alike = (met == ought).all(axis=2) & (ought[:, :, 0] == 0)
+    free = (np.diff(ought, axis=0) == 0).all(axis=2)
+    change = np.linalg.norm(np.diff(v, axis=0), axis=2)
+    steady = change <= STEADY * np.linalg.norm(v[1:], axis=2)
+    distance[: len(t) - 1] = np.where(
+        alike[1:] & alike[:-1] & free & steady,
+        np.linalg.norm(np.diff(true.position, axis=0), axis=2),
+        0.0,
+    )
+    return distance
+
+
+def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
+    """(times, n, 1 + walls): how often each disk has met other disks, and each wall, up to and
+    including the times `t` (s)."""
+    counts = np.zeros((len(t) + 1, scene.n, 1 + len(scene.walls)))
+    hits = played.collisions
+    when = np.searchsorted(t, hits.t)
+    for disk, other in ((hits.i, hits.j), (hits.j, hits.i)):
+        of_disk = disk >= 0
+        np.add.at(counts, (when[of_disk], disk[of_disk], np.maximum(-other[of_disk], 0)), 1)
+    return counts.cumsum(axis=0)[:-1]
 
 
 def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -144,6 +188,7 @@ USABLE = Predicate(
     "of the bound",
     1.0,
     "a number is not finite, a disk goes through a wall, energy grows by 5 %, disks overlap by a"
-    " tenth of a radius, a disk moves by half its distance only, or a collision is wrong",
+    " tenth of a radius, a disk in free flight moves by half its distance only (its speed is"
+    " capped, or its position has too few digits), or a collision is wrong",
     _usable,
 )

@@ -273,6 +273,13 @@ REASONS = (
         4 * atan(pi / 16) / 0.98,
     ),
     Reason(
+        "dt_body_frame_thrust",
+        "box2d_v3:shipped",
+        EIGHTH,
+        "Box2D 3.1 src/constants.h: B2_MAX_ROTATION",
+        pi / 4 / 1.7,  # rad/s, the spin when the thrusts have ended
+    ),
+    Reason(
         "spin",
         "box2d_v3:matched*",
         "rotation is limited to pi/4 a step; refused",

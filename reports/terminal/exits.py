@@ -4,8 +4,10 @@ signals."""
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -154,5 +156,14 @@ def refuse(faults: Sequence[str]) -> NoReturn:
 
 
 def say(line: str) -> None:
-    """One line on standard error."""
-    print(legible(line), file=sys.stderr)
+    """One line on standard error; on a terminal it is folded between words."""
+    text = legible(line)
+    if sys.stderr.isatty():
+        width = shutil.get_terminal_size().columns
+        text = "\n".join(folded(part, width) for part in text.split("\n"))
+    print(text, file=sys.stderr)
+
+
+def folded(line: str, width: int) -> str:
+    """The line in lines of at most so many columns; a longer word, as a path, stays whole."""
+    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)

@@ -8,7 +8,7 @@ import pytest
 from adapters.engines import ENGINES
 from adapters.play import play_once
 from reports.compare.comparison import Comparison, compare
-from reports.compare.fast_disks import fast_note, rounded_down
+from reports.compare.fast_disks import fast_note, plain, rounded_down
 from scenarios.model import Scenario, Scene
 from scenarios.truth.exact import with_oracle
 
@@ -70,6 +70,19 @@ def test_the_step_that_is_called_safe_is():
     scenario = shot(5.0)
 
     assert "With steps of 0.02 s it cannot." in fast_note(played(scenario, "reference:exercise"))
+
+
+def test_a_cap_that_rounding_makes_smaller_is_not_named():
+    """20 m/s in a step of 0.1 s, which float32 makes a little less, are what the disk has."""
+    assert "allow less" not in fast_note(played(shot(10.0), "reference:exercise", "box2d:shipped"))
+
+
+@pytest.mark.parametrize(
+    ("value", "says"), [(12000.0, "12000"), (1e-6, "0.000001"), (100.0, "100")]
+)
+def test_numbers_in_the_sentence_have_no_exponent(value: float, says: str):
+    """1e+02 beside 10⁻⁶ would be two formats on one page."""
+    assert plain(value) == says
 
 
 def test_the_caps_below_the_fastest_disk_are_named():

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,16 +16,18 @@ from playwright.sync_api import Browser
 
 from adapters.engines import ENGINES, FETCHED
 from adapters.play import play
-from reports.commands.report import medians
+from reports.commands.report import medians, never_played
 from reports.compare.comparison import Comparison, compare
+from reports.compare.view import cut
 from reports.page import charts, findings, overview, situations
 from reports.page.cost_points import NO_CLOCK, RunTimes, with_times
-from reports.page.first_screen import situated
+from reports.page.first_screen import early_ends, situated
 from reports.page.links import PAGES, neighbours
 from reports.page.overview import OverviewCell
 from reports.page.own_solvers import with_lines
 from reports.page.page_tables import summaries
-from reports.page.pooled import by_situation, scores
+from reports.page.pooled import SCORES, by_situation, flukes, scores
+from reports.page.sections import sections_of
 from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
 from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of, number
 from reports.run.timing import noise_of
@@ -91,6 +95,79 @@ def test_who_models_no_friction_is_not_shown_as_failed(with_friction):
     assert (row[0].text, row[0].failed) == (overview.NO_FRICTION, False)
     assert {each.outcome for each in overview.failures(rough[0])} == {overview.NO_FRICTION}
     assert overview.outcome_cell(("refused", "collisions accumulate")).failed
+
+
+def test_a_refusal_of_friction_is_no_failure_unless_the_engine_was_asked_for(with_friction):
+    """In a run of scenes with friction alone: not in the findings, nor in the exit status."""
+    _, rough = with_friction
+    said = " ".join(findings.findings(rough, set()))
+
+    assert "reference:exercise" not in said
+    assert "every cell was played to its end" in said
+    assert never_played(rough, by_name=False) == []
+    assert never_played(rough, by_name=True) == ["reference:exercise"]
+
+
+def test_an_exact_answer_of_less_than_a_tenth_of_a_scene_ranks_nobody(with_friction):
+    """In so short a part of a pile nothing has come to rest."""
+    [whole, _], _ = with_friction
+    least = math.ceil(0.1 * whole.scenario.intervals)
+    ends_early, enough = (replace(whole, truth=cut(whole.truth, k + 1)) for k in (least - 1, least))
+
+    assert scores([ends_early]).empty
+    assert situations.answers(with_times(scores([ends_early]), NO_CLOCK), {}, set()) == []
+    assert "so no engine is scored" in findings.findings([ends_early], set())[0]
+    assert not scores([enough]).empty
+
+
+def test_an_error_far_above_both_neighbouring_step_sizes_is_marked():
+    """Of the middle step size only, and only if it is wrong at all."""
+
+    def at(errors: list[float], name: str) -> list[tuple]:
+        steps = enumerate(errors)
+        return [("a", name, error, np.nan, 0.1 / 2**k, k, k == 2) for k, error in steps]
+
+    chance = at([0.165, 0.098, 6.1, 0.023], "pymunk:matched")
+    falls = at([8.0, 4.0, 2.0, 1.0], "pymunk:shipped")
+    rises = at([0.1, 0.1, 6.0, 6.0], "box2d:matched")
+    right = at([1e-15, 1e-15, 1e-13, 1e-15], "event_driven:float64")
+    found = pd.DataFrame([*chance, *falls, *rises, *right], columns=SCORES)
+
+    assert flukes(found) == [("a", "pymunk:matched")]
+
+
+def test_an_engine_with_nothing_in_a_scene_has_no_column_there(with_friction):
+    """One that was not asked, or models no friction; in the map it has."""
+    smooth, rough = with_friction
+    first, *_, last = sections_of([*smooth, *rough])
+
+    assert "reference:coulomb" not in first.columns
+    assert "reference:exercise" in first.columns
+    assert last.columns == ["pymunk:matched", "reference:coulomb"]
+    assert all(len(cells) == 2 for *_, cells in last.table)
+
+
+@pytest.mark.parametrize(
+    ("metric", "remark", "says"),
+    [
+        ("collisions_missed", "43 of 86 collisions judged", "43 of 86 judged"),
+        ("collisions_missed", "86 of 86 collisions judged", ""),
+        ("collision_count_error", "48 of 86", "48 of 86"),
+        ("energy_error", "43 of 86 samples", ""),
+    ],
+)
+def test_of_how_many_collisions_a_count_speaks_stands_below_it(metric, remark, says):
+    """-38 too few beside none missed: those that a step cannot resolve are not judged."""
+    assert overview.share_of(metric, remark) == says
+
+
+def test_the_end_of_the_exact_answer_stands_beside_the_name():
+    """Where it ends before the scene."""
+    pile = SimpleNamespace(name="pile", duration=3.0)
+    ends = [SimpleNamespace(scenario=pile, truth=SimpleNamespace(horizon=h)) for h in (0.244, 3.0)]
+
+    assert early_ends(ends[:1]) == {"pile": "up to 0.24 of 3 s"}
+    assert early_ends(ends[1:]) == {}
 
 
 def test_the_terminal_names_who_models_no_friction_below_the_numbers_with_units(with_friction):
@@ -394,7 +471,7 @@ def test_every_engine_of_the_table_has_its_worst_scene(
     asked = situations.answers(found[found.middle].assign(cost=np.nan), placed, set())
 
     assert "median error of the scenes" in heads
-    assert "off by more than 1 radius (1 rad): by how many" in heads
+    assert "off by more than 1 radius: by how many" in heads
     for row in asked:
         shown = [row.best, *(row.others if row.best.median <= 1 else []), *filter(None, [row.own])]
         said = [
@@ -572,6 +649,15 @@ def test_rounding_noise_takes_less_than_a_third_of_an_axis():
     assert share(charts.decades(values)["range"]) > 0.7
     assert 10**low < floor < 1e-3
     assert axis["ticktext"][-1] == "< 10<sup>−9</sup>"
+
+
+def test_a_broken_axis_is_struck_through_at_the_break():
+    """Two strokes at the upper edge of the grey band, so that the jump is seen."""
+    axis, floor = charts.broken_axis(np.array([0.1, 1.0, 1e-9]), 1e-6)
+    band, *strokes = charts.marked_break(axis, floor)["shapes"]
+
+    assert [stroke["type"] for stroke in strokes] == ["line", "line"]
+    assert strokes[0]["y0"] < band["y1"] < strokes[0]["y1"]
 
 
 def test_an_axis_of_rounding_alone_is_not_broken():

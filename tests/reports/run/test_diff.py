@@ -5,6 +5,7 @@ import json
 import random
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 
@@ -107,6 +108,29 @@ def test_the_same_run_has_not_changed(
     """Exit 0."""
     assert exit_of(before, after) == 0
     assert "Nothing got worse." in capsys.readouterr().out
+
+
+def test_a_number_between_two_engines_counts_for_both(before: Path, after: Path):
+    """So that engines with the same metrics have the same count."""
+    same = difference(before, after).same
+
+    assert set(same) == {"pymunk:shipped", "pymunk:matched"}
+    assert same["pymunk:shipped"] == same["pymunk:matched"]
+
+
+def test_runs_without_a_common_cell_are_not_said_to_have_got_worse(
+    before: Path, after: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
+    """Exit 1: the comparison that was asked for cannot be made."""
+    nothing = replace(difference(before, after), shared=0)
+    monkeypatch.setattr("reports.commands.diff.difference", lambda *_: nothing)
+
+    with pytest.raises(SystemExit) as end:
+        show_difference(before, after)
+
+    assert end.value.code == 1
+    out, err = capsys.readouterr()
+    assert (out, "share no cell" in err) == ("", True)
 
 
 def test_one_bit_in_a_cell_that_is_the_same_is_worse(before: Path, after: Path):

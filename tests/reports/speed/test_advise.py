@@ -4,6 +4,7 @@ purpose sees a wrong engine."""
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import inf, nan
@@ -22,15 +23,20 @@ from reports.speed import advice, ladder
 from reports.speed.advice import (
     NEARER,
     NO_GAIN,
+    ONLY_HERE,
     SAVES_TIME,
     TOO_FAR_OFF,
+    Advice,
     Attempt,
     ChangedOption,
     ladder_of,
     those_that_keep,
+    to_the_end,
 )
+from reports.speed.advise import sentence_on_times
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
+from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 from tests.adapters.broken_engines import DoublesSpeed, Freezes, GainsEnergy
 from tests.reports.terminal.command_line import crosscheck
@@ -69,6 +75,44 @@ def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
     plain = attempt(1, 0.1, 0.5, cost=1.0)
 
     assert ChangedOption(plain, attempt(1, 0.1, error, cost=cost)).verdict(1.0, 0.05) == verdict
+
+
+@pytest.mark.parametrize(
+    ("nearby", "verdict"),
+    [([(1.0, 0.4), (0.2, 0.1)], NEARER), ([(1.0, 0.4), (0.2, 0.2)], ONLY_HERE), ([], NEARER)],
+)
+def test_an_option_is_more_accurate_only_if_it_is_at_the_neighbouring_step_sizes(
+    nearby: list[tuple[float, float]], verdict: str
+):
+    """At a single one a collision may fall on the edge of a step by chance."""
+    plain, changed = attempt(1, 0.1, 0.5, cost=1.0), attempt(1, 0.1, 0.1, cost=1.0)
+
+    assert ChangedOption(plain, changed, nearby).verdict(1.0, 0.1) == verdict
+
+
+def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
+    """In a column the collisions accumulate: `event_driven` refuses to go on."""
+    dt = open_scene("column_of_ten", 0).dt(1)
+    found = [
+        Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "pymunk:matched")
+    ]
+    with Progress() as progress:
+        able, partly = to_the_end("column_of_ten", 0, 1, progress, found)
+
+    assert [one.name for one in able] == ["pymunk:matched"]
+    assert [one.name for one in partly] == ["event_driven:float64"]
+    assert "accumulate" in partly[0].reason
+
+
+def test_it_says_why_times_cannot_be_compared():
+    """A small difference of two timings is not given as the reason."""
+    advice = Advice("a", 1, 1, [1], [attempt(1, 0.1, 0.5)], [], [], [], noise=0.01, busy=1.9)
+
+    assert sentence_on_times(advice).startswith("Other programs keep 1.9 of ")
+    assert "differ" not in sentence_on_times(advice)
+    loud = sentence_on_times(replace(advice, noise=0.2))
+    assert loud.startswith("Two timings of the same engine differ by 20%, and other programs keep")
+    assert sentence_on_times(replace(advice, busy=0.0)).startswith("Two timings of the same engine")
 
 
 @pytest.mark.parametrize("purpose", PURPOSES)
@@ -144,5 +188,5 @@ def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Pa
     done = crosscheck("advise", *words, cwd=tmp_path)
 
     assert done.returncode == 1
-    assert "None of the engines keeps it" in done.stdout
+    assert "No engine keeps this error" in done.stdout
     assert "mostly" in done.stdout

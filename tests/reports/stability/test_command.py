@@ -149,7 +149,8 @@ def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_e
         (["slow_collisions"], "case 'slow_collisions' is not known; did you mean slow_collision"),
         (
             ["scenes/two.toml", "--vary", "mass"],
-            "--vary 'mass' is not known; did you mean mass_ratio?",
+            "--vary 'mass' is not known; did you mean mass_ratio?; allowed: dt, speed, mass_ratio,"
+            " restitution, scale, offset",
         ),
         (["--vary", "dt"], "--vary dt: varies a scene file, and none is named; name FILE.toml"),
         (["nowhere.toml"], "nowhere.toml: no such file or directory"),

@@ -194,6 +194,17 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
     assert far["event_driven:float64"].works
 
 
+def test_a_disk_whose_speed_an_engine_caps_fails():
+    """Box2D moves a disk by 2 m in a step at most: 480 m/s in steps of 1/240 s. At 1200 m/s the
+    ball does not get as far as the exact answer says, whatever its velocity is read to be."""
+    search = LimitSearch(case_of_file(str(SCENES / "bullet.toml"), "speed"), "box2d:shipped", QUICK)
+    fast = search.trial(10.0)
+
+    assert (fast.works, fast.broken) == (False, "strays")
+    assert fast.event == "disk 0 moves by 0.4 of its distance"
+    assert search.trial(1.0).works
+
+
 @pytest.mark.parametrize("x", [0.00294, 0.0167])
 def test_a_disk_that_is_struck_twice_between_two_samples_is_not_called_stuck(x: float):
     """In the cradle it leaves as it came, at rest or not, and has gone less than that."""

@@ -18,6 +18,7 @@ from reports.stability.command import print_limits
 from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
+from reports.terminal.exits import folded
 from reports.terminal.progress import OneLine, Progress, fitted
 from reports.terminal.tables import print_list, print_table, print_texts
 from tests.reports.terminal.command_line import Done, crosscheck, on_terminal
@@ -245,6 +246,19 @@ def test_texts_and_lists_wrap_below_themselves(columns: int, capsys: pytest.Capt
 
     assert faults(printed.splitlines(), columns) == []
     assert printed.count("three") == 32
+
+
+def test_a_message_is_folded_between_words_and_a_path_stays_whole():
+    """On a terminal; the terminal itself would break inside a word."""
+    text = "scene.toml: no disk moves, so that every one is static, in /a/path/longer/than/a/line"
+
+    assert folded(text, 24).split("\n") == [
+        "scene.toml: no disk",
+        "moves, so that every one",
+        "is static, in",
+        "/a/path/longer/than/a/line",
+    ]
+    assert folded("To go on:               crosscheck", 80) == "To go on:               crosscheck"
 
 
 def test_things_are_counted_in_one_way():
