@@ -16,8 +16,9 @@ class Option:
     """One change to one engine.
 
     Attributes:
-        engine: the row of `ENGINES` to compare with, `engine:profile`. change: the difference, in a
-        few words. make: makes the changed engine; imports its library when called.
+        engine: the row of `ENGINES` to compare with, `engine:profile`.
+        change: the difference, in a few words.
+        make: makes the changed engine; imports its library when called.
     """
 
     engine: str

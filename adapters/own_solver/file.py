@@ -39,9 +39,10 @@ class SolverFailed(Exception):
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
             adapters/javascript; "diverged" if `read` of an engine's file returns numbers that are
-            not finite. what: the end of the sentence "it ..."; control characters are escaped, and
-            text beyond `LONGEST` characters is cut. line, column: the place in the solver's file,
-            from 1; 0 if it is not known.
+            not finite.
+        what: the end of the sentence "it ..."; control characters are escaped, and text beyond
+            `LONGEST` characters is cut.
+        line, column: the place in the solver's file, from 1; 0 if it is not known.
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:

@@ -23,8 +23,8 @@ class ErrorCost(NamedTuple):
     """What the page shows.
 
     Attributes:
-        drawings: scenario, or `POOLED` -> its picture. sentences: three, on speed and error, or two
-        on error.
+        drawings: scenario, or `POOLED` -> its picture.
+        sentences: three, on speed and error, or two on error.
         fault: why there are no times, or "".
         caption: what a point shows.
         costs: a row for each engine, see `costs_of`; empty without times.

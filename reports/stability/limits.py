@@ -194,8 +194,10 @@ class Limit:
         intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was
             found, or looked for.
         mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; ""
-        likewise. reason, source, tested: why, where that stands, and how it was tested: "" is a
-            likely reason.
+            if none were found, or looked for.
+        reason, source: why, and where that stands.
+        tested: how the reason was tested; "": it is a likely one.
+        status: "ok", or why the search was lost, as in `STATUSES` of run.py.
     """
 
     case: str
