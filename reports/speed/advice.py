@@ -1,6 +1,5 @@
 """The cheapest engine and step size that keep a given error in one scene, and the engine options
-that
-the scene does not need: all measured in runs of the scene itself."""
+that the scene does not need: all measured in runs of the scene itself."""
 
 from __future__ import annotations
 
