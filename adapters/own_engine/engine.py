@@ -14,7 +14,7 @@ import numpy as np
 
 from adapters.engine import Unsupported
 from adapters.engine_row import EngineRow
-from adapters.own_engine.models import must_model, refusal
+from adapters.own_engine.features import must_model, refusal
 from adapters.own_engine.surface import is_engine, must_be_either
 from adapters.own_solver.engine import STEP_LIMIT, Student, row_of_solver
 from adapters.own_solver.file import LONGEST, SolverFailed, SolverText, printable, read_solver
