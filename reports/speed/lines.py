@@ -201,7 +201,7 @@ class Sizes(Line):
 
 
 class Closed(Line):
-    """What `models.closed_form` returns: what answers the scene, and its cost."""
+    """What `cheapest.closed_form` returns: what answers the scene, and its cost."""
 
     scenario: Words
     truth: Words

@@ -18,7 +18,7 @@ from reports.run.runner import run_all
 from reports.run.scenes import open_scene
 from reports.run.timing import Sample
 from reports.run.worker_process import Failure
-from reports.speed import budget, ladder, models, sizes
+from reports.speed import budget, cheapest, ladder, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
@@ -45,7 +45,7 @@ class Measured:
         samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place,
             cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes;
             of the kinds of `stepping.overheads` in s each.
-        truths: as `models.closed_form` gives them.
+        truths: as `cheapest.closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.
         stopped: (`engine:profile`, number of disks) -> why it was not measured with so many.
@@ -216,7 +216,7 @@ def timings(
             scene_rows, kind, scene, plan.seed, in_turns(list(group)), repeats
         )
         if kind == SCENE:
-            tasks["time", TRUTH, scene] = partial(models.closed_form, scene, plan.seed)
+            tasks["time", TRUTH, scene] = partial(cheapest.closed_form, scene, plan.seed)
     if plan.whole:
         tasks["time", SIZE] = partial(size_rows, makes, plan, repeats)
     return tasks
