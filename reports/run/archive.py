@@ -14,7 +14,6 @@ compared/       the scenarios' exact answers and parts of deviations.csv, so tha
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.run import Run
+from reports.run.cells import digest
 from reports.run.journal import JOURNAL
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.run_lines import KINDS
@@ -149,11 +149,6 @@ def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
             why = f"{path.name} {'is missing' if gone else f'cannot be read: {fault.strerror}'}"
     failed = {"status": "error", "reason": why} if why and record["status"] == "ok" else {}
     return record | failed | {"damage": why}
-
-
-def digest(data: bytes) -> str:
-    """16 hex digits of a hash over the bytes of a file."""
-    return hashlib.sha256(data).hexdigest()[:16]
 
 
 @cache

@@ -25,8 +25,8 @@ from reports.compare.comparison import Comparison, compare
 from reports.compare.table import status_row, table_of
 from reports.compare.view import NOT_JUDGED
 from reports.run.answers import ExactAnswer, answer_here, no_answer, put_answer, read_answer
-from reports.run.archive import Archive, as_found, digest, run_of
-from reports.run.cells import Cell, versions
+from reports.run.archive import Archive, as_found, run_of
+from reports.run.cells import Cell, digest, versions
 from reports.run.scenes import Records, scenario_of
 from reports.run.worker_process import Failure, allow
 from reports.terminal.foreign_text import put_bytes
@@ -237,8 +237,7 @@ def scene_table_file(folder: Path, records: Records, answer: ExactAnswer) -> Pat
 
 def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str) -> Path:
     """A file of a scene, with a hash of `what` in its name."""
-    digest = hashlib.sha256(repr(what).encode()).hexdigest()[:16]
-    return folder / "compared" / f"{records[0]['scenario']}-{digest}{suffix}"
+    return folder / "compared" / f"{records[0]['scenario']}-{digest(repr(what).encode())}{suffix}"
 
 
 @cache

@@ -17,8 +17,8 @@ from adapters.conformance.conform import no_answer
 from adapters.engine_row import EngineRow
 from adapters.engines import told_apart
 from adapters.run import Run
-from reports.run.archive import Archive, digest, stored_scene, trajectory_file
-from reports.run.cells import Cell, content_key, scene_hash
+from reports.run.archive import Archive, stored_scene, trajectory_file
+from reports.run.cells import Cell, content_key, digest, scene_hash
 from reports.run.folders import RUN
 from reports.run.journal import Journal, plain
 from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer

@@ -17,7 +17,8 @@ import pandas as pd
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.run.answers import ExactAnswer, read_answer
-from reports.run.archive import Archive, digest, run_of
+from reports.run.archive import Archive, run_of
+from reports.run.cells import digest
 from reports.run.folders import RUN
 from reports.run.journal import JOURNAL
 from reports.run.runner import run_all
