@@ -17,7 +17,7 @@ import pandas as pd
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
-from adapters.mechanisms.table import KNOWN
+from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
@@ -307,7 +307,7 @@ def reasons(
     tasks = {
         one.task: partial(budget_of, scene, seed, played_as(one.name), finest)
         for one in short
-        if played_as(one.name) in KNOWN and isfinite(one.error)
+        if played_as(one.name) in MECHANISMS and isfinite(one.error)
     }
     budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
     measure = "energy" if purpose == "energy" else "position_radii"

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from adapters.engines import row_of
-from adapters.mechanisms.table import KNOWN
+from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
 from reports.run.scenes import open_scene
@@ -161,7 +161,7 @@ def measure_budget(
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
         for scene in plan.budget_scenes
         for name in plan.engines
-        if name in KNOWN and reach[scene, plan.seed]
+        if name in MECHANISMS and reach[scene, plan.seed]
     }
     results = dict(done(tasks, plan.workers, progress, "error budget", kept=kept))
     for task, result in results.items():
