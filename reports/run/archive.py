@@ -157,7 +157,7 @@ def digest_of_file(path: Path, *_: int) -> str:
     return digest(all_of(path))
 
 
-def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
+def archived_run(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
     """The run of a line, with its trajectory if it has one and `with_trajectory` is set."""
     record = as_found(folder, record)
     trajectory = stored_trajectory(folder, record) if with_trajectory else None
