@@ -187,8 +187,8 @@ def test_what_is_disabled_in_the_engine_is_what_is_left_out_in_the_reference(
 
 
 def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
-    """The table of mechanisms names rows of `ENGINES` and `FETCHED`; the impulse is what the order of
-    stages of an engine is."""
+    """The table of mechanisms names rows of `ENGINES` and `FETCHED`; the impulse is what an
+    engine's own order of stages is."""
     assert set(MECHANISMS) < {*ENGINES, *FETCHED}
     scene = scenario("head_on_equal_e09")
     for name in filter(ENGINES.__contains__, MECHANISMS):
