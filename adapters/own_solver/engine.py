@@ -181,11 +181,11 @@ class Student:
 
     def of_file(self) -> dict[str, tuple[Any, Any]]:
         """The file, and the modules that it imports from its folder."""
-        beside = ", ".join(file for file, _ in self.solver.beside)
+        files = ", ".join(file for file, _ in self.solver.imported)
         which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
-        if not beside:
+        if not files:
             return which
-        return which | {"from beside it": (None, f"{beside}; sha256 of all {self.solver.source}")}
+        return which | {"from beside it": (None, f"{files}; sha256 of all {self.solver.source}")}
 
     def versions(self) -> dict[str, str]:
         """The versions of the language's engine."""

@@ -311,7 +311,10 @@ def kept_copies(solver: SolverText, kept: Path) -> Path | None:
     """
     copies = kept / "solvers" / solver.source
     try:
-        for file, text in {**dict(solver.beside), solver.path.resolve().name: solver.text}.items():
+        for file, text in {
+            **dict(solver.imported),
+            solver.path.resolve().name: solver.text,
+        }.items():
             copy = copies / file
             if copy.is_file() and copy.read_bytes() == text.encode():
                 continue

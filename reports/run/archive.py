@@ -46,7 +46,7 @@ class Archive:
         known_answers: the lines of the reproduced known answers.
         checked: solver's file, `PATH:own` -> its line with the verdict of `crosscheck check`.
         timings: key of a cell -> number of the timing (0; also 1 if timed twice) -> its line.
-        beside: (what, `engine:profile`, scenario or "") -> s in each round, see stepping.py.
+        overheads: (what, `engine:profile`, scenario or "") -> s in each round, see stepping.py.
         seconds: duration of the run; NaN if it is not complete.
         complete: whether everything requested has ended.
     """
@@ -58,7 +58,7 @@ class Archive:
     known_answers: list[dict[str, Any]]
     checked: dict[str, dict[str, Any]]
     timings: dict[str, dict[int, dict[str, Any]]]
-    beside: dict[tuple[str, str, str], list[float]]
+    overheads: dict[tuple[str, str, str], list[float]]
     seconds: float
     complete: bool
 
@@ -71,7 +71,7 @@ class Archive:
             kind: {} for kind in ("cell", "conformance", "known_answer", "checked")
         }
         timings: dict[str, dict[int, dict[str, Any]]] = {}
-        beside: dict[tuple[str, str, str], list[float]] = {}
+        overheads: dict[tuple[str, str, str], list[float]] = {}
         seconds, complete = 0.0, False
         for number, kind, line in checked_lines(folder, KINDS):
             complete = kind == "footer"
@@ -81,8 +81,8 @@ class Archive:
                 header = line["header"]
             elif kind == "timing":
                 timings.setdefault(line["timing"], {})[line["copy"]] = line
-            elif kind == "beside":
-                beside[line["beside"], line["of"], line["scenario"]] = line["cost"]
+            elif kind == "overhead":
+                overheads[line["overhead"], line["of"], line["scenario"]] = line["cost"]
             else:
                 last[kind][what_of(line) if kind == "cell" else line["of"]] = number, line
         if not header:
@@ -103,7 +103,7 @@ class Archive:
             known,
             {line["of"]: line for line in checked},
             timings,
-            beside,
+            overheads,
             seconds if complete else float("nan"),
             complete,
         )

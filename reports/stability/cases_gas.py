@@ -133,8 +133,8 @@ def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
     """The scenario, with another run of the same engine in place of the exact answer."""
     if other.status != "ok" or other.trajectory is None:
         return scenario, other
-    beside: Trajectory = other.trajectory
-    return replace(scenario, truth=lambda _: beside), run
+    instead: Trajectory = other.trajectory
+    return replace(scenario, truth=lambda _: instead), run
 
 
 def reversed_order(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
@@ -322,7 +322,7 @@ GAS = (
         runs=SEEDS,
         whole=True,
         play=reversed_order,
-        beside=OTHER,
+        shown_with=OTHER,
         quick_values=(10.0, 50.0, 200.0, 1000.0),
         ratio=1.5,
     ),
@@ -338,7 +338,7 @@ GAS = (
         runs=SEEDS,
         whole=True,
         play=restarted,
-        beside="played through",
+        shown_with="played through",
         quick_values=(10.0, 50.0, 200.0, 1000.0),
         ratio=1.5,
     ),

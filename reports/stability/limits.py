@@ -82,7 +82,7 @@ class Case:
             much.
         by_chance: share of the runs at a value that may fail by chance, where what is read is a
             statistic or the worst of it depends on what is sampled.
-        beside: what a failing run is shown beside.
+        shown_with: what a failing run is shown with.
         report: a scene of the report that asks something alike; `overview.in_report` says how the
             two differ.
     """
@@ -103,7 +103,7 @@ class Case:
     refines: bool = True
     ratio: float = 1.0
     by_chance: float = 0.0
-    beside: str = EXACT
+    shown_with: str = EXACT
     report: str = ""
 
     @property

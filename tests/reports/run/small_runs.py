@@ -48,7 +48,7 @@ def make(folder: Path, scene_file: Path) -> Path:
         journal.append(
             {"timing": line["cell"], "copy": 0, "timed_s": 1.0, "cost": [0.5], "wrapping": [0.0]}
         )
-        journal.append({"beside": "read", "of": PLAYED[0], "scenario": "", "cost": [1e-6]})
+        journal.append({"overhead": "read", "of": PLAYED[0], "scenario": "", "cost": [1e-6]})
         journal.append({"footer": {"tasks": len(cells), "played": len(cells), "seconds": 1.0}})
     replace_folder(part_of(folder), folder, RUN)
     return folder

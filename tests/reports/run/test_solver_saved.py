@@ -281,7 +281,7 @@ def test_a_module_beside_the_file_that_cannot_be_read_is_named(
     make(tmp_path / "helper.py")
     (tmp_path / "solver.py").write_text("import helper\n" + TEXTS["plain.py"])
     if not said:
-        assert read_solver(tmp_path / "solver.py").beside == ()
+        assert read_solver(tmp_path / "solver.py").imported == ()
         return
     with pytest.raises(NotASolver, match=said):
         read_solver(tmp_path / "solver.py")
