@@ -12,7 +12,7 @@ from typing import Any
 from adapters.engines import OWN
 from reports.check.verdict import check_file
 from reports.run.runner import run_all
-from reports.run.suite import Check
+from reports.run.tasks import Check
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say
 

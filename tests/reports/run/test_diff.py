@@ -19,8 +19,9 @@ from reports.run import suite
 from reports.run.cells import digest
 from reports.run.diff import Timing, difference, timing
 from reports.run.journal import JOURNAL, Journal, lines_of
-from reports.run.suite import Means, RunPlan, carry_out
+from reports.run.suite import carry_out
 from reports.run.tables import seal_of
+from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
 
 PLAN = RunPlan(

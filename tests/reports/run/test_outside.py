@@ -152,7 +152,7 @@ def test_resume_plays_again_what_failed_outside_the_engine_and_nothing_else(tmp_
             line |= {"status": "crashed", "reason": "planted", "outside": cells % 2 == 0}
             cells += 1
         if "conformance" in line and probes < 1:
-            line["key"], probes = "", probes + 1  # as `keep_answer` writes it
+            line["key"], probes = "", probes + 1  # as `keep_probes` writes it
         changed.append(json.dumps(line) + "\n")
     (whole / "journal.jsonl").write_text("".join(changed))
     crosscheck("run", "--resume", "whole", cwd=tmp_path)

@@ -14,8 +14,9 @@ from adapters.own_solver.engine import engine_file
 from reports.check.verdict import check_file
 from reports.commands.own_solvers import checked, checks_of, lines
 from reports.run.journal import JOURNAL, Journal
+from reports.run.results import keep_check
 from reports.run.run_lines import KINDS
-from reports.run.suite import Check, RunPlan, keep_check
+from reports.run.tasks import Check, RunPlan
 from reports.run.worker_process import Failure
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import MUTANTS
