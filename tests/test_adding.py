@@ -220,7 +220,7 @@ from reports.page.charts import CHARTS
 from reports.page.style import PALETTE, look
 from reports.run.cells import versions
 from reports.speed.budget import budget_of
-from reports.stability.variants import VARIANTS
+from reports.stability.variants import DRIVEN_ENGINES
 from scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 print(json.dumps({
@@ -230,7 +230,7 @@ print(json.dumps({
     "version": versions()["typer"],
     "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
     "option": [each.change for each in OPTIONS if each.engine == "toy:plain"],
-    "variant": VARIANTS["toy:plain+as_it_is"].change,
+    "variant": DRIVEN_ENGINES["toy:plain+as_it_is"].change,
     "contributions": [row["contribution"] for row in budget_of("free_fall", 0, "toy:plain", 4)],
     "verdicts": {each.probe: each.verdict for each in found},
     "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).to_json()),

@@ -30,7 +30,7 @@ from reports.stability.cases import CASES
 from reports.stability.explain import explained
 from reports.stability.limits import QUICK, Limit, Trial
 from reports.stability.search import LimitSearch
-from reports.stability.variants import VARIANTS, DrivenEngine, play_as
+from reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as
 from scenarios.catalogue import scenario
 
 
@@ -90,7 +90,7 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
         engine.load = lambda scene, dt: load(replace(scene, restitution=scene.restitution / 2), dt)
         return engine
 
-    monkeypatch.setitem(VARIANTS, "pymunk:matched", DrivenEngine("pymunk:matched", halved))
+    monkeypatch.setitem(DRIVEN_ENGINES, "pymunk:matched", DrivenEngine("pymunk:matched", halved))
     search = LimitSearch(CASES["slow_collision"], "pymunk:matched", QUICK)
     limit = search.limit()
 
