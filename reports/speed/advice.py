@@ -31,6 +31,7 @@ from reports.speed.effort import doublings
 from reports.speed.measure import done
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
+from reports.speed.scored_part import scored
 from reports.speed.tables import summed_up
 from reports.terminal.progress import Progress
 from scenarios.model import Scenario
@@ -197,7 +198,7 @@ def advise(
 def scored_scenario(scene: str, seed: int) -> Scenario:
     """The scenario up to the horizon of its exact answer; raises `NoAdvice` if it has none."""
     try:
-        return ladder.scored(scene, seed).scenario
+        return scored(scene, seed).scenario
     except NoTruth as refusal:
         raise NoAdvice(
             f"no exact answer: {refusal}. To compare the engines with each other and with the laws"
@@ -257,7 +258,7 @@ def attempts(
 
 def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, str]:
     """The error of one run up to the horizon; inf and the reason if it failed."""
-    scenario, truth = ladder.scored(scene, seed)
+    scenario, truth = scored(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
     if run.status != "ok" or run.trajectory is None:
         return inf, f"{run.status}: {run.reason}"

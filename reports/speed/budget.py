@@ -21,7 +21,7 @@ from adapters.run import Run
 from reports.compare import laws, scales
 from reports.compare.view import View, cut
 from reports.run.scenes import open_scene
-from reports.speed.ladder import scored
+from reports.speed.scored_part import scored
 from scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (

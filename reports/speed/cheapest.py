@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from reports.compare.order import FINEST
-from reports.speed.ladder import scored
+from reports.speed.scored_part import scored
 from scenarios.truth.exact import CLOSED_FORM, answered_by
 
 KINDS = {"event_driven": "collision to collision, float64"}

@@ -18,7 +18,7 @@ from reports.run.runner import run_all
 from reports.run.scenes import open_scene
 from reports.run.timing import Sample
 from reports.run.worker_process import Failure
-from reports.speed import budget, cheapest, ladder, sizes
+from reports.speed import budget, cheapest, ladder, scored_part, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
@@ -83,7 +83,7 @@ def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach
     """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
     have none are reported."""
     # In workers, which can be stopped at any time.
-    asked = {seeded: partial(ladder.reach_of, *seeded) for seeded in plan.seeded_scenes}
+    asked = {seeded: partial(scored_part.reach_of, *seeded) for seeded in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
     for (scene, seed), result in results.items():
@@ -131,24 +131,8 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
         HANGS,
     ):
         if isinstance(result, Failure):
-            engine, profile = measurement.name.split(":")
-            scenario = open_scene(measurement.scene, measurement.seed)
-            result = [
-                {
-                    "scenario": scenario.name,
-                    "seed": measurement.seed,
-                    "engine": engine,
-                    "profile": profile,
-                    "dt_s": scenario.dt(k),
-                    "substeps": k,
-                    "status": result.status,
-                    "reason": result.reason,
-                    "until_s": ladder.scored(measurement.scene, measurement.seed).scenario.duration,
-                    "duration_s": scenario.duration,
-                    "error_radii": float("inf"),
-                    "change_radii": float("nan"),
-                }
-            ]
+            asked = measurement.scene, measurement.seed, measurement.name, k
+            result = [ladder.error_row(*asked, result.status, result.reason)]
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
 

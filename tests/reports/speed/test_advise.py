@@ -18,7 +18,7 @@ from adapters.play import play
 from reports.compare.delays import jumps_of
 from reports.compare.view import View
 from reports.run.scenes import open_scene
-from reports.speed import advice, ladder
+from reports.speed import advice
 from reports.speed.advice import (
     NEARER,
     NO_GAIN,
@@ -31,6 +31,7 @@ from reports.speed.advice import (
 )
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
+from reports.speed.scored_part import scored
 from scenarios.catalogue import SCENARIOS
 from tests.adapters.broken_engines import DoublesSpeed, Freezes, GainsEnergy
 from tests.reports.terminal.command_line import crosscheck
@@ -76,7 +77,7 @@ def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
 def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type):
     """Negative controls in a scene of flight and bounces; the engine that they are made from is
     right."""
-    scenario, truth = ladder.scored("box_billiard", 0)
+    scenario, truth = scored("box_billiard", 0)
     dt = scenario.dt(scenario.substeps[-1])
 
     def error(engine) -> float:
