@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from adapters.engine import ContactImpulse, NotLoaded, Unsupported
 from adapters.engine_row import FLOAT64, EngineRow
 from adapters.friction import must_be_frictionless
-from adapters.own_solver.file import SolverFailed, SolverText, read_solver
+from adapters.own_solver.file import SolverFailed, SolverText
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import EXERCISE, restitution_of
 from scenarios.model import Array, Scene, State
@@ -224,12 +223,6 @@ def spheres_of(scene: Scene) -> list[list[float]]:
     )
     rows: list[list[float]] = np.hstack(columns).tolist()
     return rows
-
-
-def engine_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
-    """The engine row of a solver's file in its present state; raises `NotASolver` if the path is
-    not one."""
-    return row_of_solver(read_solver(path), patience, collected)
 
 
 def row_of_solver(solver: SolverText, patience: float, collected: bool) -> EngineRow:
