@@ -16,7 +16,7 @@ from adapters.engine import Unsupported
 from adapters.engine_row import EngineRow
 from adapters.own_engine.features import must_model, refusal
 from adapters.own_engine.surface import is_engine, must_be_either
-from adapters.own_solver.engine import STEP_LIMIT, Student, row_of_solver
+from adapters.own_solver.engine import STEP_LIMIT, OwnSolver, row_of_solver
 from adapters.own_solver.file import LONGEST, SolverFailed, SolverText, printable, read_solver
 from adapters.own_solver.restitution import EXERCISE
 from adapters.run import SILENT
@@ -51,7 +51,7 @@ class EngineText(SolverText):
         return PythonFile(self, copies)
 
 
-class OwnEngine(Student):
+class OwnEngine(OwnSolver):
     """Plays an engine's file; a scene that needs more than its line `models` is refused, naming
     what is missing.
 

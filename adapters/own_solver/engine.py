@@ -22,7 +22,7 @@ STEP_LIMIT = 30.0  # s that one call for several steps may take
 BEGIN_LIMIT = 2.0  # s that initScene may take
 
 
-class Student:
+class OwnSolver:
     """Plays the text of a file in a separate process; later changes of the file do not matter.
 
     A file with `advance` is played with it, in all scenes of the reference solver. For any other
@@ -228,7 +228,7 @@ def spheres_of(scene: Scene) -> list[list[float]]:
 def row_of_solver(solver: SolverText, patience: float, collected: bool) -> EngineRow:
     """The engine row of a solver's text."""
     return EngineRow(
-        partial(Student, solver, patience, collected),
+        partial(OwnSolver, solver, patience, collected),
         f"your own solver, {solver.path}",
         1.0,
         FLOAT64,

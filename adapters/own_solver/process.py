@@ -1,4 +1,5 @@
-"""Runs a solver's file in a separate process, so that nothing in the file can end this program."""
+"""Runs a file in a separate process, so that nothing in it can end this program: a solver, an
+engine of own_engine, or one of adapters/javascript."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from adapters.engine import Engine
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, OWN
 from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.engine import Student
+from adapters.own_solver.engine import OwnSolver
 from adapters.own_solver.file import KINDS
 from adapters.own_solver.restitution import EXERCISE
 from adapters.runaway import fault_of
@@ -57,7 +57,7 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
     for name in names:
         path = Path(name.removesuffix(OWN))
         rows[name] = row_of_file(path, PATIENCE, collected=True)
-        with closing(cast(Student, rows[name].make())) as engine:
+        with closing(cast(OwnSolver, rows[name].make())) as engine:
             try:
                 restitutions.append(engine.own_restitution)
                 try_out(engine, restitutions[-1])
