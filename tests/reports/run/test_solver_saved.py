@@ -147,6 +147,7 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
 ):
     """Though one process plays both: a file that moves a sphere by the number of its calls so far
     plays the same twice."""
+    monkeypatch.setattr(solver_process, "waiting", None)  # of other tests
     started = Counter()
     begin = solver_process.SolverProcess.begin
     monkeypatch.setattr(
