@@ -9,7 +9,7 @@ from dataclasses import replace
 from adapters.advance import advanced
 from adapters.engine import Engine, NotStarted, Unsupported
 from adapters.first_collisions import collisions_of
-from adapters.run import Run, gather, run_of, substeps_of
+from adapters.run import Run, gather, substeps_of, unplayed_run
 from adapters.runaway import RUNAWAY, fault_of, reach
 from scenarios.model import Scenario, State
 
@@ -31,7 +31,7 @@ def play_once(
         engine = make()
     except ImportError as missing:
         reason = f"{missing.name or missing} cannot be imported: {missing}"
-        return replace(run_of(name, scenario, dt), status="unsupported", reason=reason)
+        return replace(unplayed_run(name, scenario, dt), status="unsupported", reason=reason)
     with closing(engine):
         return play(engine, name, scenario, dt, watch)
 
@@ -44,7 +44,7 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
     `MemoryError` and `NotStarted` pass, which are not the engine's fault.
     """
     substeps = substeps_of(scenario, dt)
-    run, states, seconds = run_of(name, scenario, dt), list[State](), 0.0
+    run, states, seconds = unplayed_run(name, scenario, dt), list[State](), 0.0
     farthest = RUNAWAY * reach(scenario)
     try:
         engine.load(scenario.scene, dt)

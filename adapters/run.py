@@ -38,7 +38,7 @@ class Run:
         return bool(self.settings.get("collisions", (None, None))[1] == SILENT)
 
 
-def run_of(name: str, scenario: Scenario, dt: float) -> Run:
+def unplayed_run(name: str, scenario: Scenario, dt: float) -> Run:
     """A run of `engine:profile` without a trajectory yet."""
     engine, profile = name.split(":")
     return Run(engine, profile, scenario.name, dt)

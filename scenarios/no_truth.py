@@ -1,10 +1,10 @@
-"""The exception for scenes without an exact answer, and the functions that request an answer."""
+"""The exception for scenes without an exact answer, and the function that asks for an answer."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from scenarios.model import Array, Scenario, Trajectory
+from scenarios.model import Scenario, Trajectory
 
 
 class NoTruth(ValueError):
@@ -13,27 +13,6 @@ class NoTruth(ValueError):
     def __init__(self, reason: str, at: float = 0.0) -> None:
         super().__init__(reason)
         self.at = at
-
-
-def truth_at(scenario: Scenario, t: Array) -> Trajectory:
-    """The exact `Trajectory` at all the times t (k,) s, increasing; `scenario.truth(t)` stops at
-    the horizon.
-
-    Raises:
-        NoTruth: there is none, or a time is beyond its horizon; gives the horizon and the reason.
-    """
-    if scenario.truth is None:
-        raise NoTruth(scenario.without_truth)
-    truth = scenario.truth(t)
-    if len(truth) < len(t):
-        late, until = t[len(truth)], truth.horizon
-        why = f": {truth.reason}" if truth.reason else ""
-        raise NoTruth(
-            f"t = {late:.9g} s: the truth of {scenario.name} ends at its horizon at {until:.9g}"
-            f" s{why}",
-            until,
-        )
-    return truth
 
 
 def answered(scenario: Scenario) -> tuple[Scenario, Trajectory | None]:

@@ -251,7 +251,7 @@ from reports.page.charts import CHARTS
 from reports.page.style import PALETTE, look, mark_of_file
 from reports.run.cells import versions
 from reports.speed.budget import budget_of
-from reports.stability.variants import VARIANTS
+from reports.stability.variants import DRIVEN_ENGINES
 from scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 sys.argv[1:] = ["toy"]
@@ -266,7 +266,7 @@ print(json.dumps({
     "tests": tests,
     "alike": [name for name in ENGINES if look(*name.split(":"))[:2] == look("toy")[:2]],
     "option": [each.change for each in OPTIONS if each.engine == "toy:plain"],
-    "variant": VARIANTS["toy:plain+as_it_is"].change,
+    "variant": DRIVEN_ENGINES["toy:plain+as_it_is"].change,
     "contributions": [row["contribution"] for row in budget_of("free_fall", 0, "toy:plain", 4)],
     "verdicts": {each.probe: each.verdict for each in found},
     "lesson": lesson_page(LESSONS["toy"], LESSONS["toy"].at([]).to_json()),

@@ -56,14 +56,14 @@ def conform(name: str, row: EngineRow) -> list[Finding]:
         try:
             row.make().close()
         except Exception as error:  # a missing library, or one that fails to start
-            return [no_answer(name, type(error).__name__, str(error))]
+            return [not_probed(name, type(error).__name__, str(error))]
         try:
             return [ask(engine, profile, probe, row) for probe in PROBES]
         except NotLoaded as fault:
-            return [no_answer(name, "not loaded", str(fault))]
+            return [not_probed(name, "not loaded", str(fault))]
 
 
-def no_answer(
+def not_probed(
     name: str, what: str, why: str, verdict: Literal["breaks", "departs"] = "breaks"
 ) -> Finding:
     """The one finding of an engine that could not be made, or did not survive its probes."""

@@ -20,20 +20,20 @@ forget_stale(Path(__file__).parent, Path(compiling.__file__).parent)
 
 CONTACT = np.dtype(
     [
-        ("i", "i8"),
-        ("j", "i8"),
-        ("nx", "f8"),
-        ("ny", "f8"),  # the normal
+        ("i", "i8"),  # a disk
+        ("j", "i8"),  # another disk, or wall w as -1 - w
+        ("nx", "f8"),  # x of the unit normal, towards i
+        ("ny", "f8"),  # y of it
         ("gap", "f8"),  # m between the surfaces at the start of the step
         ("seen", "f8"),  # m between them at the last test of the pair
         ("target", "f8"),  # m/s: the target speed of separation
-        ("impulse", "f8"),
-        ("slide", "f8"),  # N s along the normal and along the tangent (-ny, nx)
+        ("impulse", "f8"),  # N s along the normal
+        ("slide", "f8"),  # N s along the tangent (-ny, nx)
         ("strongest", "f8"),  # N s, largest impulse added by one solve
         ("total", "f8"),  # N s, of the impulses at the end of each substep
         ("bore", "b1"),  # whether there was one in the step before
         ("nudged", "f8"),  # N s, of `ablated_reference.nudge`
-        ("island", "i8"),
+        ("island", "i8"),  # from 1; 0: none yet
         ("colour", "i8"),  # from 1; 0: none yet
         ("late", "b1"),  # whether its impulses are older than the last step
     ]
@@ -44,13 +44,13 @@ LOOK = np.dtype(
     [
         ("known", "b1"),  # whether the pair was tested since the boxes overlap
         ("touches", "b1"),  # whether they were a contact
-        ("x", "f8"),
-        ("y", "f8"),  # m, the centre of the second in the frame of the first
-        ("angle", "f8"),
-        ("other", "f8"),  # rad, of the first and of the second
-        ("nx", "f8"),
-        ("ny", "f8"),
-        ("gap", "f8"),  # as those of CONTACT
+        ("x", "f8"),  # m, the centre of the second in the frame of the first
+        ("y", "f8"),  # m, of it
+        ("angle", "f8"),  # rad, of the first
+        ("other", "f8"),  # rad, of the second
+        ("nx", "f8"),  # x of the unit normal, towards the first
+        ("ny", "f8"),  # y of it
+        ("gap", "f8"),  # m between the surfaces
     ]
 )
 

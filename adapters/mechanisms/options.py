@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from adapters.engine import Engine
+from adapters.engine_row import AccuracyParameter
 from adapters.engines import ENGINES, changed
 
 
@@ -16,8 +17,9 @@ class Option:
     """One change to one engine.
 
     Attributes:
-        engine: the row of `ENGINES` to compare with, `engine:profile`. change: the difference, in a
-        few words. make: makes the changed engine; imports its library when called.
+        engine: the row of `ENGINES` to compare with, `engine:profile`.
+        change: the difference, in a few words.
+        make: makes the changed engine; imports its library when called.
     """
 
     engine: str
@@ -55,28 +57,24 @@ class Sweep:
 
     Attributes:
         engine: the row of `ENGINES` whose parameter is swept, `engine:profile`.
-        what: the parameter, in a word.
-        parameter: the name of that number among those of the engine's `make`.
-        values: from cheap to expensive.
+        parameter: what is swept, and its values.
     """
 
     engine: str
-    what: str
-    parameter: str
-    values: tuple[int, ...]
+    parameter: AccuracyParameter
 
     @property
     def name(self) -> str:
         """The engine and a profile that names the swept parameter, as in `reports.page.style`."""
-        return f"{self.engine}+{self.what}"
+        return f"{self.engine}+{self.parameter.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:
         """How to make the engine with this value."""
-        return partial(changed, self.engine, **{self.parameter: value})
+        return partial(changed, self.engine, **{self.parameter.setting: value})
 
 
 SWEEPS: tuple[Sweep, ...] = tuple(
-    Sweep(name, row.work.what, row.work.setting, row.work.values)
+    Sweep(name, row.work)
     for name, row in ENGINES.items()
     if row.work is not None and name.endswith(":matched")
 )

@@ -84,7 +84,7 @@ class Mechanism:
 def mechanisms_of(
     name: str, settings: Mapping[str, tuple[Any, Any]], scene: Scene, dt: float
 ) -> list[Mechanism]:
-    """The mechanisms of an engine in `KNOWN`, in this scene at this dt; `settings` are those
+    """The mechanisms of an engine of `MECHANISMS`, in this scene at this dt; `settings` are those
     it reported once loaded."""
     # A setting that cannot be read back has its requested value.
     resolved = {
@@ -96,7 +96,7 @@ def mechanisms_of(
     if row_of(name).rounding == FLOAT32:
         digits = {"summed": name not in ROUNDED_MOVES, "tangent": name in COS_AND_SIN}
         single = [Mechanism(DIGITS, {"precision": np.float32, **digits})]
-    return [flight, *KNOWN[name](resolved, scene, dt), *single]
+    return [flight, *MECHANISMS[name](resolved, scene, dt), *single]
 
 
 def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
@@ -388,9 +388,6 @@ MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism
     "box2d:matched": _box2d_matched,
     "box2d_v3:shipped": _box2d_v3_shipped,
     "box2d_v3:matched": _box2d_v3_matched,
-}
-"""The engines whose mechanisms are known."""
-KNOWN = MECHANISMS | {
     "planck:shipped": partial(_planck, profile="shipped"),
     "planck:matched": partial(_planck, profile="matched"),
     "matter:shipped": partial(_matter, profile="shipped"),
@@ -398,4 +395,5 @@ KNOWN = MECHANISMS | {
     "rapier2d:shipped": partial(_rapier, profile="shipped"),
     "rapier2d:matched": partial(_rapier, profile="matched"),
 }
-"""And those that are fetched."""
+"""The engines whose mechanisms are known, of `ENGINES` and of `FETCHED`: a function of the settings
+that the engine reports, the scene and dt in s."""

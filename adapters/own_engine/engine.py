@@ -14,9 +14,9 @@ import numpy as np
 
 from adapters.engine import SILENT, Unsupported
 from adapters.engine_row import EngineRow
-from adapters.own_engine.models import must_model, refusal
+from adapters.own_engine.features import must_model, refusal
 from adapters.own_engine.surface import is_engine, must_be_either
-from adapters.own_solver.engine import STEP_LIMIT, Student, row_of_solver
+from adapters.own_solver.engine import STEP_LIMIT, OwnSolver, row_of_solver
 from adapters.own_solver.file import LONGEST, SolverFailed, SolverText, printable, read_solver
 from adapters.own_solver.restitution import EXERCISE
 from scenarios.model import Array, Scene
@@ -50,7 +50,7 @@ class EngineText(SolverText):
         return PythonFile(self, copies)
 
 
-class OwnEngine(Student):
+class OwnEngine(OwnSolver):
     """Plays an engine's file; a scene that needs more than its line `models` is refused, naming
     what is missing.
 

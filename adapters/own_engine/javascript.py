@@ -9,13 +9,12 @@ from typing import Any
 
 from py_mini_racer import JSEvalException, JSTimeoutException
 
-from adapters.own_engine.models import FEATURES
+from adapters.own_engine.features import features_of
 from adapters.own_engine.surface import ENGINE, HOW
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.javascript import DRIVER, JavaScriptSolver, thrown
 
 ENGINE_DRIVER = (Path(__file__).parent / "driver.js").read_text(encoding="utf-8")
-MODELS = f"models must be a text with some of the words {', '.join(FEATURES)}"
 # Evaluated after the file, where its `let` and `const` can be seen too.
 BIND = """__engine("bind", {
   create: typeof create === "undefined" ? null : create,
@@ -37,13 +36,9 @@ class JavaScriptFile(JavaScriptSolver):
         super().load()
         if lacking := [name for name in ENGINE if not self.functions[name]]:
             raise SolverFailed("error", f"has no function {' and no '.join(lacking)}; {HOW}")
-        models = self.functions["models"]
-        if models is None:
-            raise SolverFailed("error", f"has no line models; {MODELS}")
-        if unknown := [word for word in models.split() if word not in FEATURES]:
-            raise SolverFailed("error", f"models has the word {unknown[0]!r}; {MODELS}")
-        self.functions |= {"models": models.split()}
-        self.v8.eval(f'__engine("turns", {json.dumps("rotation" in models.split())})')
+        models = features_of(self.functions["models"])
+        self.functions |= {"models": models}
+        self.v8.eval(f'__engine("turns", {json.dumps("rotation" in models)})')
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """The driver's answer to a command; raises `SolverFailed` after `limit` s, or if a function

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from adapters.own_engine.models import FEATURES
+from adapters.own_engine.features import features_of
 from adapters.own_engine.surface import ENGINE, HOW
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.python import PythonSolver, seed
 from adapters.own_solver.spheres import Fields
 
 SHOWN = 60  # characters of a returned value in a message
-MODELS = f"models must be a text with some of the words {', '.join(FEATURES)}"
 COLLISION = "asked are rows [i, j] or [i, j, impulse]: disk i; disk j, or wall w as -1 - w; N s"
 
 
@@ -41,9 +40,8 @@ class PythonFile(PythonSolver):
                 raise SolverFailed(
                     "error", f"{name} is an async def, or has a yield: it runs nothing"
                 )
-        models = getattr(module, "models", None)
         self.functions = {
-            "models": checked_models(models),
+            "models": features_of(getattr(module, "models", None)),
             "collisions": "collisions" in self.file,
         }
 
@@ -127,15 +125,6 @@ class PythonFile(PythonSolver):
             arrays |= {"angle": self.angle, "angular_velocity": np.zeros(self.n)}
         rows: list[list[float]] = np.column_stack(list(arrays.values())).tolist()
         return rows
-
-
-def checked_models(models: Any) -> list[str]:
-    """The words of the line `models`; raises `SolverFailed`."""
-    if not isinstance(models, str):
-        raise SolverFailed("error", f"has no line models; {MODELS}")
-    if unknown := [word for word in models.split() if word not in FEATURES]:
-        raise SolverFailed("error", f"models has the word {unknown[0]!r}; {MODELS}")
-    return models.split()
 
 
 def array_of(state: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from adapters.engine import ContactImpulse, NotLoaded, Unsupported
 from adapters.engine_row import FLOAT64, EngineRow
 from adapters.friction import must_be_frictionless
-from adapters.own_solver.file import SolverFailed, SolverText, read_solver
+from adapters.own_solver.file import SolverFailed, SolverText
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import EXERCISE, restitution_of
 from scenarios.model import Array, Scene, State
@@ -23,7 +22,7 @@ STEP_LIMIT = 30.0  # s that one call for several steps may take
 BEGIN_LIMIT = 2.0  # s that initScene may take
 
 
-class Student:
+class OwnSolver:
     """Plays the text of a file in a separate process; later changes of the file do not matter.
 
     A file with `advance` is played with it, in all scenes of the reference solver. For any other
@@ -181,11 +180,11 @@ class Student:
 
     def of_file(self) -> dict[str, tuple[Any, Any]]:
         """The file, and the modules that it imports from its folder."""
-        beside = ", ".join(file for file, _ in self.solver.beside)
+        files = ", ".join(file for file, _ in self.solver.imported)
         which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
-        if not beside:
+        if not files:
             return which
-        return which | {"from beside it": (None, f"{beside}; sha256 of all {self.solver.source}")}
+        return which | {"from beside it": (None, f"{files}; sha256 of all {self.solver.source}")}
 
     def versions(self) -> dict[str, str]:
         """The versions of the language's engine."""
@@ -226,16 +225,10 @@ def spheres_of(scene: Scene) -> list[list[float]]:
     return rows
 
 
-def engine_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
-    """The engine row of a solver's file in its present state; raises `NotASolver` if the path is
-    not one."""
-    return row_of_solver(read_solver(path), patience, collected)
-
-
 def row_of_solver(solver: SolverText, patience: float, collected: bool) -> EngineRow:
     """The engine row of a solver's text."""
     return EngineRow(
-        partial(Student, solver, patience, collected),
+        partial(OwnSolver, solver, patience, collected),
         f"your own solver, {solver.path}",
         1.0,
         FLOAT64,

@@ -39,9 +39,10 @@ class SolverFailed(Exception):
     Attributes:
         kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
             adapters/javascript; "diverged" if `read` of an engine's file returns numbers that are
-            not finite. what: the end of the sentence "it ..."; control characters are escaped, and
-            text beyond `LONGEST` characters is cut. line, column: the place in the solver's file,
-            from 1; 0 if it is not known.
+            not finite.
+        what: the end of the sentence "it ..."; control characters are escaped, and text beyond
+            `LONGEST` characters is cut.
+        line, column: the place in the solver's file, from 1; 0 if it is not known.
     """
 
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
@@ -87,7 +88,7 @@ class SolverText:
         kind: "javascript" or "python".
         text: with \\n at the end of lines.
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
-        beside: the modules that it imports from its own folder, or the gl-matrix that it calls:
+        imported: the modules that it imports from its own folder, or the gl-matrix that it calls:
             file, relative to the folder or to the one above with its node_modules, -> text.
         engine: for an engine's file its `EngineText` of adapters/own_engine, which loads itself.
     """
@@ -98,12 +99,12 @@ class SolverText:
     kind: str
     text: str
     digest: str
-    beside: tuple[tuple[str, str], ...] = ()
+    imported: tuple[tuple[str, str], ...] = ()
 
     @property
     def source(self) -> str:
         """16 hex digits of a hash over every text that affects its behaviour."""
-        return hashlib.sha256(repr((self.digest, self.beside)).encode()).hexdigest()[:16]
+        return hashlib.sha256(repr((self.digest, self.imported)).encode()).hexdigest()[:16]
 
 
 PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
@@ -126,9 +127,9 @@ def read_solver(path: Path) -> SolverText:
         raise NotASolver(f"{path}: is written in Python; give it a name that ends in .py")
     if is_javascript_in_python(kind, text):
         raise NotASolver(f"{path}: is written in JavaScript; give it a name that ends in .js")
-    beside = read_beside(path, text) if kind == "python" else read_library(path, text)
+    imported = read_imported(path, text) if kind == "python" else read_library(path, text)
     return SolverText(
-        path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(beside.items()))
+        path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(imported.items()))
     )
 
 
@@ -142,19 +143,19 @@ def is_javascript_in_python(kind: str, text: str) -> bool:
     return kind == "python" and bool(FUNCTION.search(text)) and not DEF.search(text)
 
 
-def read_beside(path: Path, text: str) -> dict[str, str]:
+def read_imported(path: Path, text: str) -> dict[str, str]:
     """The texts of the modules that a solver of that `text` imports from its own folder; raises
     `NotASolver`."""
-    itself, beside = path.resolve(), dict[str, str]()
+    itself, imported = path.resolve(), dict[str, str]()
     for file, module in modules_beside(
         itself.parent, text, lambda one: text if one == itself else read_module(one)
     ):
-        beside[file] = module
-        if sum(map(len, beside.values())) > LARGEST:
+        imported[file] = module
+        if sum(map(len, imported.values())) > LARGEST:
             raise NotASolver(
                 f"{path}: imports more than 1 MB from its folder; a solver has a few kilobytes"
             )
-    return beside
+    return imported
 
 
 def read_library(path: Path, text: str) -> dict[str, str]:

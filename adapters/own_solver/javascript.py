@@ -73,7 +73,7 @@ class JavaScriptSolver:
         self.v8.set_hard_memory_limit(HEAP)
         for driver in self.drivers:
             self.v8.eval(driver)
-        for name, text in solver.beside:
+        for name, text in solver.imported:
             self.load_library(name, text)
         try:
             self.v8.eval(f"{solver.text}\n//# sourceURL={NAME}", timeout_sec=LOAD_LIMIT)

@@ -1,4 +1,5 @@
-"""Runs a solver's file in a separate process, so that nothing in the file can end this program."""
+"""Runs a file in a separate process, so that nothing in it can end this program: a solver, an
+engine of own_engine, or one of adapters/javascript."""
 
 from __future__ import annotations
 
@@ -311,7 +312,10 @@ def kept_copies(solver: SolverText, kept: Path) -> Path | None:
     """
     copies = kept / "solvers" / solver.source
     try:
-        for file, text in {**dict(solver.beside), solver.path.resolve().name: solver.text}.items():
+        for file, text in {
+            **dict(solver.imported),
+            solver.path.resolve().name: solver.text,
+        }.items():
             copy = copies / file
             if copy.is_file() and copy.read_bytes() == text.encode():
                 continue

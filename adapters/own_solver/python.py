@@ -60,7 +60,7 @@ class PythonSolver:
         file and content."""
         here = solver.path.resolve()
         self.solver, self.name = solver, str(solver.path if copies is None else copies / here.name)
-        self.neighbours = Neighbours(here.parent, dict(solver.beside), copies or here.parent)
+        self.neighbours = Neighbours(here.parent, dict(solver.imported), copies or here.parent)
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 

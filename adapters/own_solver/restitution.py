@@ -74,7 +74,7 @@ def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution
 
 def own_text(solver: SolverText) -> str:
     """All text that its author wrote."""
-    return "\n".join([solver.text, *(module for file, module in solver.beside if is_own(file))])
+    return "\n".join([solver.text, *(module for file, module in solver.imported if is_own(file))])
 
 
 def own_restitution(text: str, measured: float) -> OwnRestitution:

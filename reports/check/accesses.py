@@ -19,7 +19,8 @@ class Access(NamedTuple):
 
     Attributes:
         kind: "r" or "w".
-        sphere: its index in the question. field: of the sphere; "position" for both x and y.
+        sphere: its index in the question.
+        field: of the sphere; "position" for both x and y.
         lines: the lines of the file on the call stack, the innermost first, without helpers.
         helpers: the lines of helpers, which take any vector.
     """

@@ -333,7 +333,7 @@ def identity_of(file: Path) -> Hashable:
     except NotASolver:
         return file
     name = file.name if solver.kind == "python" else ""
-    return solver.kind, solver.text, solver.beside, name
+    return solver.kind, solver.text, solver.imported, name
 
 
 def named_for(file: Path, one: FileCheck) -> FileCheck:

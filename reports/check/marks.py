@@ -27,8 +27,8 @@ class TaskMark(NamedTuple):
     Attributes:
         task: its key in `TASKS`.
         status: the worst verdict of its questions.
-        points, most: points given and points possible. not_judged: points of questions that could
-        not be asked; not included in `points`.
+        points, most: points given and points possible.
+        not_judged: points of questions that could not be asked; not included in `points`.
     """
 
     task: str

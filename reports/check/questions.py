@@ -85,8 +85,8 @@ class SolverAnswer:
     Attributes:
         balls: the spheres after each call; for a failed question those of the calls before it, or
             those found by `left_by` of failing.py.
-        returned: whether a function returned an object. strayed: whether the file's own ufo or
-        asteroids changed, though they were not arguments.
+        returned: whether a function returned an object.
+        strayed: whether the file's own ufo or asteroids changed, though they were not arguments.
         strange: fields that the spheres did not have before.
         kept: global numbers of the file that the calls have changed.
         calls: the calls of the file, for a watched question: ("integrate", sphere, dt),

@@ -37,8 +37,8 @@ class FileCheck:
         path: of the file.
         rows: what was checked; none of a file that is no solver.
         refused: why it is no solver; "" if it is one.
-        restitution: used to judge its whole scenes; None if they cannot be judged. solver: the text
-        that was checked; None if there is none.
+        restitution: used to judge its whole scenes; None if they cannot be judged.
+        solver: the text that was checked; None if there is none.
         seconds: duration of the check.
     """
 

@@ -14,7 +14,7 @@ from reports.check.evidence import lines_and_formula
 from reports.check.verdict import check_file
 from reports.page.own_solvers import Said, with_lines
 from reports.run.runner import run_all
-from reports.run.suite import Check
+from reports.run.tasks import Check
 from reports.run.worker_process import Failure
 from reports.terminal.exits import say
 

@@ -37,8 +37,10 @@ from reports.run.folders import (
     replace_folder,
 )
 from reports.run.journal import JOURNAL, Journal
+from reports.run.results import OtherVersions
 from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
-from reports.run.suite import Means, OtherVersions, RunPlan, carry_out
+from reports.run.suite import carry_out
+from reports.run.tasks import Means, RunPlan
 from reports.terminal.counts import counted
 from reports.terminal.exits import FAILED, broken_off, refuse, say
 from reports.terminal.progress import Progress

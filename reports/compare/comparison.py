@@ -12,7 +12,7 @@ from adapters.run import Run
 from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
-from reports.compare.table import TableRow, row_of, status_row, table_of
+from reports.compare.table import TableRow, deviation_row, status_row, table_of
 from reports.compare.view import View, beside, not_judged
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -76,5 +76,5 @@ def _measure(run: Run, view: View, versus: str) -> list[TableRow]:
         for name, metric in METRICS.items():
             if kind in metric.against and (value := metric.of(view)) is not None:
                 judged = value if len(view.played) > 1 else not_judged("the start alone")
-                rows.append(row_of(run, name, judged, metric.unit, versus))
+                rows.append(deviation_row(run, name, judged, metric.unit, versus))
     return rows

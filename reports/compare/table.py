@@ -28,7 +28,7 @@ COLUMNS = (
 TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str]  # as `COLUMNS`
 
 
-def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
+def deviation_row(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
     """The row of one metric of a run."""
     whose = (run.scenario, run.engine, run.profile, run.dt, metric)
     return (*whose, value.disk, value.value, unit, versus, value.at, value.note)
@@ -36,7 +36,7 @@ def row_of(run: Run, metric: str, value: Value, unit: str, versus: str) -> Table
 
 def status_row(run: Run, why: str, versus: str = ITSELF) -> TableRow:
     """The row of a run without numbers, with the reason."""
-    return row_of(run, "status", Value(np.nan, note=why), "", versus)
+    return deviation_row(run, "status", Value(np.nan, note=why), "", versus)
 
 
 def table_of(rows: Sequence[TableRow]) -> pd.DataFrame:

@@ -292,7 +292,7 @@ class Simulation:
 
     @cached_property
     def film(self) -> Comparison:
-        """For the engine of the page."""
+        """What the player of the page shows."""
         return Comparison(self.scenario, self.truth, self.runs, pd.DataFrame())
 
     @property

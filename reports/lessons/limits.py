@@ -30,7 +30,7 @@ from reports.stability.explain import explained, with_replays
 from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
 from reports.stability.overview import bracket, why
 from reports.stability.search import LimitSearch
-from reports.stability.variants import VARIANTS
+from reports.stability.variants import DRIVEN_ENGINES
 from scenarios.model import Array, Scenario, Trajectory
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest
@@ -78,10 +78,10 @@ SEEN = {
 
 # What is changed in the engines of these cases whose names have a +.
 CHANGES = {
-    name.partition("+")[2]: VARIANTS[name].change
+    name.partition("+")[2]: DRIVEN_ENGINES[name].change
     for seen in SEEN.values()
     for name in CASES[seen.case].also
-    if VARIANTS[name].change
+    if DRIVEN_ENGINES[name].change
 }
 
 
@@ -112,7 +112,9 @@ def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]
     the worst phase."""
     search = LimitSearch(case, engine, QUICK)
     trial = search.trial(value, to_the_end=True)
-    return trial, *(search.seen.get(value) or case.play(VARIANTS[engine], case.scene(value, 0)))
+    return trial, *(
+        search.seen.get(value) or case.play(DRIVEN_ENGINES[engine], case.scene(value, 0))
+    )
 
 
 def show_limits(settings: Settings) -> Shown:

@@ -24,8 +24,8 @@ class ErrorCost(NamedTuple):
 
     Attributes:
         names: the engines that have a point, or a failure, in one of the pictures.
-        drawings: scenario, or `POOLED` -> its picture. sentences: three, on speed and error, or two
-        on error.
+        drawings: scenario, or `POOLED` -> its picture.
+        sentences: three, on speed and error, or two on error.
         fault: why there are no times, or "".
         caption: what a point shows.
         costs: a row for each engine, see `costs_of`; empty without times.

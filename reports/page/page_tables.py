@@ -23,8 +23,8 @@ class PageTables:
     """The tables between the first screen and the scenarios, in their order.
 
     Attributes:
-        columns: of the tables of medians. summaries: the tables of medians: without friction, and
-        with friction if there are both.
+        columns: of the tables of medians.
+        summaries: the tables of medians: without friction, and with friction if there are both.
         heat_map: scenario -> a cell for each engine: its largest position error.
         flukes: whether a cell of it is one of `pooled.flukes`.
         heat_bounds: the errors at which the colour of a cell changes, radii.

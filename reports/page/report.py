@@ -27,7 +27,8 @@ class Report:
     """The results of a run.
 
     Attributes:
-        archive: what it was made from. comparisons: one for each scenario, in reading order.
+        archive: what it was made from.
+        comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
         untrusted: the engines that broke the protocol: their rows stay in the tables, but they are

@@ -100,8 +100,8 @@ class Ranked(NamedTuple):
         name: `engine:profile`.
         median, worst: error over the scenes, radii (rad of an angle); inf: no result.
         worst_in: the scene of the worst.
-        right: number of scenes with an error below `RIGHT`. fails: scene -> error, if above
-        `FAR_OFF`, the worst first.
+        right: number of scenes with an error below `RIGHT`.
+        fails: scene -> error, if above `FAR_OFF`, the worst first.
         cost: µs of engine time per simulated second, median of the timed scenes; nan if there are
             none.
     """

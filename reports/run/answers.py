@@ -12,7 +12,7 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from reports.run.archive import digest
+from reports.run.cells import digest
 from reports.run.scenes import Records, open_scene, scenario_of
 from reports.run.worker_process import Failure
 from reports.terminal.foreign_text import put_bytes

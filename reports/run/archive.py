@@ -14,7 +14,6 @@ compared/       the scenarios' exact answers and parts of deviations.csv, so tha
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.run import Run
+from reports.run.cells import digest
 from reports.run.journal import JOURNAL
 from reports.run.journal_lines import checked_lines, no_use
 from reports.run.run_lines import KINDS
@@ -46,7 +46,7 @@ class Archive:
         known_answers: the lines of the reproduced known answers.
         checked: solver's file, `PATH:own` -> its line with the verdict of `crosscheck check`.
         timings: key of a cell -> number of the timing (0; also 1 if timed twice) -> its line.
-        beside: (what, `engine:profile`, scenario or "") -> s in each round, see stepping.py.
+        overheads: (what, `engine:profile`, scenario or "") -> s in each round, see stepping.py.
         seconds: duration of the run; NaN if it is not complete.
         complete: whether everything requested has ended.
     """
@@ -58,7 +58,7 @@ class Archive:
     known_answers: list[dict[str, Any]]
     checked: dict[str, dict[str, Any]]
     timings: dict[str, dict[int, dict[str, Any]]]
-    beside: dict[tuple[str, str, str], list[float]]
+    overheads: dict[tuple[str, str, str], list[float]]
     seconds: float
     complete: bool
 
@@ -71,7 +71,7 @@ class Archive:
             kind: {} for kind in ("cell", "conformance", "known_answer", "checked")
         }
         timings: dict[str, dict[int, dict[str, Any]]] = {}
-        beside: dict[tuple[str, str, str], list[float]] = {}
+        overheads: dict[tuple[str, str, str], list[float]] = {}
         seconds, complete = 0.0, False
         for number, kind, line in checked_lines(folder, KINDS):
             complete = kind == "footer"
@@ -81,8 +81,8 @@ class Archive:
                 header = line["header"]
             elif kind == "timing":
                 timings.setdefault(line["timing"], {})[line["copy"]] = line
-            elif kind == "beside":
-                beside[line["beside"], line["of"], line["scenario"]] = line["cost"]
+            elif kind == "overhead":
+                overheads[line["overhead"], line["of"], line["scenario"]] = line["cost"]
             else:
                 last[kind][what_of(line) if kind == "cell" else line["of"]] = number, line
         if not header:
@@ -103,7 +103,7 @@ class Archive:
             known,
             {line["of"]: line for line in checked},
             timings,
-            beside,
+            overheads,
             seconds if complete else float("nan"),
             complete,
         )
@@ -151,18 +151,13 @@ def as_found(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
     return record | failed | {"damage": why}
 
 
-def digest(data: bytes) -> str:
-    """16 hex digits of a hash over the bytes of a file."""
-    return hashlib.sha256(data).hexdigest()[:16]
-
-
 @cache
 def digest_of_file(path: Path, *_: int) -> str:
     """The digest of an existing file, cached by inode, size and time of change."""
     return digest(all_of(path))
 
 
-def run_of(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
+def archived_run(folder: Path, record: dict[str, Any], with_trajectory: bool = True) -> Run:
     """The run of a line, with its trajectory if it has one and `with_trajectory` is set."""
     record = as_found(folder, record)
     trajectory = stored_trajectory(folder, record) if with_trajectory else None

@@ -43,10 +43,15 @@ class Cell:
         name, profile = self.engine.split(":")
         return name, profile
 
-    def key(self, scene: str, source: str) -> str:
+    def key(self, hash_of_scene: str, source: str) -> str:
         """Its `content_key`, from the `scene_hash` of the scenario and the `source` of the engine's
         row."""
-        return content_key(scene, self.engine, source, self.substeps)
+        return content_key(hash_of_scene, self.engine, source, self.substeps)
+
+
+def digest(data: bytes) -> str:
+    """The first 16 hex digits of SHA-256 over some bytes, such as those of a file."""
+    return hashlib.sha256(data).hexdigest()[:16]
 
 
 def content_key(*what: Hashable) -> str:
@@ -56,15 +61,13 @@ def content_key(*what: Hashable) -> str:
     For a solver's file `what` includes `EngineRow.source`, a hash of the text read when the command
     started.
     """
-    return hashlib.sha256(repr((*what, versions(), source_hash())).encode()).hexdigest()[:16]
+    return digest(repr((*what, versions(), source_hash())).encode())
 
 
 def scene_hash(scenario: Scenario) -> str:
     """16 hex digits of a hash over what is played: the scene, its thrusts, duration and
     sampling."""
-    digest = hashlib.sha256(
-        repr((scenario.name, scenario.duration, scenario.sample_interval)).encode()
-    )
+    parts = [repr((scenario.name, scenario.duration, scenario.sample_interval)).encode()]
     scene = scenario.scene
     arrays = [
         scene.position,
@@ -78,10 +81,10 @@ def scene_hash(scenario: Scenario) -> str:
     arrays += [scene.wrap] if scene.wrap is not None else []
     arrays += [np.array(scene.friction)] if scene.friction else []
     for array in arrays:
-        digest.update(repr(array.shape).encode() + array.tobytes())
+        parts += [repr(array.shape).encode(), array.tobytes()]
     for t in scenario.thrusts:
-        digest.update(repr((t.disk, t.start, t.stop, t.force.tolist(), t.torque, t.frame)).encode())
-    return digest.hexdigest()[:16]
+        parts.append(repr((t.disk, t.start, t.stop, t.force.tolist(), t.torque, t.frame)).encode())
+    return digest(b"".join(parts))
 
 
 @cache
@@ -103,4 +106,4 @@ def versions() -> dict[str, str]:
 def source_hash(root: Path = ROOT) -> str:
     """A hash over the engines' source, so that a changed adapter is a changed cell."""
     files = sorted(path for pattern in SOURCES for path in root.glob(pattern))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
+    return digest(b"".join(path.read_bytes() for path in files))

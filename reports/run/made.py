@@ -49,7 +49,8 @@ class Made(NamedTuple):
     """made.json.
 
     Attributes:
-        command: that made the folder. finished: whether the command has written everything.
+        command: that made the folder.
+        finished: whether the command has written everything.
         files: path -> SHA-256, None while it is written.
         out: name of the folder that this one will replace; "" once it has.
     """

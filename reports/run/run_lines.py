@@ -152,10 +152,10 @@ class TimingLine(Line):
     wrapping: Costs
 
 
-class BesideLine(Line):
-    """What was timed beside the steps of an engine: s, one number per round."""
+class OverheadLine(Line):
+    """An overhead of an engine, as `stepping.overheads` times it: s, one number per round."""
 
-    beside: Literal[EMPTY, CALL, READ]  # type: ignore[valid-type]
+    overhead: Literal[EMPTY, CALL, READ]  # type: ignore[valid-type]
     of: EngineProfile
     scenario: Literal[""] | Name
     cost: Costs
@@ -189,7 +189,7 @@ KINDS = Kinds(
         "known_answer": KnownAnswerLine,
         "checked": CheckedLine,
         "timing": TimingLine,
-        "beside": BesideLine,
+        "overhead": OverheadLine,
         "footer": RunFooterLine,
     },
     "delete that line; run --resume then plays its cell again",

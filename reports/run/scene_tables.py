@@ -25,8 +25,8 @@ from reports.compare.comparison import Comparison, compare
 from reports.compare.table import status_row, table_of
 from reports.compare.view import NOT_JUDGED
 from reports.run.answers import ExactAnswer, answer_here, no_answer, put_answer, read_answer
-from reports.run.archive import Archive, as_found, digest, run_of
-from reports.run.cells import Cell, versions
+from reports.run.archive import Archive, archived_run, as_found
+from reports.run.cells import Cell, digest, versions
 from reports.run.scenes import Records, scenario_of
 from reports.run.worker_process import Failure, allow
 from reports.terminal.foreign_text import put_bytes
@@ -181,7 +181,7 @@ def csv_of(table: pd.DataFrame, header: bool = True) -> bytes:
 def compared(folder: Path, records: Records, answer: ExactAnswer) -> Comparison:
     """The runs of a scene's cells, compared with its answer and with each other."""
     scenario = answer.put_into(scenario_of(folder, records))
-    return compare(scenario, [run_of(folder, record) for record in records])
+    return compare(scenario, [archived_run(folder, record) for record in records])
 
 
 def rows_not_judged(runs: Iterable[Run], why: str, versus: str) -> pd.DataFrame:
@@ -237,8 +237,7 @@ def scene_table_file(folder: Path, records: Records, answer: ExactAnswer) -> Pat
 
 def named_by(folder: Path, records: Records, what: tuple[Any, ...], suffix: str) -> Path:
     """A file of a scene, with a hash of `what` in its name."""
-    digest = hashlib.sha256(repr(what).encode()).hexdigest()[:16]
-    return folder / "compared" / f"{records[0]['scenario']}-{digest}{suffix}"
+    return folder / "compared" / f"{records[0]['scenario']}-{digest(repr(what).encode())}{suffix}"
 
 
 @cache

@@ -4,122 +4,30 @@ at once."""
 from __future__ import annotations
 
 import json
-import os
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
-from adapters.conformance.conform import no_answer
-from adapters.engine_row import EngineRow
-from adapters.engines import told_apart
-from adapters.run import Run
-from reports.run.archive import Archive, digest, stored_scene, trajectory_file
-from reports.run.cells import Cell, content_key, scene_hash
+from reports.run.archive import Archive, stored_scene
+from reports.run.cells import Cell, scene_hash
 from reports.run.folders import RUN
 from reports.run.journal import Journal, plain
-from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE, KnownAnswer
-from reports.run.machine import about
+from reports.run.known_answers import KnownAnswer
 from reports.run.made import writing
-from reports.run.playing import CellResult, conform_here, play_here, source_and_versions
-from reports.run.runner import TIMEOUT, run_all
+from reports.run.playing import CellResult
+from reports.run.results import keep_cell, keep_check, keep_known_answer, keep_probes
+from reports.run.runner import run_all
 from reports.run.scene_tables import SceneTasks
-from reports.run.scenes import open_scene, with_steps
+from reports.run.tasks import Checking, Means, RunPlan, finished_tasks, tasks_of
 from reports.run.timing_pass import Pass, cells_to_time, is_timed
-from reports.run.trajectories import from_trail, packed
 from reports.run.worker_process import Failure
-from reports.terminal.foreign_text import put_bytes, put_text
+from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 from scenarios.files.scene_file import scene_text
 from scenarios.model import Scenario
-
-
-class Check(NamedTuple):
-    """The verdict of `crosscheck check` on a solver's file.
-
-    Attributes:
-        passed: whether it found no fault.
-        says: its sentences, the most important first.
-        shown: for each sentence the lines of the file and the exercise's formula, a text each.
-        source: `EngineRow.source` of the text that was checked; "" if there is none.
-    """
-
-    passed: bool
-    says: list[str]
-    shown: list[list[str]]
-    source: str
-
-
-class Checking(NamedTuple):
-    """The task to check the file of an engine."""
-
-    engine: str
-
-
-@dataclass(frozen=True)
-class RunPlan:
-    """The scenes, engines and settings of a run: all that decides its numbers.
-
-    Attributes:
-        scenes: names of the catalogue or paths of scene files, in reading order.
-        engines: `engine:profile`, or a solver's file as `PATH:own`, -> its row, in reading order.
-        seed: seed of random scenes.
-        dts: step sizes in s instead of each scenario's own; empty: its own.
-        full: two finer steps for every scenario.
-        timings: s that the timing pass at the end may take; 0: no timing pass.
-        command: the command line that runs this plan again.
-        folder: the working directory of the command, to which relative paths belong.
-        files: path of a scene -> the file that is read instead, such as the kept copy of a deleted
-            file.
-        checks: a solver's file of `engines` -> a picklable task that gives its `Check`.
-    """
-
-    scenes: Sequence[str]
-    engines: Mapping[str, EngineRow]
-    seed: int
-    dts: Sequence[float]
-    full: bool
-    timings: float
-    command: str
-    folder: str = field(default_factory=os.getcwd)
-    files: Mapping[str, Path] = field(default_factory=dict)
-    checks: Mapping[str, Callable[[], Check]] = field(default_factory=dict)
-
-    def scenario(self, scene: str) -> Scenario:
-        """The scenario behind one of `scenes`, with the steps asked for."""
-        return with_steps(
-            open_scene(str(self.files.get(scene, scene)), self.seed), self.dts, self.full
-        )
-
-    def header(self) -> dict[str, Any]:
-        """The first line of the journal; when a run is resumed, its `RunPlan` is made from it."""
-        lists = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
-        values = {name: getattr(self, name) for name in ("full", "timings", "folder")}
-        return about(self.command, self.seed) | lists | values
-
-
-@dataclass(frozen=True)
-class Means:
-    """The processes, time and memory for carrying out a plan; they change no number.
-
-    Attributes:
-        workers: processes that play at once.
-        timeout: s a cell may take, and the exact answer to a scene.
-        memory: bytes a worker may take; 0: no limit.
-        scheduler: address of the dask scheduler whose workers play; "": this machine.
-    """
-
-    workers: int
-    timeout: float = TIMEOUT
-    memory: int = 0
-    scheduler: str = ""
-
-
-class OtherVersions(Exception):
-    """The source or library versions of a worker differ from those of this machine."""
 
 
 def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:
@@ -188,14 +96,16 @@ class Playing:
         if isinstance(task, Path):  # the file of an exact answer or of a comparison
             return self.scene_tasks.task_ended(task, result)
         if isinstance(task, Cell):
-            return self.scene_tasks.cell_ended(self.keep_cell(task, result))
+            return self.scene_tasks.cell_ended(self.kept_cell(task, result))
         if isinstance(task, Checking):
             self.progress.done(*keep_check(self.journal, self.plan, task.engine, result))
+        elif isinstance(task, KnownAnswer):
+            self.progress.done(*keep_known_answer(self.journal, task, result))
         else:
-            self.progress.done(*keep_answer(self.journal, self.plan, task, result))
+            self.progress.done(*keep_probes(self.journal, self.plan, task, result))
         return ()
 
-    def keep_cell(self, cell: Cell, result: CellResult | Failure) -> dict[str, Any]:
+    def kept_cell(self, cell: Cell, result: CellResult | Failure) -> dict[str, Any]:
         """Write the result of a cell and show its status; returns the cell's line of the
         journal."""
         scenario = self.scenarios[cell.scene]
@@ -237,178 +147,6 @@ def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], ta
             put_text(path, text)
         put_text(about_it, json.dumps(plain(header), indent=2) + "\n")
     journal.append({"header": header})
-
-
-def tasks_of(plan: RunPlan, scenarios: Mapping[str, Scenario]) -> dict[Any, Callable[[], Any]]:
-    """Task -> the picklable function that carries it out. A task is an engine's name (its probes),
-    a `Checking`, a `KnownAnswer` or a `Cell`."""
-    tasks: dict[Any, Callable[[], Any]] = {
-        name: partial(conform_here, name, row) for name, row in plan.engines.items()
-    }
-    tasks |= {Checking(name): check for name, check in plan.checks.items()}
-    if KNOWN_SCENE in plan.scenes:
-        tasks |= {answer: answer.reproduce for answer in KNOWN_ANSWERS}
-    for scene, scenario in scenarios.items():
-        question = replace(scenario, truth=None)  # an engine does not get the exact answer
-        for name in told_apart(plan.engines, scenario.scene):
-            for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
-                tasks[cell] = partial(play_here, cell, plan.engines[name], question)
-    return tasks
-
-
-def finished_tasks(
-    archive: Archive, plan: RunPlan, means: Means, scenarios: Mapping[str, Scenario]
-) -> set[Any]:
-    """The tasks that have a result in the journal, with the same scene, settings and versions.
-
-    A cell is played again if it was stopped at a shorter time limit than the present one, if its
-    trajectory is missing or damaged, or if it failed for a reason outside the engine.
-    """
-    keys = {
-        line["of"]: line["key"] for line in (*archive.conformance.values(), *archive.known_answers)
-    }
-    asked: tuple[KnownAnswer | str, ...] = (*plan.engines, *KNOWN_ANSWERS)
-    done: set[Any] = {task for task in asked if keys.get(name_of(task)) == answer_key(plan, task)}
-    done |= {
-        Checking(name)
-        for name, line in archive.checked.items()
-        if name in plan.engines and line["key"] == answer_key(plan, name)
-    }
-    hashes = {scene: scene_hash(scenario) for scene, scenario in scenarios.items()}
-    for record in archive.records:
-        cell = Cell(
-            record["scene"],
-            record["seed"],
-            f"{record['engine']}:{record['profile']}",
-            record["substeps"],
-        )
-        if cell.scene not in hashes or cell.engine not in plan.engines:
-            continue
-        stopped = record["status"] == "timeout" and record["timeout_s"] < means.timeout
-        lost = record["damage"]  # its trajectory is missing or damaged
-        same = record["cell"] == cell.key(hashes[cell.scene], plan.engines[cell.engine].source)
-        if same and not (stopped or lost or record["outside"]):
-            done.add(cell)
-    return done
-
-
-def name_of(task: KnownAnswer | str) -> str:
-    """The name in the journal of an engine's probes or of a known answer."""
-    return task if isinstance(task, str) else repr(task)
-
-
-def answer_key(plan: RunPlan, task: KnownAnswer | str) -> str:
-    """The `content_key` of the probes of an engine, or of a known answer."""
-    return content_key(name_of(task), plan.engines[task].source if isinstance(task, str) else "")
-
-
-def keep_answer(
-    journal: Journal, plan: RunPlan, task: KnownAnswer | str, result: Any
-) -> tuple[str, str, str]:
-    """Write the result of a known answer or of an engine's probes to the journal; returns the
-    task in words, its status, and the reason of a failure."""
-    failure = result if isinstance(result, Failure) else None
-    status, reason = (failure.status, failure.reason) if failure else ("ok", "")
-    if isinstance(task, KnownAnswer):
-        line: dict[str, Any] = {
-            "known_answer": asdict(task) | {"ours_J2": float("nan") if failure else result}
-        }
-        said = f"known answer: {task.column} at dt {task.dt_s:g} s"
-    else:
-        faulty = plan.engines[task].exercise  # a solver that hangs breaks no protocol
-        verdict: Literal["departs", "breaks"] = "departs" if faulty else "breaks"
-        findings = [no_answer(task, status, reason, verdict)] if failure else result
-        line = {"conformance": [asdict(finding) for finding in findings]}
-        said = f"conformance of {task}"
-    # No key matches "": a failure outside the engine is tried again when the run is resumed.
-    key = "" if failure and failure.outside else answer_key(plan, task)
-    journal.append(line | {"of": name_of(task), "key": key})
-    return said, status, reason
-
-
-def keep_check(
-    journal: Journal, plan: RunPlan, engine: str, result: Check | Failure
-) -> tuple[str, str, str]:
-    """Write the verdict of `crosscheck check` on an engine's file to the journal; returns the task
-    in words, its status, and the reason of a failure."""
-    said, status, reason = f"check of {engine}", "ok", ""
-    shown: list[list[str]]
-    passed, says, shown, key = False, ["It was saved while the run began: check it again."], [], ""
-    if isinstance(result, Failure):
-        says = [f"It could not be checked: {result.reason}"]
-        status, reason = result.status, result.reason
-    elif result.source == plan.engines[engine].source:
-        passed, says, shown, _ = result
-        key = answer_key(plan, engine)
-    # No key matches "": the file is checked again when the run is resumed.
-    verdict = {"passed": passed, "says": says, "shown": shown}
-    journal.append({"checked": verdict, "of": engine, "key": key})
-    return said, status, reason
-
-
-def keep_cell(
-    journal: Journal,
-    scenario: Scenario,
-    means: Means,
-    cell: Cell,
-    key: str,
-    result: CellResult | Failure,
-) -> dict[str, Any]:
-    """Write the trajectory of the cell with this `key`, then its line, which is returned."""
-    played = failed(cell, scenario, result) if isinstance(result, Failure) else result
-    run, samples = played.run, played.samples
-    if played.played_by != source_and_versions():
-        raise OtherVersions(
-            "a worker has other versions or other source of the engines than this machine"
-        )
-    path = trajectory_file(journal.path.parent, key)
-    if played.file:
-        put_bytes(path, played.file)
-    record = {
-        "cell": key,
-        "scene_hash": scene_hash(scenario),
-        "scene": cell.scene,
-        "seed": cell.seed,
-        "substeps": cell.substeps,
-        "scenario": run.scenario,
-        "engine": run.engine,
-        "profile": run.profile,
-        "dt_s": run.dt,
-        "status": run.status,
-        "reason": run.reason,
-        "step": (samples - 1) * cell.substeps if samples else -1,
-        "until_s": float(scenario.times[samples - 1]) if samples else float("nan"),
-        "seconds": run.seconds,
-        "timeout_s": means.timeout,
-        "outside": isinstance(result, Failure) and result.outside,
-        "file": digest(played.file) if played.file else "",
-        "settings": run.settings,
-        "versions": run.versions,
-    }
-    journal.append(record)
-    return record
-
-
-def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
-    """The result of a cell whose worker died or was stopped, with the states up to that time."""
-    trajectory = from_trail(failure.trail, scenario)
-    samples = len(trajectory) if trajectory else 0
-    last = (
-        f"; last good state: step {(samples - 1) * cell.substeps},"
-        f" {scenario.times[samples - 1]:g} s"
-        if samples
-        else ""
-    )
-    run = Run(
-        *cell.names,
-        scenario.name,
-        scenario.dt(cell.substeps),
-        failure.status,
-        failure.reason + last,
-    )
-    return CellResult(
-        run, samples, packed(trajectory) if trajectory else b"", source_and_versions()
-    )
 
 
 def take_timings(

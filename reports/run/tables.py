@@ -17,7 +17,8 @@ import pandas as pd
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.run.answers import ExactAnswer, read_answer
-from reports.run.archive import Archive, digest, run_of
+from reports.run.archive import Archive, archived_run
+from reports.run.cells import digest
 from reports.run.folders import RUN
 from reports.run.journal import JOURNAL
 from reports.run.runner import run_all
@@ -152,7 +153,7 @@ def unkept_comparison(
 ) -> Comparison:
     """What can be shown of a scene without a scene table; if its comparison failed, it is compared
     with no answer."""
-    runs = [run_of(folder, record) for record in records]
+    runs = [archived_run(folder, record) for record in records]
     scenario = scenario_of(folder, records)
     if isinstance(scene_table, bytes):
         scenario, truth = answered(answer.put_into(scenario))
@@ -174,7 +175,7 @@ def comparisons_of(archive: Archive, tables: Tables) -> list[Comparison]:
             tables.answers[scene].put_into(scenario_of(archive.folder, records))
         )
         runs = [
-            run_of(
+            archived_run(
                 archive.folder,
                 record,
                 with_trajectory=record["substeps"] == scenario.middle_substeps,

@@ -172,7 +172,7 @@ def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
     for cell in cells:
         for what, run, amount in overheads(cell.row.make, cell.scenario):
             # Only a read-out depends on the scene.
-            key = ("beside", what, cell.name, cell.scenario.name if what == READ else "")
+            key = ("overhead", what, cell.name, cell.scenario.name if what == READ else "")
             found.setdefault(key, Timed(key, run, amount))
     return [timed for timed in found.values() if can(timed)]
 
@@ -198,7 +198,7 @@ def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
         wrapping = [sample.wrapping for sample in samples]
         return {"timing": cell, "copy": copy, "timed_s": until, "cost": costs, "wrapping": wrapping}
     _, what, name, scene = key
-    return {"beside": what, "of": name, "scenario": scene, "cost": costs}
+    return {"overhead": what, "of": name, "scenario": scene, "cost": costs}
 
 
 def as_played(cell: CellToTime) -> dict[str, Any]:
@@ -243,7 +243,7 @@ def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame
                 len(line["cost"]),
                 *(1e6 * value for value in (cost, low, high)),
                 1e6 * binding(archive, name, scenario, record["substeps"]),
-                1e6 * median_of(archive.beside.get((READ, name, scenario.name))),
+                1e6 * median_of(archive.overheads.get((READ, name, scenario.name))),
                 1e6 * float(np.median(line["wrapping"])),
                 1e6 * float(np.median(again)),
             )
@@ -254,7 +254,7 @@ def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame
 def binding(archive: Archive, name: str, scenario: Scenario, substeps: int) -> float:
     """s per simulated second that the steps and calls of an engine take in an empty world; nan if
     that is not known."""
-    step, singly = (median_of(archive.beside.get((what, name, ""))) for what in (EMPTY, CALL))
+    step, singly = (median_of(archive.overheads.get((what, name, ""))) for what in (EMPTY, CALL))
     return binding_of(step, singly, scenario, substeps)
 
 

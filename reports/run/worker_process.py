@@ -28,7 +28,8 @@ class Failure(NamedTuple):
 
     Attributes:
         status: "crashed", "timeout" or "error", as in `STATUSES` of run.py.
-        reason: why. trail: the bytes that the task left.
+        reason: why.
+        trail: the bytes that the task left.
         outside: whether the reason is outside the engine: the machine, the memory, this program.
             Another try may succeed.
     """

@@ -17,7 +17,7 @@ import pandas as pd
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
-from adapters.mechanisms.table import KNOWN
+from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
@@ -29,10 +29,10 @@ from reports.run.timing import Sample, Timed, interleaved
 from reports.run.worker_process import Failure
 from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
 from reports.speed.effort import doublings
-from reports.speed.ladder import scored
 from reports.speed.measure import done
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
+from reports.speed.scored_part import scored
 from reports.speed.tables import summed_up
 from reports.terminal.progress import Progress
 from scenarios.model import Scenario
@@ -405,7 +405,7 @@ def reasons(
     tasks = {
         one.task: partial(budget_of, scene, seed, played_as(one.name), finest)
         for one, _, _ in short
-        if played_as(one.name) in KNOWN and isfinite(one.error)
+        if played_as(one.name) in MECHANISMS and isfinite(one.error)
     }
     budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
     measure = "energy" if purpose == "energy" else "position_radii"

@@ -21,7 +21,7 @@ from adapters.run import Run
 from reports.compare import laws, scales
 from reports.compare.view import View, cut
 from reports.run.scenes import open_scene
-from reports.speed.ladder import scored
+from reports.speed.scored_part import scored
 from scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
@@ -94,18 +94,23 @@ class Offset(NamedTuple):
 
 
 def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str, Any]]:
-    """The error budget of engine `name` of `MECHANISMS` in a scene, at `substeps` steps a sample
-    interval: a row for each contribution.
+    """The error budget of an engine whose mechanisms are known, `name`, in a scene, at `substeps`
+    steps a sample interval: a row for each contribution.
 
-    Of `COLUMNS`: until_s, how far the scene was evaluated, horizon_s, how far its exact answer
-    goes, and duration_s, the scene itself; position_radii and energy, the root mean square of what
-    the contribution changes, the energy in contributions of that at hand; share, by which it makes
-    up the position's total (1 in all;
-    negative: it makes up for others); off_engine_radii, off_reference_radii and
-    off_deviation_radii: what disabling it changes in the engine, in the reference with all the
-        rest, and their deviation;
-    closed_deviation_radii: how far the flight's contribution is from its closed form up to the
-    first collision; note: why there are no numbers.
+    The columns of a row, among others:
+        until_s: up to when the scene was evaluated.
+        horizon_s: up to when its exact answer holds.
+        duration_s: the duration of the scene itself.
+        position_radii, energy: root mean square of what the contribution changes; the energy over
+            the energy at hand.
+        share: the part of the total position error that the contribution makes up; all parts sum
+            to 1; negative: it cancels others.
+        off_engine_radii, off_reference_radii, off_deviation_radii: what disabling it changes in the
+            engine, what it changes in the reference with all other mechanisms, and how far these
+            two differ.
+        closed_deviation_radii: how far the contribution of flight is from its closed form up to
+            the first collision.
+        note: why there are no numbers.
     """
     at = window_of(scene, seed, substeps)
     scenario, dt = at.scenario, at.dt

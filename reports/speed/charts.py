@@ -14,7 +14,7 @@ from reports.compare.pooling import without_idle
 from reports.page import style
 from reports.page.charts import ZERO, Figure, broken_axis, decades, marked_break, shortened, sized
 from reports.page.cost_picture import light_marks
-from reports.speed.models import KINDS
+from reports.speed.cheapest import KINDS
 from scenarios.model import Array
 
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import ceil
 
 from adapters.engines import ENGINES
-from adapters.mechanisms.table import KNOWN
+from adapters.mechanisms.table import MECHANISMS
 from reports.run.scenes import open_scene
 from reports.run.timing import FEWEST_ROUNDS, LEAST, WARM_UP
 from reports.speed.effort import Effort
@@ -29,7 +29,7 @@ PAGE = 8.0  # s
 def estimate(plan: SpeedPlan, measurements: Sequence[Measurement], reach: Reach) -> str:
     """A sentence that says how much there is to measure and about how long it takes on an idle
     machine."""
-    budgets = BUDGET * len(plan.budget_scenes) * len(set(plan.engines) & set(KNOWN))
+    budgets = BUDGET * len(plan.budget_scenes) * len(set(plan.engines) & set(MECHANISMS))
     playing = (
         budgets + sum(seconds_to_play(measurement, reach) for measurement in measurements)
     ) / plan.workers

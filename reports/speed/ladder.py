@@ -4,10 +4,8 @@ another."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import cache
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,40 +15,7 @@ from reports.run.scenes import open_scene
 from reports.run.stepping import Make, Stepping, overheads
 from reports.run.timing import Sample, Timed, interleaved
 from reports.run.timing_pass import can
-from scenarios.model import Scenario, Trajectory
-from scenarios.no_truth import NoTruth
-
-
-class Scored(NamedTuple):
-    """A scenario cut at the last sample before the horizon of its exact answer, and the answer up
-    to there."""
-
-    scenario: Scenario
-    truth: Trajectory
-
-
-@cache
-def scored(scene: str, seed: int) -> Scored:
-    """The part of a scene that has an exact answer.
-
-    Raises:
-        NoTruth: there is none, or it ends before the first sample.
-    """
-    scenario = open_scene(scene, seed)
-    if scenario.truth is None:
-        raise NoTruth(scenario.without_truth or "the scene comes without an exact answer")
-    truth = scenario.truth(scenario.times)
-    if len(truth) < 2:
-        raise NoTruth(f"its exact answer ends at {truth.horizon:.3g} s, before the first sample")
-    return Scored(replace(scenario, duration=(len(truth) - 1) * scenario.sample_interval), truth)
-
-
-def reach_of(scene: str, seed: int) -> tuple[int, str]:
-    """The number of sample intervals with an exact answer; 0 and the reason if there are none."""
-    try:
-        return scored(scene, seed).scenario.intervals, ""
-    except NoTruth as refusal:
-        return 0, str(refusal)
+from reports.speed.scored_part import scored
 
 
 def errors_of(
@@ -65,25 +30,10 @@ def errors_of(
     failed. An engine that converges to a wrong motion has a small change and a large error.
     """
     scenario, truth = scored(scene, seed)
-    whole = open_scene(scene, seed).duration
     radius, before, rows = scenario.scene.radius, None, []
-    engine_name, profile = name.split(":")
     for k in ladder:
         run = play_once(make, name, scenario, scenario.dt(k))
-        row = {
-            "scenario": scenario.name,
-            "seed": seed,
-            "engine": engine_name,
-            "profile": profile,
-            "dt_s": scenario.dt(k),
-            "substeps": k,
-            "status": run.status,
-            "reason": run.reason,
-            "until_s": scenario.duration,
-            "duration_s": whole,
-            "error_radii": np.inf,
-            "change_radii": np.nan,
-        }
+        row = error_row(scene, seed, name, k, run.status, run.reason)
         played = run.trajectory if run.status == "ok" else None
         if played is not None:
             row["error_radii"] = float(
@@ -96,6 +46,28 @@ def errors_of(
         before = played
         rows.append(row)
     return rows
+
+
+def error_row(
+    scene: str, seed: int, name: str, substeps: int, status: str, reason: str
+) -> dict[str, Any]:
+    """A row of `errors_of` as it is where the run failed."""
+    scenario = scored(scene, seed).scenario
+    engine, profile = name.split(":")
+    return {
+        "scenario": scenario.name,
+        "seed": seed,
+        "engine": engine,
+        "profile": profile,
+        "dt_s": scenario.dt(substeps),
+        "substeps": substeps,
+        "status": status,
+        "reason": reason,
+        "until_s": scenario.duration,
+        "duration_s": open_scene(scene, seed).duration,
+        "error_radii": np.inf,
+        "change_radii": np.nan,
+    }
 
 
 def times_of(

@@ -80,7 +80,7 @@ class Row(Line):
 
 
 class ErrorRow(Row):
-    """As of `ladder.errors_of`."""
+    """A row that `ladder.errors_of` returns."""
 
     seed: Seed
     dt_s: Step
@@ -94,7 +94,7 @@ class ErrorRow(Row):
 
 
 class BudgetRow(Row):
-    """As of `budget.budget_of`, which leaves out what it does not know."""
+    """A row that `budget.budget_of` returns; a number that it does not know is left out."""
 
     seed: Seed
     dt_s: Step
@@ -113,7 +113,7 @@ class BudgetRow(Row):
 
 
 class SampleRow(Row):
-    """As of `measure.sample_row`."""
+    """A row that `measure.sample_row` returns."""
 
     kind: Words
     change: Words
@@ -128,19 +128,20 @@ class SampleRow(Row):
 
 
 class Errors(Line):
-    """The result of a ladder of step sizes."""
+    """The line of the journal that holds the errors of an engine at several step sizes."""
 
     result: Annotated[list[ErrorRow], Field(min_length=1)]
 
 
 class BudgetResult(Line):
-    """The contributions to an error."""
+    """The line of the journal that holds the contributions to an error."""
 
     result: Annotated[list[BudgetRow], Field(min_length=1)]
 
 
 class Samples(Line):
-    """What was timed together: every round of each thing, the warm-up first."""
+    """The line of the journal that holds what was timed together: every round of each thing,
+    the warm-up first."""
 
     result: list[SampleRow]
 
@@ -177,7 +178,8 @@ class SizesOf(Line):
 
     @model_validator(mode="after")
     def known(self) -> SizesOf:
-        """As of `Samples`; and each that stopped is an engine, a number of disks and why."""
+        """The samples are as in `Samples`, and each of `stopped` is an engine, a number of disks
+        and why it was not measured with so many."""
         Samples(result=self.samples)
         for name, n, why in self.stopped:
             if not (
@@ -193,13 +195,13 @@ class SizesOf(Line):
 
 
 class Sizes(Line):
-    """The same, as a result."""
+    """The line of the journal that holds the costs of a step by number of disks."""
 
     result: SizesOf
 
 
 class Closed(Line):
-    """As of `models.closed_form`."""
+    """What `cheapest.closed_form` returns: what answers the scene, and its cost."""
 
     scenario: Words
     truth: Words
@@ -207,7 +209,7 @@ class Closed(Line):
 
 
 class Truth(Line):
-    """The same, as a result."""
+    """The line of the journal that holds the cost of a closed form."""
 
     result: Closed
 

@@ -12,13 +12,13 @@ from typing import Any
 import pandas as pd
 
 from adapters.engines import row_of
-from adapters.mechanisms.table import KNOWN
+from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
 from reports.run.runner import run_all
 from reports.run.scenes import open_scene
 from reports.run.timing import Sample
 from reports.run.worker_process import Failure
-from reports.speed import budget, ladder, models, sizes
+from reports.speed import budget, cheapest, ladder, scored_part, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept
 from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
@@ -45,7 +45,7 @@ class Measured:
         samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place,
             cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes;
             of the kinds of `stepping.overheads` in s each.
-        truths: as `models.closed_form` gives them.
+        truths: as `cheapest.closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.
         stopped: (`engine:profile`, number of disks) -> why it was not measured with so many.
@@ -83,7 +83,7 @@ def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach
     """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
     have none are reported."""
     # In workers, which can be stopped at any time.
-    asked = {seeded: partial(ladder.reach_of, *seeded) for seeded in plan.seeded_scenes}
+    asked = {seeded: partial(scored_part.reach_of, *seeded) for seeded in plan.seeded_scenes}
     results = dict(done(asked, plan.workers, progress, "exact answer"))
     reach = {}
     for (scene, seed), result in results.items():
@@ -131,24 +131,8 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
         HANGS,
     ):
         if isinstance(result, Failure):
-            engine, profile = measurement.name.split(":")
-            scenario = open_scene(measurement.scene, measurement.seed)
-            result = [
-                {
-                    "scenario": scenario.name,
-                    "seed": measurement.seed,
-                    "engine": engine,
-                    "profile": profile,
-                    "dt_s": scenario.dt(k),
-                    "substeps": k,
-                    "status": result.status,
-                    "reason": result.reason,
-                    "until_s": ladder.scored(measurement.scene, measurement.seed).scenario.duration,
-                    "duration_s": scenario.duration,
-                    "error_radii": float("inf"),
-                    "change_radii": float("nan"),
-                }
-            ]
+            asked = measurement.scene, measurement.seed, measurement.name, k
+            result = [ladder.error_row(*asked, result.status, result.reason)]
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
 
@@ -161,7 +145,7 @@ def measure_budget(
         ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
         for scene in plan.budget_scenes
         for name in plan.engines
-        if name in KNOWN and reach[scene, plan.seed]
+        if name in MECHANISMS and reach[scene, plan.seed]
     }
     results = dict(done(tasks, plan.workers, progress, "error budget", kept=kept))
     for task, result in results.items():
@@ -216,7 +200,7 @@ def timings(
             scene_rows, kind, scene, plan.seed, in_turns(list(group)), repeats
         )
         if kind == SCENE:
-            tasks["time", TRUTH, scene] = partial(models.closed_form, scene, plan.seed)
+            tasks["time", TRUTH, scene] = partial(cheapest.closed_form, scene, plan.seed)
     if plan.whole:
         tasks["time", SIZE] = partial(size_rows, makes, plan, repeats)
     return tasks

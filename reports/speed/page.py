@@ -19,8 +19,8 @@ from reports.page.links import neighbours
 from reports.run.scenes import open_scene
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
-from reports.speed.ladder import scored
 from reports.speed.results import Results
+from reports.speed.scored_part import scored
 from reports.speed.versus import OWN
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import put_text

@@ -132,7 +132,7 @@ class SpeedPlan:
             yield Measurement(
                 SWEEP, scene, seed, sweep.engine, PLAIN, row_of(sweep.engine).make, around(here)
             )
-            for value in sweep.values:
+            for value in sweep.parameter.values:
                 yield Measurement(
                     SWEEP, scene, seed, sweep.name, str(value), sweep.at(value), (here,)
                 )

@@ -19,7 +19,7 @@ from reports.compare.pareto import (
 )
 from reports.compare.pooling import POOLED, pooled
 from reports.run.scenes import open_scene
-from reports.speed import explained, models, tables, versus
+from reports.speed import cheapest, explained, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
 from reports.terminal.foreign_text import put_text
@@ -206,8 +206,8 @@ class Results:
 
     @cached_property
     def models(self) -> pd.DataFrame:
-        """See `models.cheapest`."""
-        return models.cheapest(self.measured.truths, self.points)
+        """See `cheapest.cheapest_models`."""
+        return cheapest.cheapest_models(self.measured.truths, self.points)
 
     def order_table(self, scene: str) -> pd.DataFrame:
         """A row for each engine: order with interval and verdict, and for every accuracy (cost, dt,

@@ -36,7 +36,9 @@ def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
         return pd.DataFrame()
     found = summed(measured, SWEEP, seed)
     places = {
-        (sweep.name, str(value)): k for sweep in SWEEPS for k, value in enumerate(sweep.values)
+        (sweep.name, str(value)): k
+        for sweep in SWEEPS
+        for k, value in enumerate(sweep.parameter.values)
     }
     names = found.engine + ":" + found.profile
     turned = [places.get(who, -1) for who in zip(names, found.change)]

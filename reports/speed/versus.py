@@ -11,11 +11,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from adapters.engines import ENGINES
 from adapters.mechanisms.table import MECHANISMS
 from reports.speed.plan import PLAIN
 
 OWN = "reference:exercise"
-COMPARED = tuple(name for name in MECHANISMS if name != OWN)
+COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != OWN)
 COLUMNS = [
     "engine",
     "profile",

@@ -21,7 +21,7 @@ from adapters.mechanisms.table import (
     FLIGHT,
     FRICTION,
     IMPULSE,
-    KNOWN,
+    MECHANISMS,
     POSITION_CORRECTION,
     RECYCLING,
     RESTITUTION,
@@ -137,7 +137,7 @@ class Ablations:
             limit.failing,
             search.engine.split("+"),
         )
-        if seen is None or failing is None or seen[1].trajectory is None or name not in KNOWN:
+        if seen is None or failing is None or seen[1].trajectory is None or name not in MECHANISMS:
             return None
         judged, run = seen
         scene, runs = search.case.scene, failing.runs

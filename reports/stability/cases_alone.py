@@ -152,12 +152,12 @@ def oscillator(x: float, _run: int) -> Scenario:
     )
 
 
-def on_spring(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
+def on_spring(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """Play a disk with the force -x N, read from its position before every step, as a user of an
     engine would write it."""
     states: list[State] = []
     status, reason, settings = "ok", "", {}
-    with closing(variant.make()) as engine:
+    with closing(driven.make()) as engine:
         try:
             engine.load(scenario.scene, scenario.sample_interval)
             settings = engine.settings()
@@ -171,7 +171,7 @@ def on_spring(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]
                     break
         except Unsupported as refusal:
             status, reason = "unsupported", str(refusal)
-    name, profile = variant.name.split(":")
+    name, profile = driven.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
     return scenario, Run(
         name,

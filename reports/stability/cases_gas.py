@@ -133,11 +133,11 @@ def against(other: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
     """The scenario, with another run of the same engine in place of the exact answer."""
     if other.status != "ok" or other.trajectory is None:
         return scenario, other
-    beside: Trajectory = other.trajectory
-    return replace(scenario, truth=lambda _: beside), run
+    instead: Trajectory = other.trajectory
+    return replace(scenario, truth=lambda _: instead), run
 
 
-def reversed_order(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
+def reversed_order(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """The same gas with its disks inserted in the opposite order, compared with the gas in its
     own order."""
     scene = scenario.scene
@@ -145,10 +145,10 @@ def reversed_order(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario,
     turned = replace(
         scenario, scene=replace(scene, **{name: getattr(scene, name)[::-1] for name in names})
     )
-    run = played(variant, turned)
+    run = played(driven, turned)
     if run.trajectory is not None:
         run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
-    return against(played(variant, scenario), run, scenario)
+    return against(played(driven, scenario), run, scenario)
 
 
 def renumbered(played: Trajectory, n: int) -> Trajectory:
@@ -168,10 +168,10 @@ def renumbered(played: Trajectory, n: int) -> Trajectory:
     )
 
 
-def restarted(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
+def restarted(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """The gas stopped half-way, read and loaded into a new engine, compared with the gas played
     without a stop."""
-    whole = played(variant, scenario)
+    whole = played(driven, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
     half = scenario.intervals // 2
@@ -184,7 +184,7 @@ def restarted(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]
         angular_velocity=state.angular_velocity,
     )
     left = (scenario.intervals - half) * scenario.sample_interval
-    rest = played(variant, replace(scenario, scene=fresh, duration=left))
+    rest = played(driven, replace(scenario, scene=fresh, duration=left))
     if rest.status != "ok" or rest.trajectory is None:
         return scenario, rest
     before, after = whole.trajectory, rest.trajectory
@@ -322,7 +322,7 @@ GAS = (
         runs=SEEDS,
         whole=True,
         play=reversed_order,
-        beside=OTHER,
+        shown_with=OTHER,
         quick_values=(10.0, 50.0, 200.0, 1000.0),
         ratio=1.5,
     ),
@@ -338,7 +338,7 @@ GAS = (
         runs=SEEDS,
         whole=True,
         play=restarted,
-        beside="played through",
+        shown_with="played through",
         quick_values=(10.0, 50.0, 200.0, 1000.0),
         ratio=1.5,
     ),

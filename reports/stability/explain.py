@@ -58,10 +58,8 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
         return limit
     reason = reason_of(limit)
     if reason is None:
-        varied = (
-            CASES[limit.case].parameter if limit.case in CASES else limit.case.rsplit(":", 1)[-1]
-        )
-        text, source, tested = reason_by_intervention(limit, varied)
+        varies = CASES[limit.case].varies if limit.case in CASES else limit.case.rpartition(":")[2]
+        text, source, tested = reason_by_intervention(limit, varies)
         return replace(limit, reason=text, source=source, tested=tested)
     tests = tests_of(limit, reason, by_name)
     if limit.mechanisms:
@@ -102,6 +100,5 @@ def farther(one: Limit, other: Limit) -> bool:
     """Whether `one` fails at a harsher value than the other, or not at all."""
     if one.verdict == NEVER_FAILS:
         return other.verdict != NEVER_FAILS
-    values = CASES[one.case].values
-    harsher = 1 if values[-1] > values[0] else -1
+    harsher = CASES[one.case].harsher
     return harsher * one.fails_at > harsher * other.fails_at

@@ -34,7 +34,7 @@ def keep_failure(search: LimitSearch, limit: Limit, folder: Path) -> None:
     path.write_bytes(packed(part_of(run.trajectory, shown, scenario), small=True))
     with suppress(NoTruth):
         if scenario.truth is not None:
-            beside_file(path).write_bytes(
+            companion_file(path).write_bytes(
                 packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True)
             )
 
@@ -47,9 +47,9 @@ def kept_failure(
     path = file_of(limit, folder)
     if not path.exists() or limit.failing is None:
         return None
-    beside = beside_file(path)
+    companion = companion_file(path)
     try:
-        found = load_trajectory(path), load_trajectory(beside) if beside.exists() else None
+        found = load_trajectory(path), load_trajectory(companion) if companion.exists() else None
     except UNREADABLE:  # damaged by a crash; the limit itself is in the journal
         return None
     most = len(near(limit.failing, scenario))
@@ -90,8 +90,8 @@ def file_of(limit: Limit, folder: Path) -> Path:
     return folder / "trajectories" / f"{name}.npz"
 
 
-def beside_file(path: Path) -> Path:
-    """The file of the trajectory shown with it."""
+def companion_file(path: Path) -> Path:
+    """The file of the trajectory that is shown with the failing run of the file `path`."""
     return path.with_name(f"beside.{path.name}")
 
 

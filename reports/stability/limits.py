@@ -11,7 +11,7 @@ from math import nan, sqrt
 from adapters.engines import DISTINCT
 from adapters.run import Run
 from reports.stability.predicates import Predicate
-from reports.stability.variants import VARIANTS, WITH_FRICTION_ONLY, DrivenEngine, played
+from reports.stability.variants import DRIVEN_ENGINES, WITH_FRICTION_ONLY, DrivenEngine, played
 from scenarios.model import Scenario
 
 EXACT, NOT_KNOWN = "the exact answer", "not known"
@@ -51,9 +51,9 @@ FULL = Form("full", few=ALL, ratio=1.01, whole=True)
 FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
-def once(variant: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
+def once(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     """One run, judged by the scenario's own truth or by the laws of physics."""
-    return scenario, played(variant, scenario)
+    return scenario, played(driven, scenario)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Case:
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
             seeds.
         whole: whether the parameter counts something.
-        also: engines of `VARIANTS` besides those of `ENGINES`: an engine with one thing changed.
+        also: variants, keys of `DRIVEN_ENGINES`, that play it besides the engines of `ENGINES`.
         play: engine and scenario -> the run and what it is judged by, where that takes more than
             one call of `play`.
         quick_values: to scan in the quick form, where a run is long: some of `values`.
@@ -82,7 +82,7 @@ class Case:
             much.
         by_chance: share of the runs at a value that may fail by chance, where what is read is a
             statistic or the worst of it depends on what is sampled.
-        beside: what a failing run is shown beside.
+        shown_with: what a failing run is shown with.
         report: a scene of the report that asks something alike; `overview.in_report` says how the
             two differ.
     """
@@ -103,7 +103,7 @@ class Case:
     refines: bool = True
     ratio: float = 1.0
     by_chance: float = 0.0
-    beside: str = EXACT
+    shown_with: str = EXACT
     report: str = ""
 
     @property
@@ -177,7 +177,7 @@ class Limit:
     """What a search found; plain numbers and text, so that it goes into a journal as it is.
 
     Attributes:
-        case, engine: names; the engine is a key of `VARIANTS`.
+        case, engine: names; the engine is a key of `DRIVEN_ENGINES`.
         form: of `FORMS`.
         verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or
             "works only beyond" (at works_at, and not at the gentler fails_at).
@@ -194,8 +194,10 @@ class Limit:
         intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was
             found, or looked for.
         mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; ""
-        likewise. reason, source, tested: why, where that stands, and how it was tested: "" is a
-            likely reason.
+            if none were found, or looked for.
+        reason, source: why, and where that stands.
+        tested: how the reason was tested; "": it is a likely one.
+        status: "ok", or why the search was lost, as in `STATUSES` of run.py.
     """
 
     case: str
@@ -255,9 +257,11 @@ class Limit:
 
 def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
     """The engines that play a case: these rows of `ENGINES`, and the variants that the case
-    names, in the order of `VARIANTS`.
+    names, in the order of `DRIVEN_ENGINES`.
 
     An engine that only adds friction to another plays only the cases that name it.
     """
-    rows_alone = [name for name in VARIANTS if name in rows and name not in WITH_FRICTION_ONLY]
-    return [name for name in VARIANTS if name in rows_alone or name in case.also]
+    rows_alone = [
+        name for name in DRIVEN_ENGINES if name in rows and name not in WITH_FRICTION_ONLY
+    ]
+    return [name for name in DRIVEN_ENGINES if name in rows_alone or name in case.also]

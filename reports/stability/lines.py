@@ -79,7 +79,7 @@ class StabilityFooterLine(Line):
 
 
 class TaskOf(Line):
-    """As `Task`."""
+    """The part of a line of the journal that names a `Task`."""
 
     kind: Literal["limit", "map", "law"]
     name: File
@@ -88,7 +88,7 @@ class TaskOf(Line):
 
 
 class TrialRow(Line):
-    """As `Trial`."""
+    """The part of a line of the journal that holds a `Trial`."""
 
     value: Number
     runs: Annotated[int, Field(ge=1, le=MOST)]
@@ -104,7 +104,7 @@ class TrialRow(Line):
 
 
 class LimitRow(Line):
-    """As `Limit`."""
+    """The part of a line of the journal that holds a `Limit`."""
 
     case: File
     engine: EngineProfile
@@ -125,7 +125,8 @@ class LimitRow(Line):
 
 
 class MapRow(Line):
-    """As `MapOf`; a cell is x, y, reading, whether it failed, what broke."""
+    """The part of a line of the journal that holds a `MapOf`; a cell is x, y, reading, whether it
+    failed, what broke."""
 
     name: Literal[tuple(MAPS)]  # type: ignore[valid-type]
     engine: EngineProfile
@@ -148,7 +149,7 @@ class MapRow(Line):
 
 
 class LawRow(Line):
-    """As `LawOf`; a gap is as `AtGap`."""
+    """The part of a line of the journal that holds a `LawOf`; a gap has the fields of `AtGap`."""
 
     name: Literal[tuple(TOUCHING)]  # type: ignore[valid-type]
     engine: EngineProfile
@@ -190,7 +191,8 @@ def number_like(value: Any) -> bool:
 
 
 class StabilityTaskLine(Line):
-    """What a task gave: one of the three, under the name of its kind."""
+    """The line of the journal that holds the result of a task: one of the three, under the name of
+    its kind."""
 
     task: TaskOf
     limit: LimitRow | None = None

@@ -21,7 +21,6 @@ from scenarios.catalogue import scenario
 from scenarios.model import Scenario
 
 WITH_FRICTION = {case.name for case in FRICTION}
-EVERYWHERE = {"never": "everywhere"}  # the table shows where an engine fails, not where it works
 
 
 class LimitCell(NamedTuple):
@@ -58,10 +57,9 @@ def cell_of(case: Case, limit: Limit | None) -> LimitCell:
     if limit.verdict == NEVER_FAILS:
         return LimitCell(limit.word, f"does not fail up to {number(limit.works_at)}", 0)
     if limit.word:
-        return LimitCell(EVERYWHERE.get(limit.word, limit.word), remark, -1, True)
-    values = list(case.values)
-    harsher = 1 if values[-1] > values[0] else -1
-    passed = sum(harsher * value < harsher * limit.fails_at for value in values) / len(values)
+        return LimitCell(limit.word, remark, -1, True)
+    gentler = sum(case.harsher * value < case.harsher * limit.fails_at for value in case.values)
+    passed = gentler / len(case.values)
     text = limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
     return LimitCell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
 

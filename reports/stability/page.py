@@ -144,11 +144,11 @@ def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
     kept = kept_failure(limit, folder, scenario)
     if kept is None or failing.disk >= scenario.scene.n:
         return None
-    played, beside = kept
+    played, companion = kept
     shown = near(failing, scenario)
     layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
-    if beside is not None and len(beside):
-        layers.append((None, beside))
+    if companion is not None and len(companion):
+        layers.append((None, companion))
     pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
     says = f"{case.parameter} = {style.number(failing.value)}: {failing.event}"
     return Replay(limit.engine, pack, ratio_of(scenario, layers), says)

@@ -20,7 +20,7 @@ from reports.stability.limits import (
     Trial,
 )
 from reports.stability.predicates import Reading, judge
-from reports.stability.variants import VARIANTS
+from reports.stability.variants import DRIVEN_ENGINES
 from scenarios.model import Scenario
 
 
@@ -75,7 +75,7 @@ class LimitSearch:
             if failed > self.allowed and not (self.form.whole or to_the_end):
                 break
             scenario, run = self.case.play(
-                VARIANTS[self.engine], self.case.scene(value, len(readings))
+                DRIVEN_ENGINES[self.engine], self.case.scene(value, len(readings))
             )
             readings.append(judge(self.case.predicate, scenario, run))
             failed += readings[-1].failed

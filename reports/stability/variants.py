@@ -1,5 +1,5 @@
-"""The engines that are tested: every row of `ENGINES`, and engines with one thing changed, by
-which a reason is tested."""
+"""The engines that are tested: every row of `ENGINES`, and its variants: engines with one thing
+changed, by which a reason is tested."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from scenarios.model import Scenario, Scene
 
 
 class DrivenEngine(NamedTuple):
-    """A name, engine:profile; a function that makes the engine; and what is changed in it, ""
-    for a row of `ENGINES`."""
+    """An engine or a variant: its name, `engine:profile` or `engine:profile+variant`; the function
+    that makes it; and what is changed in it, "" for an engine as in its row."""
 
     name: str
     make: Callable[[], Engine]
     change: str = ""
 
 
-class Changed:
+class ChangedOnceLoaded:
     """An engine with one thing changed right after `load`; all other calls are passed on."""
 
     def __init__(self, engine: Engine, change: Callable[[Any], None]) -> None:
@@ -40,31 +40,29 @@ class Changed:
         return getattr(self.engine, name)
 
 
-def varied(name: str, variant: str) -> Any:
+def make_variant(name: str, variant: str) -> Any:
     """The engine of a row of `ENGINES`, changed as one of the row's variants says."""
     settings, _, loaded = ENGINES[name].variants[variant]
     engine = changed(name, **settings)
-    return Changed(engine, loaded) if loaded else engine
+    return ChangedOnceLoaded(engine, loaded) if loaded else engine
 
 
 def with_variant(variant: str) -> tuple[str, ...]:
-    """The keys in `VARIANTS` of all engines that have this variant."""
+    """The keys in `DRIVEN_ENGINES` of all engines that have this variant."""
     return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
 
 
 WITH_FRICTION_ONLY = tuple(name for name, row in ENGINES.items() if row.adds_friction)
 
-CHANGED = tuple(
-    DrivenEngine(f"{name}+{variant}", partial(varied, name, variant), what)
+# `engine:profile`, and after all of these `engine:profile+variant` -> the engine.
+DRIVEN_ENGINES: dict[str, DrivenEngine] = {
+    name: DrivenEngine(name, row.make) for name, row in ENGINES.items()
+} | {
+    f"{name}+{variant}": DrivenEngine(
+        f"{name}+{variant}", partial(make_variant, name, variant), what
+    )
     for name, row in ENGINES.items()
     for variant, (_, what, _) in row.variants.items()
-)
-VARIANTS: dict[str, DrivenEngine] = {
-    variant.name: variant
-    for variant in (
-        *(DrivenEngine(name, row.make) for name, row in ENGINES.items()),
-        *CHANGED,
-    )
 }
 
 
@@ -73,19 +71,19 @@ def taking_part(rows: Mapping[str, EngineRow]) -> Iterator[None]:
     """In this context engines' own files, `PATH:own`, and rows of `FETCHED` are tested in this
     process like the rows of `ENGINES`."""
     ENGINES.update(rows)
-    VARIANTS.update({name: DrivenEngine(name, row.make) for name, row in rows.items()})
+    DRIVEN_ENGINES.update({name: DrivenEngine(name, row.make) for name, row in rows.items()})
     try:
         yield
     finally:
         for name in rows:
-            del ENGINES[name], VARIANTS[name]
+            del ENGINES[name], DRIVEN_ENGINES[name]
 
 
-def played(variant: DrivenEngine, scenario: Scenario) -> Run:
+def played(driven: DrivenEngine, scenario: Scenario) -> Run:
     """Play a scenario at its only step size."""
-    return play_once(variant.make, variant.name, scenario, scenario.dt(scenario.substeps[0]))
+    return play_once(driven.make, driven.name, scenario, scenario.dt(scenario.substeps[0]))
 
 
 def play_as(engine: str, scenario: Scenario) -> Run:
-    """`played`, by a key of `VARIANTS`, or a row that does not take part."""
-    return played(VARIANTS.get(engine) or DrivenEngine(engine, row_of(engine).make), scenario)
+    """`played`, by a key of `DRIVEN_ENGINES`, or a row that does not take part."""
+    return played(DRIVEN_ENGINES.get(engine) or DrivenEngine(engine, row_of(engine).make), scenario)

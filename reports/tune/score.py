@@ -36,7 +36,8 @@ class TrialScores(NamedTuple):
             radii, at least `FLOOR`; inf where a scene was refused or failed, nan where there is no
             exact answer.
         gained: (s, k) energy over the energy at hand: at e = 1 the largest change, else the largest
-        rise. missed, spurious: (s, k) collisions.
+            rise.
+        missed, spurious: (s, k) collisions.
     """
 
     error: Array

@@ -17,7 +17,7 @@ from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.truth.oracle.path import Path
 from scenarios.truth.oracle.work import TimeLimit, WorkLimit
-from scenarios.truth.record import TruthRecord, record_of
+from scenarios.truth.record import TruthRecord, last_time, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # the tie is 2^-(bits / 2), below the eps of float64
 LEAST_GAIN = 1.05  # 1.5 times the bits must reach 1.05 times as far, else more bits do not help
@@ -77,11 +77,6 @@ class OracleTruth:
         return TruthRecord(**found)
 
 
-def oracle_truth(scenario: Scenario) -> Callable[[Array], Trajectory]:
-    """Times (k,) s -> the exact `Trajectory` of `scenario` at those: see `OracleTruth`."""
-    return OracleTruth(scenario)
-
-
 def answered_by(scenario: Scenario) -> str:
     """What gives the truth of a scenario: `CLOSED_FORM`, `EVENT_DRIVEN` or `NOTHING`."""
     if scenario.truth is None:
@@ -91,7 +86,7 @@ def answered_by(scenario: Scenario) -> str:
 
 def with_oracle(scenario: Scenario) -> Scenario:
     """The scenario with the oracle for its truth."""
-    return replace(scenario, truth=oracle_truth(scenario), without_truth="")
+    return replace(scenario, truth=OracleTruth(scenario), without_truth="")
 
 
 def computed(
@@ -188,10 +183,7 @@ def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float
     table, end = widths(path), min(path.end, until)
     if (most := widest(table, end)) < accuracy:
         return end, most
-    held, lost = 0.0, end
-    for _ in range(64):  # halvings
-        middle = (held + lost) / 2
-        held, lost = (middle, lost) if widest(table, middle) < accuracy else (held, middle)
+    held = last_time(lambda t: widest(table, t) < accuracy, end)
     return held, widest(table, held)
 
 

@@ -111,11 +111,14 @@ class TangentVectors:
 
     Attributes:
         moving: the disks that are not static.
-        t: (n,) s, the time up to which each disk has been carried; `leg`: (n,) the index of its leg
-            then. dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, the deviations of each disk then,
-            for each of the d numbers. collided_at, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, the
-            time of the last collision of each disk, and its velocity after that.
-        instant: s, the latest collision; `late`: (d,) s, its delay for each deviation.
+        t: (n,) s, the time up to which each disk has been carried.
+        leg: (n,) the index of its leg then.
+        dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, the deviations of each disk then, for each of
+            the d numbers.
+        collided_at, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, the time of the last collision of
+            each disk, and its velocity after that.
+        instant: s, the latest collision.
+        late: (d,) s, its delay for each deviation.
         diverged: s, when the first disk diverges; inf: none has so far.
     """
 

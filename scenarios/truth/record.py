@@ -3,7 +3,7 @@ time and reason of its end, and what still holds after it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -175,16 +175,22 @@ def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
     room = (DIVERGED * float(scenario.scene.radius.min()) - error) / ROUNDINGS
     if reach(legs, end) <= room:
         return path
-    held, lost = 0.0, end
-    for _ in range(64):  # halvings: to the last place of float64
-        held, lost = (
-            (middle, lost) if reach(legs, middle := (held + lost) / 2) <= room else (held, middle)
-        )
+    held = last_time(lambda t: reach(legs, t) <= room, end)
     reason = (
         f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t ="
         f" {held:.9g} s on"
     )
     return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
+
+
+def last_time(holds: Callable[[float], bool], end: float) -> float:
+    """The time in s, to the last place of float64, up to which `holds` is true: it is true from 0
+    on, and then false up to `end`."""
+    held, lost = 0.0, end
+    for _ in range(64):  # halvings
+        middle = (held + lost) / 2
+        held, lost = (middle, lost) if holds(middle) else (held, middle)
+    return held
 
 
 def legs_of(path: Path, end: float) -> Array:

@@ -513,7 +513,7 @@ def test_a_solver_that_calls_gl_matrix_gets_the_one_that_is_fetched(tmp_path):
     text = (CORRECT / "gl_vec3.js").read_text("utf-8")
     (tmp_path / "Exercise.js").write_text(text, "utf-8")
     solver = read_solver(tmp_path / "Exercise.js")
-    assert [name for name, _ in solver.beside] == ["gl-matrix-min.js"]
+    assert [name for name, _ in solver.imported] == ["gl-matrix-min.js"]
     with SolverProcess(solver) as process:
         assert process.functions
 

@@ -16,7 +16,7 @@ import pytest
 from adapters.conformance.conform import ask, conform
 from adapters.engine_row import EngineRow
 from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_engine.models import FEATURES
+from adapters.own_engine.features import FEATURES
 from adapters.own_solver.file import NotASolver
 from adapters.own_solver.process import SolverProcess
 from adapters.play import play, play_once

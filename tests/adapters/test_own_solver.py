@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from adapters.conformance.conform import ask, conform
-from adapters.own_solver.engine import engine_file
+from adapters.own_engine.engine import row_of_file
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import own_restitution
 from adapters.play import play
@@ -32,7 +32,7 @@ def test_a_file_plays_as_an_engine(name: str):
     language."""
     flight = scenario("ship_thrust")
     runs = {}
-    for row in (engine_file(RIGHT.parent / name), engine_file(RIGHT)):
+    for row in (row_of_file(RIGHT.parent / name), row_of_file(RIGHT)):
         engine = row.make()
         runs[row.summary] = play(engine, "x:own", flight, flight.dt(4))
         engine.close()
@@ -59,7 +59,7 @@ def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(SolverProcess, "do", noted)
     states = []
     for collected in (True, False):
-        with closing(engine_file(RIGHT.parent / name, collected=collected).make()) as engine:
+        with closing(row_of_file(RIGHT.parent / name, collected=collected).make()) as engine:
             engine.load(asteroid_field(0, 3, 0.9), 1 / 1024)
             for force in [0.5] * 16 + [0.25] * 4 + [0.0] * 3:
                 if force:
@@ -84,7 +84,7 @@ def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
 )
 def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
     """Its restitution is written into it, and it has neither walls nor friction."""
-    engine = engine_file(RIGHT).make()
+    engine = row_of_file(RIGHT).make()
     question = scenario(scene)
     played = play(engine, "x:own", question, question.dt(question.substeps[0]))
     engine.close()
@@ -137,7 +137,7 @@ def test_what_a_file_does_is_the_status_of_its_cell(
         assert old in text
         text = text.replace(old, new)
     (tmp_path / "Exercise.js").write_text(text)
-    engine = engine_file(tmp_path / "Exercise.js", patience=1.0).make()
+    engine = row_of_file(tmp_path / "Exercise.js", patience=1.0).make()
     question = scenario(scene)
     played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
     engine.close()
@@ -166,7 +166,7 @@ LACKING = {"integrate_missing.js", "integrate_missing.py"}
 def test_a_faulty_file_is_played(tmp_path: Path, mutant: Mutant):
     """Every mutant of the catalogue: refused only for a function that it lacks, and then that is
     the reason; where it ends in no numbers or throws, what came before can be watched."""
-    engine = engine_file(mutant.write(tmp_path), patience=2.0).make()
+    engine = row_of_file(mutant.write(tmp_path), patience=2.0).make()
     question = scenario("head_on_equal_e09")
     played = play(engine, "x:own", question, question.dt(question.substeps[0]))
     engine.close()
@@ -221,7 +221,7 @@ def test_a_probe_tells_wrong_physics_from_a_broken_protocol_in_a_file(
 ):
     """What is wrong in the file's physics departs and is scored, also what throws or gives no
     numbers; state that it keeps breaks; what the exercise has not is not asked."""
-    found = ask("x", "own", probe, engine_file(changed(tmp_path, changes)))
+    found = ask("x", "own", probe, row_of_file(changed(tmp_path, changes)))
 
     assert (found.verdict, found.note.partition(" (line")[0]) == (verdict, note)
 
@@ -248,7 +248,7 @@ IN_THE_GATE = ("dt_squared.js", "state_in_a_list.py")  # one of each kind
 )
 def test_only_a_file_that_breaks_the_protocol_is_not_scored(tmp_path: Path, mutant: Mutant):
     """By all probes: wrong physics misses some of them and is scored."""
-    found = conform("x:own", engine_file(mutant.write(tmp_path), patience=2.0))
+    found = conform("x:own", row_of_file(mutant.write(tmp_path), patience=2.0))
     broken = {finding.probe for finding in found if finding.verdict == "breaks"}
 
     if mutant.name in BREAKING:
@@ -261,7 +261,7 @@ def test_a_file_without_collisions_plays_a_lone_disk(tmp_path: Path):
     """Nothing of it is missing there; where two meet, the function is."""
     text = RIGHT.read_text().replace("function sphereSphere", "function laterSphereSphere")
     (tmp_path / "Exercise.js").write_text(text)
-    row = engine_file(tmp_path / "Exercise.js")
+    row = row_of_file(tmp_path / "Exercise.js")
     statuses = {}
     for name in ("ship_thrust", "head_on_equal_e09"):
         engine, question = row.make(), scenario(name)
@@ -314,7 +314,7 @@ def test_collected_steps_give_the_same_bits(name: str):
     flight = asteroid_field(1, 6, 0.9)
     states, collisions = [], []
     for collected in (False, True):
-        engine = engine_file(RIGHT.parent / name, collected=collected).make()
+        engine = row_of_file(RIGHT.parent / name, collected=collected).make()
         engine.load(flight, 1 / 128)
         for k in range(300):
             engine.apply_force(0, np.array([1.0, 0.5 * k]), 0.1)
@@ -337,7 +337,7 @@ def test_a_file_that_ends_its_process_is_a_crash(tmp_path: Path):
     (tmp_path / "solver.py").write_text(
         text.replace("    sphere.alpha +=", "    import os; os._exit(3)\n    sphere.alpha +=")
     )
-    engine = engine_file(tmp_path / "solver.py").make()
+    engine = row_of_file(tmp_path / "solver.py").make()
     question = scenario("head_on_equal_e09")
     played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
     engine.close()

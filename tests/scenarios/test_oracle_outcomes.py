@@ -12,7 +12,7 @@ import pytest
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Scene, Thrust
-from scenarios.no_truth import NoTruth, truth_at
+from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed, with_oracle
 from scenarios.truth.oracle import contact_finder
 from scenarios.truth.oracle.numbers import mpfr
@@ -289,9 +289,8 @@ def test_what_can_still_be_said_is_said():
     assert len(wedge.remains) == 1
 
 
-def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
-    """`truth_at` names the time, the horizon and the reason; `truth` gives what is known, be it
-    nothing."""
+def test_past_its_horizon_the_truth_is_cut():
+    """It gives what is known, be it nothing, and the reason; past the duration it is not asked."""
     for one, reason in (
         (with_oracle(asked(BREAK, 4.0)), "(2 outcomes)"),
         (scenario("disk_between_static_disks"), "the unstable orbit"),
@@ -299,17 +298,11 @@ def test_past_its_horizon_the_truth_is_refused_or_cut_as_one_asks():
         until = one.truth(one.times).horizon
         before, after = np.array([0.0, until * 0.99]), np.array([until * 1.01])
 
-        assert len(truth_at(one, before)) == 2
+        assert len(one.truth(np.append(before, after))) == 2
         assert len(one.truth(after)) == 0
-        with pytest.raises(
-            NoTruth, match=r"the truth of .* ends at its horizon at .* s"
-        ) as refusal:
-            truth_at(one, np.append(before, after))
-        assert f"t = {after[0]:.9g} s" in str(refusal.value)
-        assert reason in str(refusal.value)
-        assert refusal.value.at == until
+        assert reason in one.truth(before).reason
     with pytest.raises(ValueError, match="is known up to 4 s"):
-        truth_at(with_oracle(asked(BREAK, 4.0)), np.array([5.0]))
+        with_oracle(asked(BREAK, 4.0)).truth(np.array([5.0]))
 
 
 def test_what_is_said_of_one_disk_is_said_in_the_singular():

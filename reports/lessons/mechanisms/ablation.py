@@ -118,8 +118,8 @@ def setting_rows(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
 
 
 def filmed(scenario: Scenario, runs: Sequence[Run]) -> Any:
-    """For the engine of the page, which shows the runs at the step of the scenario, and the exact
-    answer if any."""
+    """What the player of the page shows: the runs at the step of the scenario, and the exact answer
+    if there is one."""
     seen = replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),))
     seen, truth = answered(seen if seen.truth else with_oracle(seen))
     return Simulation(seen, runs, truth).film

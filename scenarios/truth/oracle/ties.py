@@ -164,9 +164,10 @@ class CollisionLaw:
         """Every distinct outcome of resolving the approaching contacts, over all orders, each with
         one of its orders; and the number of collisions that were tried.
 
-        still: contacts with exactly no speed along their normal. stays_still: whether a collision
-        on one contact keeps another one `still`. If some order does not end, the last outcome has
-        no velocities.
+        still: contacts with exactly no speed along their normal.
+        stays_still: whether a collision on one contact keeps another one `still`.
+
+        If some order does not end, the last outcome has no velocities.
         """
         sign, ends = self.numbers.sign, list[TieOutcome]()
         waiting = [TieOutcome(v, [], still)]

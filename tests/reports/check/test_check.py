@@ -320,7 +320,7 @@ def test_gl_matrix_is_there_for_who_calls_it_and_for_nobody_else(tmp_path: Path)
 
     assert library_read(tmp_path / "with.js") == 1.0
     assert library_read(tmp_path / "without.js") == 0.0
-    assert read_solver(tmp_path / "without.js").beside == ()
+    assert read_solver(tmp_path / "without.js").imported == ()
 
 
 @pytest.mark.slow
@@ -392,7 +392,10 @@ def test_gl_matrix_is_read_once_and_decides_what_the_solver_is(tmp_path: Path):
     with SolverProcess(before) as process:
         assert ask(process, {"force": QUESTIONS["force"]})["force"].last[0].alpha == 1.0
 
-    assert (before.digest, [name for name, _ in before.beside]) == (after.digest, ["gl-matrix.js"])
+    assert (before.digest, [name for name, _ in before.imported]) == (
+        after.digest,
+        ["gl-matrix.js"],
+    )
     assert before.source != after.source
 
 

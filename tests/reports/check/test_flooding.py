@@ -87,7 +87,7 @@ def test_a_name_that_no_file_can_have_is_a_sentence(tmp_path, words: tuple[str, 
 def test_a_module_that_no_file_can_have_is_not_beside_a_solver(tmp_path):
     """It is then missing as any other is, when the solver runs."""
     (tmp_path / "mine.py").write_text(f"import {'a' * 300}\n")
-    assert read_solver(tmp_path / "mine.py").beside == ()
+    assert read_solver(tmp_path / "mine.py").imported == ()
 
 
 def test_a_folder_that_is_called_as_a_solver_is_none(tmp_path):

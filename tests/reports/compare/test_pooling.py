@@ -13,6 +13,7 @@ from reports.compare.pooling import middle_half, moved, pooled, said_of_pool
 from reports.run.scenes import open_scene
 from reports.speed import ladder
 from reports.speed.effort import QUICK
+from reports.speed.scored_part import scored
 from scenarios.model import Array
 
 MOST = 2.0  # the factor by which leaving out one scene of the quick form may move a pooled error
@@ -108,7 +109,7 @@ def test_the_scenes_and_the_median_of_before_fail_both():
     free_fall's own closed form, a g dt t / 2 over the radius, at every step.
     """
     errors = errors_of(BEFORE, STEPPING)
-    fall = ladder.scored("free_fall", 0).scenario
+    fall = scored("free_fall", 0).scenario
     g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
     for step_size in range(STEP_SIZES):
         medians = np.percentile(errors["reference:exercise", step_size], 50, method="nearest")

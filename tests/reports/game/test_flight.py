@@ -19,7 +19,7 @@ from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.first_collisions import first_collisions
-from adapters.own_solver.engine import Student
+from adapters.own_solver.engine import OwnSolver
 from adapters.play import play
 from reports.game.divergence import (
     NEVER,
@@ -338,7 +338,7 @@ def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.M
     assert flight.frame == 10
 
 
-class Meeting(Student):
+class Meeting(OwnSolver):
     """A file that steps only while another does: side by side, or never. Its engine is the
     reference."""
 

@@ -20,8 +20,7 @@ from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
 
 from adapters.engines import ENGINES
-from adapters.own_engine.engine import TEMPLATES
-from adapters.own_solver.engine import engine_file
+from adapters.own_engine.engine import TEMPLATES, row_of_file
 from adapters.own_solver.process import SolverProcess
 from reports.check.verdict import check_file
 from reports.commands.own_solvers import checked
@@ -388,7 +387,7 @@ def test_a_frame_under_thrust_is_one_exchange_with_the_file(
 
     exchange = SolverProcess.exchange
     monkeypatch.setattr(SolverProcess, "exchange", counted)
-    monkeypatch.setitem(ENGINES, "x:own", engine_file(solver(tmp_path), collected=collected))
+    monkeypatch.setitem(ENGINES, "x:own", row_of_file(solver(tmp_path), collected=collected))
     flight = Flight(field_scenario(), ["x:own"])
     flight.key("w", True)
     before = count["exchanges"]

@@ -57,7 +57,7 @@ def test_another_engine_has_another_bracket(monkeypatch: pytest.MonkeyPatch):
         patch.setattr(limits, "limits_of", limits_of.__wrapped__)
         patch.setattr(limits, "engines_of", lambda _: ["box2d:shipped"])
         patch.setitem(
-            variants.VARIANTS,
+            variants.DRIVEN_ENGINES,
             "box2d:shipped",
             DrivenEngine("box2d:shipped", ENGINES["box2d:matched"].make),
         )

@@ -9,7 +9,9 @@ from reports.run.cells import Cell, scene_hash
 from reports.run.folders import RUN, open_new, part_of, replace_folder
 from reports.run.known_answers import KNOWN_ANSWERS
 from reports.run.playing import play_here
-from reports.run.suite import Means, RunPlan, begin, keep_answer, keep_cell, tasks_of
+from reports.run.results import keep_cell, keep_known_answer, keep_probes
+from reports.run.suite import begin
+from reports.run.tasks import Means, RunPlan, tasks_of
 
 PLAYED = ("pymunk:shipped", "pymunk:matched")
 
@@ -39,8 +41,8 @@ def make(folder: Path, scene_file: Path) -> Path:
                 0.0,
                 "keeps",
             )
-            keep_answer(journal, plan, name, [finding])
-        keep_answer(journal, plan, KNOWN_ANSWERS[0], 18808.3)
+            keep_probes(journal, plan, name, [finding])
+        keep_known_answer(journal, KNOWN_ANSWERS[0], 18808.3)
         for cell in cells:
             scenario, row = scenarios[cell.scene], ENGINES[cell.engine]
             key = cell.key(scene_hash(scenario), row.source)
@@ -48,7 +50,7 @@ def make(folder: Path, scene_file: Path) -> Path:
         journal.append(
             {"timing": line["cell"], "copy": 0, "timed_s": 1.0, "cost": [0.5], "wrapping": [0.0]}
         )
-        journal.append({"beside": "read", "of": PLAYED[0], "scenario": "", "cost": [1e-6]})
+        journal.append({"overhead": "read", "of": PLAYED[0], "scenario": "", "cost": [1e-6]})
         journal.append({"footer": {"tasks": len(cells), "played": len(cells), "seconds": 1.0}})
     replace_folder(part_of(folder), folder, RUN)
     return folder

@@ -64,7 +64,7 @@ def broken_off(whole: Path, out: Path, after: int) -> Path:
     journal.sort(
         key=lambda line: [
             f'{{"{kind}"' in line
-            for kind in ("footer", "beside", "timing", "cell", "conformance", "header")
+            for kind in ("footer", "overhead", "timing", "cell", "conformance", "header")
         ]
     )
     (part / "journal.jsonl").write_text("".join(journal[:after]) + journal[after][:50])

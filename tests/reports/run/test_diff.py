@@ -17,11 +17,12 @@ from reports.commands.diff import show_difference
 from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
 from reports.run import suite
-from reports.run.archive import digest
+from reports.run.cells import digest
 from reports.run.diff import Timing, difference, timing
 from reports.run.journal import JOURNAL, Journal, lines_of
-from reports.run.suite import Means, RunPlan, carry_out
+from reports.run.suite import carry_out
 from reports.run.tables import seal_of
+from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
 
 PLAN = RunPlan(

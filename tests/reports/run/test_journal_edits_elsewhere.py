@@ -17,10 +17,11 @@ from reports.run.journal import JOURNAL, Journal
 from reports.run.journal_lines import kind_of
 from reports.run.machine import about
 from reports.run.made import digest_of, read_made
-from reports.speed import budget, ladder, lines, models
+from reports.speed import budget, cheapest, lines
 from reports.speed.kept import Kept
 from reports.speed.measure import in_turns, scene_rows
 from reports.speed.plan import PLAIN, SCENE, Measurement
+from reports.speed.scored_part import scored
 from reports.stability import lines as stability_lines
 from reports.stability.command import write_files
 from reports.stability.limits import Limit
@@ -57,8 +58,8 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ("time", SCENE, "slow_collision"),
             scene_rows(SCENE, "slow_collision", 0, in_turns([engine]), often),
         )
-        kept.add(("time", "truth", "slow_collision"), models.closed_form("slow_collision", 0))
-    assert ladder.scored("slow_collision", 0).scenario.name == "slow_collision"
+        kept.add(("time", "truth", "slow_collision"), cheapest.closed_form("slow_collision", 0))
+    assert scored("slow_collision", 0).scenario.name == "slow_collision"
     return place
 
 

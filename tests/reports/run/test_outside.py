@@ -21,7 +21,7 @@ import pytest
 
 from adapters import safe_path
 from adapters.engine import NotStarted
-from adapters.own_solver.engine import engine_file
+from adapters.own_engine.engine import row_of_file
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import WORK
 from adapters.own_solver.worker import HERE, MEMORY
@@ -55,7 +55,7 @@ def own(path: Path) -> partial:
     return partial(
         play_here,
         Cell(SCENE, 0, f"{path}:own", 1),
-        engine_file(path),
+        row_of_file(path),
         replace(scenario(SCENE), truth=None),
     )
 
@@ -134,7 +134,7 @@ def test_a_process_of_a_solver_that_cannot_start_is_not_the_fault_of_its_file(
 ):
     """It is neither a row of the check nor the status of a run."""
     monkeypatch.setattr(safe_path.sys, "executable", shutil.which("false"))
-    question, engine = scenario(SCENE), engine_file(RIGHT).make()
+    question, engine = scenario(SCENE), row_of_file(RIGHT).make()
 
     with pytest.raises(
         NotStarted, match=r"the process for a solver's file could not be started: .*exit status 1"
@@ -152,7 +152,7 @@ def test_resume_plays_again_what_failed_outside_the_engine_and_nothing_else(tmp_
             line |= {"status": "crashed", "reason": "planted", "outside": cells % 2 == 0}
             cells += 1
         if "conformance" in line and probes < 1:
-            line["key"], probes = "", probes + 1  # as `keep_answer` writes it
+            line["key"], probes = "", probes + 1  # as `keep_probes` writes it
         changed.append(json.dumps(line) + "\n")
     (whole / "journal.jsonl").write_text("".join(changed))
     crosscheck("run", "--resume", "whole", cwd=tmp_path)

@@ -10,12 +10,13 @@ from typing import cast
 
 import pytest
 
-from adapters.own_solver.engine import engine_file
+from adapters.own_engine.engine import row_of_file
 from reports.check.verdict import check_file
 from reports.commands.own_solvers import checked, checks_of, lines
 from reports.run.journal import JOURNAL, Journal
+from reports.run.results import keep_check
 from reports.run.run_lines import KINDS
-from reports.run.suite import Check, RunPlan, keep_check
+from reports.run.tasks import Check, RunPlan
 from reports.run.worker_process import Failure
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import MUTANTS
@@ -27,7 +28,7 @@ def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
     """Kept with its key; that of another text, or none at all, is said to be so, and has no key."""
     path = FAULTY.write(tmp_path)
     name = f"{path}:own"
-    plan = cast(RunPlan, type("Plan", (), {"engines": {name: engine_file(path)}}))
+    plan = cast(RunPlan, type("Plan", (), {"engines": {name: row_of_file(path)}}))
     right = checked(path)
     later = Check(True, ["No fault found."], [], "another text")
     with Journal(tmp_path) as journal:

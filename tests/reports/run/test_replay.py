@@ -13,7 +13,8 @@ from reports.run.archive import Archive
 from reports.run.cells import Cell
 from reports.run.journal import Journal
 from reports.run.playing import play_cell
-from reports.run.suite import Means, RunPlan, carry_out
+from reports.run.suite import carry_out
+from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from tests.reports.run.control_engines import CONTROLS, FATAL, Controlled, row

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adapters.own_engine.engine import row_of_file
 from adapters.own_solver import process as solver_process
-from adapters.own_solver.engine import engine_file
 from adapters.own_solver.file import LARGEST, NotASolver, read_solver
 from adapters.play import play
 from adapters.run import Run
@@ -95,8 +95,8 @@ def test_the_text_that_was_read_is_played_whatever_is_saved_since(
     """A row made before plays the old text, one made after the new one, and neither what numba kept
     of the other."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
-    before = engine_file(place(tmp_path, file, 1))
-    after = engine_file(place(tmp_path, file, 2))
+    before = row_of_file(place(tmp_path, file, 1))
+    after = row_of_file(place(tmp_path, file, 2))
     first, second, again = played(before), played(after), played(before)
 
     at_start = [
@@ -117,8 +117,8 @@ def test_what_numba_keeps_would_be_taken_for_another_text(
     new one."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(solver_process, "kept_copies", lambda solver, _: solver.path.parent)
-    before = engine_file(place(tmp_path, file, 1))
-    after = engine_file(place(tmp_path, file, 2))
+    before = row_of_file(place(tmp_path, file, 1))
+    after = row_of_file(place(tmp_path, file, 2))
     first, second = played(before), played(after)
 
     assert np.array_equal(first.trajectory.position, second.trajectory.position)
@@ -147,6 +147,7 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
 ):
     """Though one process plays both: a file that moves a sphere by the number of its calls so far
     plays the same twice."""
+    monkeypatch.setattr(solver_process, "waiting", None)  # of other tests
     started = Counter()
     begin = solver_process.SolverProcess.begin
     monkeypatch.setattr(
@@ -155,7 +156,7 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
         lambda self, settings: (started.update([file]), begin(self, settings)),
     )
     (tmp_path / file).write_text(COUNTS[file])
-    row = engine_file(tmp_path / file)
+    row = row_of_file(tmp_path / file)
     cell = Cell("head_on_equal_e09", 0, "x:own", 1)
     question = replace(scenario(cell.scene), truth=None)
     with solver_process.processes_reused():
@@ -259,7 +260,7 @@ def test_a_replay_says_that_the_file_is_another(tmp_path: Path):
 
 def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):
     """In its settings, with a hash over all, so that two runs can be distinguished."""
-    run = played(engine_file(place(tmp_path, "beside", 1)))
+    run = played(row_of_file(place(tmp_path, "beside", 1)))
 
     assert run.settings["from beside it"][1].startswith("helper.py; sha256 of all ")
     assert json.dumps(run.settings)
@@ -281,7 +282,7 @@ def test_a_module_beside_the_file_that_cannot_be_read_is_named(
     make(tmp_path / "helper.py")
     (tmp_path / "solver.py").write_text("import helper\n" + TEXTS["plain.py"])
     if not said:
-        assert read_solver(tmp_path / "solver.py").beside == ()
+        assert read_solver(tmp_path / "solver.py").imported == ()
         return
     with pytest.raises(NotASolver, match=said):
         read_solver(tmp_path / "solver.py")

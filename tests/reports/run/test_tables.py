@@ -29,8 +29,9 @@ from reports.run.scene_tables import (
     name_of,
     scene_table_of,
 )
-from reports.run.suite import Means, RunPlan, carry_out
+from reports.run.suite import carry_out
 from reports.run.tables import comparisons_of, make_tables
+from reports.run.tasks import Means, RunPlan
 from reports.run.worker_process import Failure
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario

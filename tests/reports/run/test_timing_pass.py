@@ -44,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def timing_lines(folder: Path) -> list[dict]:
     """Those of the journal."""
-    return [line for line in lines_of(folder / "out") if "timing" in line or "beside" in line]
+    return [line for line in lines_of(folder / "out") if "timing" in line or "overhead" in line]
 
 
 def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: Path):
@@ -138,14 +138,14 @@ def test_what_takes_long_has_three_rounds_and_leaves_the_others_to_the_rest(
 ):
     """A median of fewer is none. The control: what is within its share has every round."""
     what = [
-        Timed(("beside", key, "", ""), partial(Spent, seconds), 1.0)
+        Timed(("overhead", key, "", ""), partial(Spent, seconds), 1.0)
         for key, seconds in {"long": 2 * SHARE, "short": SHARE / 100}.items()
     ]
     monkeypatch.setattr(timing_pass, "overheads_of", lambda _: what)
     monkeypatch.setattr(timing_pass, "ROUNDS", 9)  # which is 1 in all other tests
     lines = timing_pass.Pass([], 5.0, 0)()
 
-    assert {line["beside"]: len(line["cost"]) for line in lines} == {"long": 3, "short": 9}
+    assert {line["overhead"]: len(line["cost"]) for line in lines} == {"long": 3, "short": 9}
 
 
 def test_what_is_slow_has_the_cost_of_when_it_was_played():
@@ -201,5 +201,5 @@ def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest
     monkeypatch.setattr("reports.run.stepping.empty_world", partial(int, "no world"))
     lines = timing_pass.Pass([refusing], 5.0, 0)()
 
-    assert [line.get("timing") or line["beside"] for line in lines].count("key") == 1
-    assert {line["beside"] for line in lines if "beside" in line} == {"read"}
+    assert [line.get("timing") or line["overhead"] for line in lines].count("key") == 1
+    assert {line["overhead"] for line in lines if "overhead" in line} == {"read"}

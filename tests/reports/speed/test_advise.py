@@ -19,7 +19,7 @@ from adapters.play import play
 from reports.compare.delays import jumps_of
 from reports.compare.view import View
 from reports.run.scenes import open_scene
-from reports.speed import advice, ladder
+from reports.speed import advice
 from reports.speed.advice import (
     NEARER,
     NO_GAIN,
@@ -36,6 +36,7 @@ from reports.speed.advice import (
 from reports.speed.advise import sentence_on_times
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
+from reports.speed.scored_part import scored
 from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 from tests.adapters.broken_engines import DoublesSpeed, Freezes, GainsEnergy
@@ -120,7 +121,7 @@ def test_it_says_why_times_cannot_be_compared():
 def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type):
     """Negative controls in a scene of flight and bounces; the engine that they are made from is
     right."""
-    scenario, truth = ladder.scored("box_billiard", 0)
+    scenario, truth = scored("box_billiard", 0)
     dt = scenario.dt(scenario.substeps[-1])
 
     def error(engine) -> float:

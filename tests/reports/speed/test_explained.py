@@ -9,7 +9,7 @@ import pytest
 from reports.speed import budget, explained
 from reports.speed.budget import RESIDUAL, TOTAL, budget_of
 from reports.speed.explained import COLUMNS, Cut, extent, sentence, share
-from reports.speed.ladder import scored
+from reports.speed.scored_part import scored
 
 
 def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:

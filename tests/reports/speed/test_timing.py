@@ -20,6 +20,7 @@ from reports.run.timing import (
 from reports.speed import ladder, sizes
 from reports.speed.effort import QUICK
 from reports.speed.estimate import READY, all_rounds
+from reports.speed.scored_part import scored
 from reports.speed.tables import summed_up
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
@@ -42,14 +43,14 @@ def table(samples: list[Sample]) -> pd.DataFrame:
 def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
     """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
     in it."""
-    scored = ladder.scored("near_miss", 0).scenario
-    steps = scored.intervals
+    part = scored("near_miss", 0).scenario
+    steps = part.intervals
     samples = ladder.times_of(
         "near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0
     )
     best = summed_up(table(samples), ["key"]).best.iloc[0]
 
-    assert steps * EACH / scored.duration <= best <= (1 + SLACK) * steps * EACH / scored.duration
+    assert steps * EACH / part.duration <= best <= (1 + SLACK) * steps * EACH / part.duration
 
 
 def test_what_wrapping_in_python_took_is_given_separately():

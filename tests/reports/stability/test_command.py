@@ -25,7 +25,7 @@ from reports.stability.limits import QUICK
 from reports.stability.maps import MAPS
 from reports.stability.results import COLUMNS, StabilityPlan, Task, done_before, tasks_of
 from reports.stability.search import LimitSearch
-from reports.stability.variants import VARIANTS, taking_part
+from reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.page.figures import check_figures
 from tests.reports.terminal.command_line import crosscheck
@@ -315,7 +315,7 @@ def test_an_engine_in_a_file_takes_part(tmp_path: Path):
 
     assert works == [True, False]
     assert name not in ENGINES
-    assert name not in VARIANTS
+    assert name not in DRIVEN_ENGINES
 
 
 @pytest.mark.long

@@ -16,7 +16,7 @@ from reports.stability.cases import CASES
 from reports.stability.limits import QUICK, Limit
 from reports.stability.results import StabilityPlan, Task
 from reports.stability.search import LimitSearch
-from reports.stability.variants import VARIANTS, taking_part
+from reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.stability.kept_limits import FILE_OF_FETCHED, Kept, agrees, kept
 from tests.reports.terminal.command_line import crosscheck
 
@@ -35,7 +35,7 @@ def test_planck_is_driven_to_its_threshold():
             works[name] = [search.trial(speed, 1).works for speed in (2.0, 0.5)]
 
     assert works == {"planck:shipped": [True, False], "planck:matched": [True, True]}
-    assert not {*names} & {*ENGINES, *VARIANTS}
+    assert not {*names} & {*ENGINES, *DRIVEN_ENGINES}
 
 
 def test_a_report_of_a_package_names_its_version_and_no_file():

@@ -17,7 +17,7 @@ from reports.stability.limits import QUICK, Limit
 from reports.stability.predicates import apexes
 from reports.stability.search import LimitSearch
 from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
-from reports.stability.variants import VARIANTS, DrivenEngine, play_as, played
+from reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as, played
 from scenarios.model import Scenario, Trajectory
 
 PARTNERS = [
@@ -140,7 +140,7 @@ def drift(engine: str | DrivenEngine, x: float, runs: int = 1) -> float:
     found = []
     for scenario in (ball(x, run) for run in range(runs)):
         trajectory = played(
-            engine if isinstance(engine, DrivenEngine) else VARIANTS[engine], scenario
+            engine if isinstance(engine, DrivenEngine) else DRIVEN_ENGINES[engine], scenario
         ).trajectory
         assert trajectory is not None
         height = scenario.scene.position[0, 1] - scenario.scene.radius[0]
@@ -200,7 +200,9 @@ def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(
     engine: str, factor: float
 ):
     """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
-    trajectory: Trajectory | None = on_spring(VARIANTS[engine], oscillator(0.05, 0))[1].trajectory
+    trajectory: Trajectory | None = on_spring(DRIVEN_ENGINES[engine], oscillator(0.05, 0))[
+        1
+    ].trajectory
     assert trajectory is not None
     energy = (trajectory.velocity**2 + trajectory.position**2).sum(axis=(1, 2)) / 2
 

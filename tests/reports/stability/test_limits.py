@@ -15,7 +15,7 @@ from adapters.engines import ENGINES, UNASKED
 from reports.stability.cases import CASES
 from reports.stability.limits import FULL, NEVER_FAILS, QUICK, Limit, engines_of
 from reports.stability.search import LimitSearch
-from reports.stability.variants import VARIANTS
+from reports.stability.variants import DRIVEN_ENGINES
 from tests.measured import MEASURED
 from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
 
@@ -96,7 +96,7 @@ def test_the_quick_form_finds_a_limit_of_the_full_one_in_every_case(row: Kept):
 # one that gives the bits of another in all cases has its limits, too
 SEARCHABLE = {
     name
-    for name in VARIANTS
+    for name in DRIVEN_ENGINES
     if name.split("+")[0] in MEASURED and (name in UNASKED or name not in ENGINES)
 }
 

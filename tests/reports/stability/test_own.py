@@ -27,7 +27,7 @@ from reports.stability.interventions import (
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
 from reports.stability.search import LimitSearch
-from reports.stability.variants import VARIANTS, play_as
+from reports.stability.variants import DRIVEN_ENGINES, play_as
 from reports.stability.vary import VARIES, case_of_file, varied
 from scenarios.files.scene_file import read_scene_file
 from scenarios.truth.exact import with_oracle
@@ -184,7 +184,7 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
     path = str(SCENES / "two.toml")
     far = {
         name: LimitSearch(case_of_file(path, "offset"), name, QUICK).trial(1e6)
-        for name in VARIANTS
+        for name in DRIVEN_ENGINES
         if "+" not in name
     }
 

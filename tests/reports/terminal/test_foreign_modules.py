@@ -150,7 +150,7 @@ def test_what_a_solver_imports_of_its_own_is_found(ran):
         path.unlink()
     with SolverProcess(solver) as process:
         assert process.functions["integrate"]
-    assert [file for file, _ in solver.beside] == [
+    assert [file for file, _ in solver.imported] == [
         "folder/deep.py",
         "package/__init__.py",
         "package/inner.py",

@@ -7,6 +7,7 @@ from collections.abc import Collection
 
 from adapters.engine import Unsupported
 from adapters.friction import Frictionless
+from adapters.own_solver.file import SolverFailed
 from scenarios.model import Scene
 
 # Word in the line -> its name in a sentence.
@@ -20,6 +21,17 @@ FEATURES = {
     "friction": "friction",
     "wrap": "the wrap at the edges",
 }
+
+
+def features_of(line: object) -> list[str]:
+    """The words of the line `models`, which is not a text if the file has no such line; raises
+    `SolverFailed`."""
+    asked = f"models must be a text with some of the words {', '.join(FEATURES)}"
+    if not isinstance(line, str):
+        raise SolverFailed("error", f"has no line models; {asked}")
+    if unknown := [word for word in line.split() if word not in FEATURES]:
+        raise SolverFailed("error", f"models has the word {unknown[0]!r}; {asked}")
+    return line.split()
 
 
 def must_model(scene: Scene, models: Collection[str], who: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from reports.compare.order import FINEST
-from reports.speed.ladder import scored
+from reports.speed.scored_part import scored
 from scenarios.truth.exact import CLOSED_FORM, answered_by
 
 KINDS = {"event_driven": "collision to collision, float64"}
@@ -39,7 +39,7 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
     }
 
 
-def cheapest(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+def cheapest_models(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     """A row for each scenario: truth, closed_us, and the cheapest engines with an error of at
     most `FINEST` and of at most 1 % of a radius.
 
