@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.catalogue import scenario
-from scenarios.families.placing import lay_out
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import ACCURACY, computed
 from scenarios.truth.oracle import resting as oracle_resting
@@ -450,6 +450,22 @@ def test_bounces_are_exact_where_the_restitution_is_close_to_one(miss: float):
     expected = 0.25 + float((speed - Fraction(g) * left / 2) * left)
     # One rounding of the root is late by 1e-16 s at 4 m/s; eight bounces add to it.
     assert states(one, computed(one)).position[-1, 0, 1] == pytest.approx(expected, abs=1e-14)
+
+
+@pytest.mark.parametrize("restitution", [0.999, 1.0])
+def test_the_collisions_of_a_fast_disk_in_a_narrow_box_do_not_accumulate(restitution: float):
+    """At 1e5 m/s, a collision each 1e-11 s: 64 of them within 1e-9 s."""
+    scene = lay_out(
+        position=[[0, 0]],
+        velocity=[[1e5, 3e4]],
+        radius=[1e-3],
+        mass=[1],
+        restitution=restitution,
+        walls=box([-1.001e-3, -1.001e-3], [1.001e-3, 1.001e-3]),
+    )
+    record = computed(replace(asked(scene, 2e-9), sample_interval=1e-10))
+    assert (record.horizon, record.reason) == (np.inf, "")
+    assert len(record.events) > 80
 
 
 def test_the_bounces_listed_do_not_depend_on_the_unit_of_time():
