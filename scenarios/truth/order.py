@@ -69,6 +69,8 @@ class CollisionOrder:
         end: s, of the path.
         legs: (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time. begun: how many of
             them have begun. now: (n, 8) the latest of those of each disk.
+        span, way: (w, 2) m and 1/m, each wall from its start to its end, and over its length
+            squared.
     """
 
     def __init__(self, scenario: Scenario, path: Path, tangents: TangentVectors) -> None:
@@ -79,6 +81,8 @@ class CollisionOrder:
         ]
         self.legs = np.array(sorted(rows, key=lambda row: row[0]))
         self.begun, self.now = 0, np.zeros((self.scene.n, 8))
+        self.span = self.scene.walls[:, 1] - self.scene.walls[:, 0]
+        self.way = self.span / (self.span**2).sum(axis=1)[:, None]
 
     def cut(self, event: Event) -> Path | None:
         """The path up to a collision, the first one of its instant, if rounding decides which other
@@ -135,9 +139,9 @@ class CollisionOrder:
         x = self.now[:, 2:4] + (self.now[:, 4:6] + self.now[:, 6:8] * since / 2) * since
         most = CLOSE * scene.radius.min() + scene.radius[i]
         disks = np.flatnonzero(np.hypot(*(x - x[i]).T) <= most + scene.radius)
-        start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
-        share = np.clip(((x[i] - start) * span).sum(axis=1) / (span**2).sum(axis=1), 0, 1)
-        walls = np.flatnonzero(np.hypot(*(x[i] - start - share[:, None] * span).T) <= most)
+        away = x[i] - scene.walls[:, 0]
+        share = np.minimum(np.maximum((away * self.way).sum(axis=1), 0.0), 1.0)
+        walls = np.flatnonzero(np.hypot(*(away - share[:, None] * self.span).T) <= most)
         return [j for j in disks.tolist() if j != i] + [-1 - w for w in walls.tolist()]
 
     def near(self, i: int, j: int, t: float, late: Array) -> Near | None:
