@@ -22,7 +22,14 @@ MAY_IMPORT = {
 # its layer "".
 LAYERS = {
     "scenarios": ["regular faults", "model", "no_truth", "truth", "families", "files", "catalogue"],
-    "scenarios/truth": ["oracle", "closed_forms cache", "horizon lines sliding", "record", "exact"],
+    "scenarios/truth": [
+        "oracle",
+        "closed_forms cache",
+        "horizon lines sliding",
+        "order",
+        "record",
+        "exact",
+    ],
     "adapters": [
         "matched safe_path system",
         "engine",

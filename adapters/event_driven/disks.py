@@ -137,6 +137,8 @@ class Walls(NamedTuple):
 
     wrap: Array  # (2, 2) m
     segment: Array  # (w, 5) start m, direction, length m
+    # (w,) walls in line that overlap or share an end are one surface, with one number
+    surface: Ints
     first: Ints  # (cells + 1,) the index in `of` of a cell's first wall
     of: Ints
 

@@ -314,8 +314,31 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
     segment = np.column_stack([scene.walls[:, 0], along / length[:, None], length])
     wrap = np.zeros((2, 2)) if scene.wrap is None else np.array(scene.wrap)
     return Walls(
-        wrap, segment, *walls_by_cell(scene, low, np.array(grid.side), np.array(grid.shape))
+        wrap,
+        segment,
+        surfaces(scene.walls),
+        *walls_by_cell(scene, low, np.array(grid.side), np.array(grid.shape)),
     )
+
+
+def surfaces(walls: Array) -> NDArray[np.int64]:
+    """(w,) the number of the surface that each wall belongs to, as in `Walls`; exact, in
+    rationals."""
+    number = np.arange(len(walls))
+    for w, one in enumerate(walls):
+        for k in range(w):
+            if number[k] != number[w] and joined(one, walls[k]):
+                number[number == number[w]] = number[k]
+    return number
+
+
+def joined(one: Array, other: Array) -> bool:
+    """Whether two walls (2, 2) lie in line and overlap or share an end."""
+    (low, high), (first, last) = np.sort(one, axis=0), np.sort(other, axis=0)
+    if (first > high).any() or (low > last).any():
+        return False
+    (px, py), (qx, qy), *ends = [[Fraction(x) for x in end.tolist()] for end in (*one, *other)]
+    return all((qx - px) * (y - py) == (qy - py) * (x - px) for x, y in ends)
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:

@@ -54,7 +54,13 @@ from adapters.event_driven.impacts import (
     set_end,
 )
 from adapters.event_driven.queue import Tree, put
-from adapters.event_driven.rest import check_rest, normal_component, take_off, update_support
+from adapters.event_driven.rest import (
+    check_rest,
+    next_in_line,
+    normal_component,
+    take_off,
+    update_support,
+)
 from adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
 from scenarios.model import Array
 
@@ -179,9 +185,13 @@ def own_event(arena: Arena, i: int) -> int:
 
 @kernel
 def leave(arena: Arena, i: int) -> int:
-    """Disk `i` reaches the end of the wall it rests on: it flies off, unless it is so slow that it
-    would turn about the end."""
+    """Disk `i` reaches the end of the wall it rests on: it goes on along the next wall in line, or
+    flies off, unless it is so slow that it would turn about the end."""
     a, w = arena.disks[i], int(arena.disks[i].wall)
+    following = next_in_line(arena.walls, arena.grid, a)
+    if following >= 0:
+        a.wall, a.count = following, a.count + 1
+        return GOES_ON
     speed2, press = (
         a.vx * a.vx + a.vy * a.vy,
         -normal_component(arena.walls, a, w, a.free_ax, a.free_ay),

@@ -51,6 +51,30 @@ def rest_on(walls: Walls, a: Any, w: int) -> None:
 
 
 @kernel
+def next_in_line(walls: Walls, g: Grid, a: Any) -> int:
+    """The wall that carries a disk on, farthest beyond the end of its wall that it has reached; -1:
+    none does."""
+    ux, uy, length = walls.segment[a.wall, 2], walls.segment[a.wall, 3], walls.segment[a.wall, 4]
+    x, y = walls.segment[a.wall, 0], walls.segment[a.wall, 1]
+    if 2.0 * ((a.x - x) * ux + (a.y - y) * uy) < length:
+        ux, uy = -ux, -uy
+    else:
+        x, y = x + length * ux, y + length * uy
+    farthest, found = 0.0, -1
+    c = a.cx * g.shape[1] + a.cy
+    for at in range(walls.first[c], walls.first[c + 1]):
+        k = walls.of[at]
+        dx, dy = walls.segment[k, 0] - x, walls.segment[k, 1] - y
+        start = dx * ux + dy * uy
+        end = start + walls.segment[k, 4] * (walls.segment[k, 2] * ux + walls.segment[k, 3] * uy)
+        slack = ROUNDING * (abs(x) + abs(y) + length + walls.segment[k, 4])
+        beyond = min(start, end) <= slack < max(start, end)
+        if walls.surface[k] == walls.surface[a.wall] and beyond and max(start, end) > farthest:
+            farthest, found = max(start, end), k
+    return found
+
+
+@kernel
 def take_off(a: Any) -> None:
     """Let a disk that rests on a wall fly again."""
     a.ax, a.ay, a.wall = a.free_ax, a.free_ay, -1

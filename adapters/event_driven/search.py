@@ -72,13 +72,16 @@ def next_own(g: Grid, walls: Walls, wrapped: bool, a: Any) -> tuple[float, int]:
                 if t < best:
                     best, code = t, WRAP + 2 * axis + high
     c = a.cx * g.shape[1] + a.cy
+    rests = walls.surface[a.wall] if a.wall >= 0 else -1
+    slid_off = walls.surface[-2 - a.wall] if a.wall < -1 else -1
     for k in range(walls.first[c], walls.first[c + 1]):
         w = walls.of[k]
         for part in range(3):
-            # A disk does not meet the wall it rests on, nor the face of the one that it slid off.
+            # A disk does not meet the surface it rests on, nor the face of the one it slid off.
+            surface = walls.surface[w]
             t = (
                 inf
-                if a.wall == w or (a.wall == -2 - w and part == 0)
+                if surface == rests or (surface == slid_off and part == 0)
                 else wall_time(walls, a, w, part, best)
             )
             if t < best:

@@ -7,7 +7,8 @@ is computed along the path of the oracle. Each number of the initial state has a
 of 2^-52 of the largest one, and its effect is propagated by the derivative of the flights and of
 every collision (Dellago, Posch & Hoover, Phys. Rev. E 53, 1485, 1996; here also for parabolas and
 for motion along a wall). The derivative is needed to a few per cent only, so it is computed in
-float64. A near miss by less than a rounding error has no derivative and is not detected.
+float64. A near miss by less than a rounding error has no derivative and is not detected; collisions
+whose order the rounding decides are found in `order.py`.
 
 The limit applies to the standard deviation over independent errors of all numbers. The deviation of
 one rounded state is normally distributed: it is below the standard deviation in two of three
@@ -37,24 +38,6 @@ DIVERGED = 1e-9
 """In radii of a disk: if the standard deviation of its position is larger, it has diverged."""
 # this many bounces of a series that dies out are computed; float64 cannot resolve later ones
 BOUNCES = 64
-
-
-def float64_horizon(scenario: Scenario, path: Path) -> float:
-    """s, the time at which the first disk diverges along `path`, see `DIVERGED`; inf: none does.
-
-    Contacts that last stay closed: a disk that rests on a wall, or on another disk, has no
-    deviation along the normal.
-    """
-    tangents = TangentVectors(scenario, path)
-    end = min(path.end, scenario.duration)
-    for event in path.events:
-        if float(event.t) >= min(end, tangents.diverged):
-            break
-        if float(event.impulse):  # else a contact begins
-            tangents.collide(event)
-    for i in tangents.moving:
-        tangents.carry(i, min(end, tangents.diverged))
-    return tangents.diverged
 
 
 def roundings(scene: Scene) -> tuple[Array, Array, Array]:
@@ -247,9 +230,7 @@ class TangentVectors:
         way, dv, share = two.x - one.x, two.v - one.v, one.weight + two.weight
         normal = way / np.hypot(*way)
         if event.new and t > 0:
-            # normal.dv itself would lose its digits in a grazing collision
-            closing = -impulse * share / (1 + e)
-            self.late = -(two.dx - one.dx) @ normal / closing
+            self.late = self.delay(event, one, two)
         late = self.late[:, None]
         shift = two.dx - one.dx + dv * late
         tilt = (shift - np.outer(shift @ normal, normal)) / reach
@@ -272,6 +253,15 @@ class TangentVectors:
                 arm = body.radius * body.inverse_inertia
                 self.dw[disk] += (body.rates[0] - body.rates[1]) * self.late - arm * d_friction
                 self.spin[disk] = body.spin - arm * friction
+
+    def delay(self, event: Event, one: Body, two: Body) -> Array:
+        """(d,) s, the delay of a collision of these two, as they are before it, for each
+        deviation."""
+        way = two.x - one.x
+        # normal.dv itself would lose its digits in a grazing collision
+        closing = -float(event.impulse) * (one.weight + two.weight) / (1 + self.scene.restitution)
+        late: Array = -(two.dx - one.dx) @ (way / np.hypot(*way)) / closing
+        return late
 
     def friction_impulse(
         self, one: Body, two: Body, normal: Array, tilt: Array, impulse: float, more: Array

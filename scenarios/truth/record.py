@@ -10,8 +10,9 @@ import numpy as np
 
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
-from scenarios.truth.horizon import DIVERGED, float64_horizon
+from scenarios.truth.horizon import DIVERGED
 from scenarios.truth.oracle.path import Event, Path
+from scenarios.truth.order import float64_horizon
 
 EPS = float(np.finfo(float).eps)
 # relative to `reach`: a few roundings, of the start of a leg, of a time and of a sample
@@ -40,9 +41,9 @@ class TruthRecord:
         method: "closed form", "two-precision" (half as many bits give the same) or "certified"
             (interval arithmetic).
         reason: why it ends where it does.
-        float64_horizon: s; up to then float64 engines are compared with it, see `horizon.py`.
+        float64_horizon: s; up to then float64 engines are compared with it, see `order.py`.
         outcomes: (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends
-            because the order of simultaneous collisions matters.
+            because the order of collisions matters that are simultaneous but for a rounding.
         orders: (p, 3) outcome, disk, other: for each outcome one order of collisions that leads to
             it.
         remains: sentences on what still holds after the end.
@@ -132,7 +133,7 @@ def powers(e: float, k: Array | int) -> Array:
 
 def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: str) -> TruthRecord:
     """The record of a path whose error is at most `error` m up to its end."""
-    path = within_float64(scenario, path, error)
+    until, path = float64_horizon(scenario, within_float64(scenario, path, error))
     end = min(path.end, scenario.duration) if path.reason else np.inf
     legs = legs_of(path, end)
     rows = [_row(event) for event in path.events if float(event.t) < end]
@@ -157,7 +158,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         bits=bits,
         method=method,
         reason=path.reason,
-        float64_horizon=float64_horizon(scenario, path),
+        float64_horizon=until,
         outcomes=frozen(np.array(outcomes).reshape(-1, 4)),
         orders=frozen(np.array(orders).reshape(-1, 3)),
         remains=tuple(remains(scenario.scene, legs, path.disks, end)) if path.disks else (),

@@ -15,10 +15,11 @@ from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Thrust
 from scenarios.truth import horizon as of_horizon
 from scenarios.truth.exact import computed
-from scenarios.truth.horizon import DIVERGED, EPS, TangentVectors, float64_horizon, roundings
+from scenarios.truth.horizon import DIVERGED, EPS, TangentVectors, roundings
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import digits
 from scenarios.truth.oracle.path import Path
+from scenarios.truth.order import float64_horizon
 from scenarios.truth.record import record_of
 from tests.scenarios.exercise_box import boxed, lasting
 
@@ -267,7 +268,7 @@ def test_motions_that_are_not_chaotic_are_followed_to_their_end():
         "line_gas",
     ):
         one = scenario(name)
-        assert float64_horizon(one, path_of(one)) == np.inf
+        assert float64_horizon(one, path := path_of(one)) == (np.inf, path)
 
 
 def test_the_horizon_does_not_depend_on_the_units_of_length_and_time():

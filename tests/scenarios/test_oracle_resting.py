@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.catalogue import scenario
-from scenarios.families.placing import lay_out
+from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import ACCURACY, computed
 from scenarios.truth.oracle import resting as oracle_resting
@@ -267,15 +267,24 @@ def test_a_resting_disk_slides_off_its_wall_or_on_to_the_next():
         truth.position[:, 0], np.stack([2 * t - 1, 0.25 - fallen], -1), rtol=0, atol=1e-14
     )
     slow = asked(replace(scene, velocity=[[1.5, 0]]), 1.5)
-    assert (
-        "disk 0 slides off the end of wall 1 so slowly that it turns about it at t = 1.33333333 s"
-        in computed(slow).reason
-    )
+    turns = "disk 0 slides off the end of wall 1 so slowly that it turns about it at t = 1.33333333"
+    assert turns in computed(slow).reason
+    overlap = replace(scene, walls=[[[-3, 0], [0.5, 0]], [[1, 0], [-0.5, 0]]])
+    assert turns in computed(asked(replace(overlap, velocity=[[1.5, 0]]), 1.5)).reason
 
 
-def test_a_floor_of_pieces_is_a_floor():
-    """Dropped onto the very seam, and drifting over seams, as on a floor of one piece."""
-    pieces = [[[x, 0], [x + 1, 0]] if x % 2 else [[x + 1, 0], [x, 0]] for x in range(-4, 4)]
+def pieces(length: float, both: bool) -> list[list[list[float]]]:
+    """A floor of walls that begin 1 m apart, every other one the other way round; `both`: each wall
+    also the other way round."""
+    walls = [[[x, 0], [x + length, 0]] for x in range(-4, 4)]
+    turned = [wall[::-1] for wall in walls]
+    return walls + turned if both else walls[::2] + turned[1::2]
+
+
+@pytest.mark.parametrize(("length", "both"), [(1.0, False), (1.375, False), (1.0, True)])
+def test_a_floor_of_pieces_is_a_floor(length: float, both: bool):
+    """Dropped onto the very seam, and drifting over seams, as on a floor of one piece; also where
+    the pieces overlap, or each of them is there twice."""
     for x, u in ((0.0, 0.0), (-1.25, 0.75)):
         scene = lay_out(
             position=[[x, 1.25]],
@@ -286,7 +295,9 @@ def test_a_floor_of_pieces_is_a_floor():
             restitution=0.5,
             walls=FLOOR,
         )
-        whole, apart = (asked(replace(scene, walls=walls), 2.0) for walls in (FLOOR, pieces))
+        whole, apart = (
+            asked(replace(scene, walls=walls), 2.0) for walls in (FLOOR, pieces(length, both))
+        )
         expected, found = states(whole, computed(whole)), states(apart, computed(apart))
 
         assert len(found) == len(whole.times)
@@ -439,6 +450,22 @@ def test_bounces_are_exact_where_the_restitution_is_close_to_one(miss: float):
     expected = 0.25 + float((speed - Fraction(g) * left / 2) * left)
     # One rounding of the root is late by 1e-16 s at 4 m/s; eight bounces add to it.
     assert states(one, computed(one)).position[-1, 0, 1] == pytest.approx(expected, abs=1e-14)
+
+
+@pytest.mark.parametrize("restitution", [0.999, 1.0])
+def test_the_collisions_of_a_fast_disk_in_a_narrow_box_do_not_accumulate(restitution: float):
+    """At 1e5 m/s, a collision each 1e-11 s: 64 of them within 1e-9 s."""
+    scene = lay_out(
+        position=[[0, 0]],
+        velocity=[[1e5, 3e4]],
+        radius=[1e-3],
+        mass=[1],
+        restitution=restitution,
+        walls=box([-1.001e-3, -1.001e-3], [1.001e-3, 1.001e-3]),
+    )
+    record = computed(replace(asked(scene, 2e-9), sample_interval=1e-10))
+    assert (record.horizon, record.reason) == (np.inf, "")
+    assert len(record.events) > 80
 
 
 def test_the_bounces_listed_do_not_depend_on_the_unit_of_time():

@@ -30,6 +30,24 @@ class ContactFinder:
         self.in_line = [
             {j for j in ends if collinear(wall, bodies.table[j, :2])} for wall in self.scene.walls
         ]
+        self.surface = [self._surface(w) for w in range(len(self.scene.walls))]
+
+    def _surface(self, w: int) -> list[int]:
+        """The walls that lie in line with wall w and overlap it or share an end with it, directly
+        or through others, with wall w itself: a disk slides over them as over one wall."""
+        walls, ends = self.scene.walls, self.bodies.table[sorted(self.in_line[w]), :2]
+        spans = {
+            k: line_span(walls[w], wall)
+            for k, wall in enumerate(walls)
+            if all((ends == end).all(axis=1).any() for end in wall)
+        }
+        (low, high), found = spans[w], {w}
+        while more := {
+            k for k, (a, b) in spans.items() if k not in found and a <= high and b >= low
+        }:
+            found |= more
+            low, high = min(spans[k][0] for k in found), max(spans[k][1] for k in found)
+        return sorted(found)
 
     def contact(self, i: int, code: int) -> Contact:
         """The contact of disk i with a code of `soonest`."""
@@ -82,7 +100,7 @@ class ContactFinder:
             return contact in held or any(
                 c.kind == "wall" and contact.j in self.in_line[c.j] for c in held
             )
-        return any(c.kind == "wall" and c.j == contact.j for c in held)
+        return any(c.kind == "wall" and contact.j in self.surface[c.j] for c in held)
 
     def time_to(self, contact: Contact, now: Number, limit: float) -> Number | None:
         """s from `now` to this contact, or None if it does not come within `limit` s. Raises
@@ -238,7 +256,7 @@ class ContactFinder:
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:
         """All contacts that touch now, of the disks in `contacts` and of all disks connected to
-        them by contacts."""
+        them by contacts; only one of those of a disk on one surface, a held one if there is one."""
         done: set[int] = set()
         waiting = {contact.i for contact in contacts} | {c.j for c in contacts if c.kind == "body"}
         found = {key(contact): contact for contact in contacts}
@@ -250,13 +268,31 @@ class ContactFinder:
             found |= {key(contact): contact for contact, _ in self.near(i, now, sure)}
             waiting |= {j for c in found.values() if c.kind == "body" for j in (c.i, c.j)}
             done.add(i)
-        return [self.touch(contact, now) for contact in found.values()]
+        once: dict[tuple[int, int], Contact] = {}
+        for contact in (c for c in found.values() if c.kind == "wall"):
+            place = contact.i, self.surface[contact.j][0]
+            if place not in once or contact in resting.values():
+                once[place] = contact
+        return [
+            self.touch(contact, now)
+            for contact in found.values()
+            if contact.kind != "wall" or contact in once.values()
+        ]
 
 
 def key(contact: Contact) -> tuple[Any, ...]:
     """A key for a contact: the same from both disks of a pair, different for the two sides of a
     wall."""
     return ("body", *sorted((contact.i, contact.j))) if contact.kind == "body" else tuple(contact)
+
+
+def line_span(along: np.ndarray, wall: np.ndarray) -> tuple[float, float]:
+    """The least and the largest coordinate, m, of a wall (2, 2) on the axis nearest to the wall
+    `along`, in line with it; negative if `along` runs that way, so that they grow along it."""
+    way = along[1] - along[0]
+    axis = int(np.argmax(np.abs(way)))
+    low, high = sorted((np.sign(way[axis]) * wall[:, axis]).tolist())
+    return low, high
 
 
 def collinear(wall: np.ndarray, point: np.ndarray) -> bool:

@@ -39,7 +39,7 @@ class Motion:
         self.due = np.full(scene.n, np.inf)
         self.now = k.exact(0.0)
         self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
-        self.recent = RecentCollisions(scene.n)
+        self.recent = RecentCollisions(scene)
         # From the last to the first, so that the next one can be popped.
         self.starts_and_stops = sorted(
             ((t, p.disk) for p in thrusts for t in (p.start, p.stop) if t < until), reverse=True

@@ -9,12 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scenarios.model import Scene
 from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact, TieOutcome
 
 ACCUMULATED = 64  # collisions of one disk ...
-INSTANT = 1e-9  # ... within this many s accumulate
+INSTANT = 1e-9  # ... within this many s accumulate; in a fast scene ...
+SHARE = 1e-7  # ... within this share of the time in which a disk moves by its radius
 NAMED = 1e-5  # s before that; the bodies it collides with in this time are named in the reason
 
 
@@ -75,19 +77,32 @@ class Path:
 
 
 class RecentCollisions:
-    """The latest collisions of each of n disks."""
+    """The latest collisions of each disk of a scene.
 
-    def __init__(self, n: int) -> None:
+    Attributes:
+        instant: s; so many collisions within it accumulate. At e = 1 it is 0: there are finitely
+            many collisions in a finite time (Vaserstein, Commun. Math. Phys. 69, 31, 1979).
+    """
+
+    def __init__(self, scene: Scene) -> None:
         self.collisions: list[deque[tuple[float, str]]] = [
-            deque(maxlen=4 * ACCUMULATED) for _ in range(n)
+            deque(maxlen=4 * ACCUMULATED) for _ in range(scene.n)
         ]
+        radius = float(scene.radius.min())
+        fastest = max(
+            float(np.hypot(*scene.velocity.T).max()),
+            float(np.sqrt(np.hypot(*scene.gravity) * radius)),
+        )
+        self.instant = min(INSTANT, SHARE * radius / fastest) if fastest else INSTANT
+        if scene.restitution == 1:
+            self.instant = 0.0
 
     def add(self, i: int, t: float, other: str) -> None:
         """Disk i collides with `other` at t s. Raises `MotionEnds` where its collisions
         accumulate."""
         collisions = self.collisions[i]
         collisions.append((t, other))
-        if len(collisions) < ACCUMULATED or t - collisions[-ACCUMULATED][0] > INSTANT:
+        if len(collisions) < ACCUMULATED or t - collisions[-ACCUMULATED][0] > self.instant:
             return
         others = sorted({name for at, name in collisions if at > t - NAMED})
         disks = [i, *(int(name[5:]) for name in others if name.startswith("disk"))]

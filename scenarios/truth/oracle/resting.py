@@ -18,7 +18,7 @@ import numpy as np
 from scenarios.model import Array, Thrust
 from scenarios.no_truth import NoTruth
 from scenarios.truth.oracle.bodies import FALLING, STATIC, Bodies, Hop, Leg, rational, square_to
-from scenarios.truth.oracle.contact_finder import ContactFinder, collinear, key
+from scenarios.truth.oracle.contact_finder import ContactFinder, key, line_span
 from scenarios.truth.oracle.filter import moved, touching
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact
@@ -109,14 +109,13 @@ def untouched(
         return False
     for j in np.flatnonzero(~clear).tolist():  # float64 does not decide these
         clear[j] = apart(bodies, i, j, leg.t) > needed[j]
-    room, in_line = stretch(finder, contact, float(bodies.foot(w, leg.x, leg.y)))
-    if not clear.all() or not own * SAFE + slack < room:
+    if not clear.all() or not own * SAFE + slack < room(finder, contact, leg):
         return False
     if scene.wrap is not None and (
         scene.n > 1 or not (np.abs(scene.wrap - [x, y]) > own * SAFE + slack).all()
     ):
         return False
-    known = in_line | {c.j for c in bodies.held[i] if c.kind == "wall"}
+    known = {*finder.surface[w], *(c.j for c in bodies.held[i] if c.kind == "wall")}
     walls = np.array([wall for k, wall in enumerate(scene.walls) if k not in known]).reshape(
         -1, 2, 2
     )
@@ -126,23 +125,15 @@ def untouched(
     return bool((away > own * SAFE + slack).all())
 
 
-def stretch(finder: ContactFinder, contact: Contact, foot: float) -> tuple[float, set[int]]:
-    """How far a disk can slide in both directions, m, from `foot` m along its wall; and the walls
-    in line, with its own."""
-    rooms, walls = [], {contact.j}
-    for side in (1, -1):
-        here: Contact | None = contact
-        room = foot if side < 0 else float(finder.bodies.walls[contact.j].length) - foot
-        heading = side
-        while here is not None and (following := next_in_line(finder, here, heading)) is not None:
-            if following.j in walls:
-                break
-            room += float(finder.bodies.walls[following.j].length)
-            heading = heading if following.side == here.side else -heading
-            walls.add(following.j)
-            here = following
-        rooms.append(room)
-    return min(rooms), walls
+def room(finder: ContactFinder, contact: Contact, leg: Leg) -> float:
+    """m, how far a disk can slide along its wall, and the walls that continue it, either way."""
+    walls, frame = finder.scene.walls, finder.bodies.walls[contact.j]
+    foot = float(finder.bodies.foot(contact.j, leg.x, leg.y))
+    ends = (walls[finder.surface[contact.j]].reshape(-1, 2) - walls[contact.j, 0]) @ [
+        float(frame.tx),
+        float(frame.ty),
+    ]
+    return float(min(foot - ends.min(), ends.max() - foot))
 
 
 def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
@@ -238,17 +229,18 @@ def lie_down(finder: ContactFinder) -> list[Contact]:
 
 
 def next_in_line(finder: ContactFinder, contact: Contact, side: int) -> Contact | None:
-    """The contact with the wall that continues this one in line at its end (side 1) or start (-1);
-    None if there is none."""
+    """The contact with the wall that carries a disk on in line, farthest beyond the end (side 1) or
+    the start (-1) of this one; None if there is none."""
     walls, w = finder.scene.walls, contact.j
-    tip, heading = walls[w, 1 if side > 0 else 0], side * (walls[w, 1] - walls[w, 0])
-    for other, wall in enumerate(walls):
-        ahead_of = wall.sum(axis=0) - 2 * tip
-        joined = other != w and (wall == tip).all(axis=1).any() and ahead_of @ heading > 0
-        if joined and all(collinear(walls[w], end) for end in wall):
-            same = (wall[1] - wall[0]) @ (walls[w, 1] - walls[w, 0]) > 0
-            return contact._replace(j=other, side=contact.side if same else -contact.side)
-    return None
+    heading = walls[w] if side > 0 else walls[w, ::-1]
+    tip = line_span(heading, heading)[1]
+    spans = {k: line_span(heading, walls[k]) for k in finder.surface[w]}
+    beyond = {k: high for k, (low, high) in spans.items() if low <= tip < high}
+    if not beyond:
+        return None
+    k = max(beyond, key=lambda k: beyond[k])
+    same = (walls[k, 1] - walls[k, 0]) @ (walls[w, 1] - walls[w, 0]) > 0
+    return contact._replace(j=k, side=contact.side if same else -contact.side)
 
 
 def _pressed(bodies: Bodies, contact: Contact) -> bool:

@@ -152,6 +152,37 @@ def test_over_the_end_of_its_wall_a_fast_disk_flies_and_a_slow_one_is_refused(sp
     assert v[0] == pytest.approx([speed, -G * fall], abs=1e-14)
 
 
+@pytest.mark.parametrize("slope", [0.0, -0.5])
+@pytest.mark.parametrize(
+    "pieces",
+    [[(-4, 0), (0, 4)], [(0, -4), (4, 0)], [(-4, 1), (4, -1)], [(-4, 0), (-4, 0), (0, 4)]],
+    ids=["joined", "joined, the other way round", "overlapping", "twice"],
+)
+def test_a_slow_disk_goes_on_along_the_walls_that_continue_its_own(slope, pieces):
+    """As along a single wall: at rest on it, it passes their ends at 1 to 2 m/s."""
+    start = [-1.0, -slope + 0.5 * np.hypot(1, slope) + 0.01]
+    one, whole = (
+        EventEngine(
+            disks(
+                [start],
+                [[1.0, slope]],
+                0.25,
+                gravity=[0.0, -1.0],
+                walls=[[[x, slope * x] for x in ends] for ends in these],
+            )
+        )
+        for these in (pieces, [(-4, 4)])
+    )
+    for t in (0.5, 1.75):
+        for engine in (one, whole):
+            engine.advance(t)
+            assert engine.arena.disks[0].wall >= 0
+        (x, v), (x_whole, v_whole) = one.motion_at(t), whole.motion_at(t)
+        assert x == pytest.approx(x_whole, abs=1e-14)
+        assert v == pytest.approx(v_whole, abs=1e-14)
+    assert x[0, 0] > 0.5
+
+
 def test_a_thrust_off_the_floor_lifts_a_lying_disk_and_one_into_it_does_not():
     """2 m/s2 upward and to the right from 1 s to 2 s; the same twice as strong downward leaves it
     where it is."""
