@@ -14,7 +14,6 @@ from adapters.engines import ENGINES
 from adapters.mechanisms.table import (
     FLIGHT,
     FRICTION,
-    KNOWN,
     MECHANISMS,
     NAMES,
     POSITION_CORRECTION,
@@ -167,7 +166,7 @@ def test_every_mechanism_has_words(engine: str):
     )
 
 
-@pytest.mark.parametrize("engine", [*KNOWN, "new:plain"])
+@pytest.mark.parametrize("engine", [*MECHANISMS, "new:plain"])
 def test_every_name_of_a_mechanism_has_words(engine: str):
     """Whatever engine has it, fetched or new; a name that is none has none."""
     limit = Limit("slow_collision", engine, "quick", "never works", nan, 1.0, ())

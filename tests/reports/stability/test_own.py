@@ -200,7 +200,7 @@ def test_a_disk_whose_speed_an_engine_caps_fails():
     search = LimitSearch(case_of_file(str(SCENES / "bullet.toml"), "speed"), "box2d:shipped", QUICK)
     fast = search.trial(10.0)
 
-    assert (fast.works, fast.broken) == (False, "strays")
+    assert (fast.works, fast.broken) == (False, "wrong distance")
     assert fast.event == "disk 0 moves by 0.4 of its distance"
     assert search.trial(1.0).works
 
