@@ -28,6 +28,11 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
   const quiet = () => undefined;
   globalThis.console = { log: quiet, info: quiet, warn: quiet, error: quiet, debug: quiet, table: quiet, assert: quiet };
 
+  // A page in which nobody answers: each is closed at once.
+  globalThis.alert = quiet;
+  globalThis.confirm = () => false;
+  globalThis.prompt = () => null;
+
   let file;  // the solver's functions and globals, once it is loaded
   let world;  // the scene being played
   let accesses = "";  // what the last traced call read and wrote

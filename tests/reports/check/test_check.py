@@ -17,7 +17,7 @@ from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
 from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
 from reports.check.solver import check_solver
-from reports.check.verdict import FileCheck
+from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.confusion import TABLE, judged, said_first, said_too
 from tests.solvers.mutants import CORRECT, MUTANTS
 
@@ -392,6 +392,39 @@ def test_who_calls_gl_matrix_where_there_is_none_is_reported_where_to_put_it(tmp
         SolverFailed, match=r"calls gl-matrix\.js, which cannot be loaded .*; put the gl-matrix\.js"
     ):
         SolverProcess(read_solver(path))
+
+
+COLLIDE = "function sphereSphereCollisionHandling(sphereA, sphereB) {\n"
+
+
+@pytest.mark.usefixtures("none_fetched")
+def test_a_file_whose_gl_matrix_is_missing_is_not_judged(tmp_path: Path):
+    """It may be right: it has no fault and no points, whether it calls gl-matrix where it is loaded
+    or only in a collision, or what lies beside it is no library."""
+    path = tmp_path / "Exercise.js"
+    path.write_text((CORRECT[0].parent / "gl_vec3.js").read_text())
+    at_once = check_file(path)
+    (tmp_path / "gl-matrix.js").write_text("import { vec2 } from 'elsewhere';")
+    no_library = check_file(path)
+    (tmp_path / "gl-matrix.js").unlink()
+    plain = next(file for file in CORRECT if file.name == "plain.js").read_text()
+    path.write_text(plain.replace(COLLIDE, COLLIDE + "  var n = vec2.create();\n"))
+    in_a_collision = check_file(path)
+
+    for one in (at_once, no_library, in_a_collision):
+        assert (one.rows, one.faults) == ([], [])
+        assert "cannot be judged without the gl-matrix that it calls" in one.refused
+        assert "put the gl-matrix.js that the exercise hands out beside the file" in one.refused
+
+
+def test_what_opens_a_window_in_a_browser_costs_nothing(tmp_path: Path):
+    """alert, confirm and prompt are closed at once, as by somebody who only wants to go on."""
+    path = tmp_path / "Exercise.js"
+    plain = next(file for file in CORRECT if file.name == "plain.js").read_text()
+    calls = "  if (confirm('go on?') || prompt('how far?')) return;\n  alert('x');\n"
+    path.write_text(plain.replace(COLLIDE, COLLIDE + calls))
+
+    assert check_file(path).passed
 
 
 def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
