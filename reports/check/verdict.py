@@ -70,6 +70,11 @@ class FileCheck:
         """Whether the file was loaded, so that its tasks have rows."""
         return any(row.task != "file" for row in self.rows)
 
+    @property
+    def unjudged(self) -> bool:
+        """Whether nothing is known of its tasks."""
+        return bool(self.refused) or not self.loaded
+
     def of(self, task: str) -> list[CheckRow]:
         """The rows of a task."""
         return [row for row in self.rows if row.task == task]

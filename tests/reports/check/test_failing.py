@@ -226,7 +226,7 @@ OVERLAPPING = "reach/0"
 def test_the_page_does_not_say_that_a_scene_was_searched_where_none_can_be_played(tmp_path: Path):
     """A file that fails in a collision plays no scene."""
     one = checked(tmp_path, JS, TOO_FAR | THROWS_IN_C)
-    write_page(tmp_path / "check.html", one, [])
+    write_page(tmp_path / "check.html", *marks_of(one))
     said = (tmp_path / "check.html").read_text()
 
     assert "No scene was played with this file. The rows below show the faults." in said
