@@ -13,7 +13,7 @@ from reports.check.terminal import print_class, print_file
 TITLE = "crosscheck check\n\n"
 
 
-class Kept(StringIO):
+class TextFor(StringIO):
     """A text that is kept, for an output of this encoding."""
 
     def __init__(self, encoding: str) -> None:
@@ -41,7 +41,7 @@ def show(marked: Sequence[Marked]) -> None:
 
 def drawn(marked: Sequence[Marked], encoding: str) -> str:
     """It as text, without spaces at the end of lines."""
-    text = Kept(encoding)
+    text = TextFor(encoding)
     with redirect_stdout(text):
         draw(marked, wide=True)
     return "".join(f"{line.rstrip()}\n" for line in text.getvalue().split("\n")[:-1])
