@@ -298,7 +298,10 @@ def check(
         typer.Option(
             metavar="PATH",
             parser=place,
-            help="Where to write the page of the file, or of the class.  [default: check.html]",
+            help=(
+                "Where to write the page of the file, or of the class.  [default: check.html for a"
+                " file, none for a class]"
+            ),
         ),
     ] = None,
     formats: Annotated[

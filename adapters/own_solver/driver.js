@@ -32,6 +32,11 @@ Object.defineProperty(globalThis, "__crosscheck", { value: (() => {
     globalThis.console[name] = quiet;
   }
 
+  // A page in which nobody answers: each is closed at once.
+  globalThis.alert = quiet;
+  globalThis.confirm = () => false;
+  globalThis.prompt = () => null;
+
   let file;  // the solver's functions and globals, once it is loaded
   let world;  // the scene being played
   let accesses = "";  // what the last traced call read and wrote

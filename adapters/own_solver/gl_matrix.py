@@ -13,6 +13,10 @@ from adapters.npm_packages import HOW, file_of, missing
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
+# what V8, or javascript.py, says of a file whose gl-matrix is missing, or is none
+LACKING = re.compile(
+    rf"ReferenceError: (?:{'|'.join(NAMES)}) is not defined|calls \S+, which cannot be loaded \("
+)
 HANDED_OUT = "gl-matrix*.js"
 BESIDE = "put the gl-matrix.js that the exercise hands out beside the file"
 # 2.x, then 3.x
@@ -47,6 +51,12 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
         yield from ((file.relative_to(above).as_posix(), file) for file in built if file.is_file())
     if (fetched := file_of("gl-matrix")) is not None:
         yield fetched.name, fetched
+
+
+def lacks_gl_matrix(said: str) -> bool:
+    """Whether a failure says that the gl-matrix that a file calls is missing, which is no fault of
+    the file."""
+    return bool(LACKING.search(said))
 
 
 def where_to() -> str:

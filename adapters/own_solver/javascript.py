@@ -194,7 +194,6 @@ OUTSIDE = (
     "requestAnimationFrame",
     "document",
     "window",
-    "alert",
     "fetch",
     "localStorage",
 )

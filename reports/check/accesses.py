@@ -4,6 +4,7 @@ record it."""
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -110,7 +111,8 @@ def part_of(seen: Sequence[Access], failed_at: int, text: str) -> str:
         return "2d"
     if WRITES_POSITION.search(statement):
         return "2b"
-    if not failed_at and repeated(seen) == "position":
+    again = set() if failed_at else repeated(seen)
+    if "position" in again and not again & {"velocity", "mass"}:
         return "2b"
     displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
     before = [a for a in seen[displaced + 1 :] if not failed_at or a.line != failed_at]
@@ -129,10 +131,13 @@ FOR_IMPULSE = {(who, field) for who in (0, 1) for field in ("velocity", "mass")}
 FOR_DISTANCE = {(who, field) for who in (0, 1) for field in ("position", "size")}
 
 
-def repeated(seen: Sequence[Access]) -> str:
-    """The field that an endless call reads or writes repeatedly; "" if there is none."""
-    again = seen[-1:] and sum(access.line == seen[-1].line for access in seen) > LOOPS
-    return seen[-1].field if again else ""
+def repeated(seen: Sequence[Access]) -> set[str]:
+    """The fields that the loop of an endless call reads or writes; none if it repeats nothing.
+
+    The latest access is left out of what is counted: the call was stopped anywhere in its loop.
+    """
+    times = Counter(access.line for access in seen[:-1])
+    return {access.field for access in seen if times[access.line] > LOOPS}
 
 
 LOOPS = 40  # accesses from one line; a right call needs a dozen

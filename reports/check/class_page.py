@@ -12,7 +12,7 @@ from typing import NamedTuple
 from reports.check.marks import Marked, number
 from reports.check.page import GENERATOR
 from reports.check.rows import TASKS
-from reports.check.terminal import same_code, sentence_on
+from reports.check.terminal import results, same_code, sentence_on
 from reports.check.verdict import Tally, headline
 from reports.page.documents import render
 from reports.run.made import sealed
@@ -44,8 +44,9 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
         name=root.resolve().name,
         marked=marked,
         tasks={task: TASKS[task] for task in TASKS if any(task in one.worth for one in marked)},
-        right=sum(one.check.passed for one in marked),
-        refused=sum(bool(one.check.refused) for one in marked),
+        results=results(checks),
+        waits=sum(bool(one.not_judged) for one in marked),
+        twice=shared_ids(marked),
         points=bars(distribution(marked)),
         causes=bars(causes(marked)),
         copies=same_code(root, checks),
@@ -55,6 +56,11 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
         version=version("crosscheck2d"),
     )
     put_text(path, sealed(html))
+
+
+def shared_ids(marked: Sequence[Marked]) -> list[str]:
+    """The ids that several rows have."""
+    return [name for name, rows in Counter(one.id for one in marked).items() if rows > 1]
 
 
 def distribution(marked: Sequence[Marked]) -> dict[str, int]:

@@ -8,12 +8,13 @@ import os
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from unicodedata import combining, normalize
 
 from adapters.own_solver.file import (
     KINDS,
@@ -80,28 +81,37 @@ class Grading(NamedTuple):
 def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Grading) -> None:
     """Check the file or folder `path` and print the result; exits 0, 1 (a fault was found) or 2
     (nothing to check)."""
-    single = any(FORMATS[one.format].single for one in outputs)
+    for_one = [one for one in outputs if FORMATS[one.format].single]
+    single = bool(for_one)
+    if single and len(students := students_in(path)) > 1:
+        why = f"holds the folders of {len(students)} students: {named(students)}"
+        refuse(
+            [f"{path}: {why}; --format {for_one[0].format} is for one, --format csv for a class"]
+        )
     files = submission_of(path) if single else files_of(path)
     several = path.is_dir() and not single
     if page is None and not path.is_dir() and all(one.option == "--junit" for one in outputs):
         page = Path("check.html")
     places_for(page, outputs)
-    checks = [one_of_several(path)] if single and files[0].is_dir() else checked(files)
+    checks = checked(files)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
     if single and files[0].is_dir() and len(solvers_below(path)) > 1:
         say(f"{path}: holds several solvers; for a class: --format csv, or --scaffold")
-    not_read = others_in(path, files) if several else []
+    homes = {file: path if single else student_of(file, path) for file in files}
+    beside = {file: passed_over(file, home) for file, home in homes.items()}
+    places = [f"{homes[file].name}/{one}" for file, others in beside.items() for one in others]
+    not_read = [*others_in(path, files), *places] if several else []
     wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
     scenes = scenes_of(checks[0]) if any(wanted) else []
-    marked = marks_of(path, checks, grading, not_read, scenes)
+    marked = marks_of(path, checks, grading, not_read, beside, scenes)
     printed = next((one.format for one in outputs if one.path is None), "")
     if printed:
         sys.stdout.write(FORMATS[printed].text(marked))
         if not_read:
             say(sentence_on(not_read))
     elif several and any(one.option == "--out" for one in outputs):
-        print_total(checks, not_read)
+        print_total(marked)
     else:
         show(marked)
     for one in outputs:
@@ -112,7 +122,7 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     elif page is not None:
         if scenes and not printed:
             print_scene(scenes, page)
-        make_page(page, checks[0], scenes)
+        make_page(page, marked[0])
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
 
 
@@ -160,11 +170,13 @@ def marks_of(
     checks: Sequence[FileCheck],
     grading: Grading,
     not_read: Sequence[str],
+    beside: Mapping[Path, Sequence[str]],
     scenes: Sequence[Smallest],
 ) -> list[Marked]:
     """The marks of each file; warns on standard error about doubtful ids.
 
-    scenes: for a single file, those that show its faults.
+    beside: the solvers that are `passed_over` for each file; scenes: for a single file, those that
+    show its faults.
     """
     pattern, within = grading.id_pattern, [one.path for one in checks]
     ids = [id_of(file, path, pattern) for file in within]
@@ -175,7 +187,17 @@ def marks_of(
     if twice := [name for name, times in Counter(ids).items() if times > 1]:
         say(f"the same id for several files: {named(twice)}")
     return [
-        Marked(name, one, path, grading.points, grading.low, not_read, scenes)
+        Marked(
+            name,
+            one,
+            path,
+            grading.points,
+            grading.low,
+            not_read,
+            scenes,
+            beside[one.path],
+            matched(one.path, path, pattern),
+        )
         for name, one in zip(ids, checks)
     ]
 
@@ -185,13 +207,36 @@ def submission_of(path: Path) -> list[Path]:
     one there with a name of the exercise; else the folder itself."""
     if not path.is_dir():
         return files_of(path)
-    found = solvers_below(path)
+    return chosen_of(path, solvers_below(path))
+
+
+def chosen_of(folder: Path, found: Sequence[Path]) -> list[Path]:
+    """The solver of the student whose folder this is; the folder itself if it holds none, or
+    several of which not exactly one has a name of the exercise."""
     named_so = [file for file in found if file.name.lower() in EXPECTED]
-    chosen = named_so if len(named_so) == 1 else found
-    return chosen if len(chosen) == 1 else [path]
+    chosen = named_so if len(named_so) == 1 else list(found)
+    return chosen if len(chosen) == 1 else [folder]
 
 
-def one_of_several(folder: Path) -> FileCheck:
+def students_in(folder: Path) -> list[str]:
+    """The names of the folders in it that hold a file with a name of the exercise."""
+    found = (file.relative_to(folder).parts for file in solvers_below(folder))
+    return sorted({parts[0] for parts in found if len(parts) > 1 and parts[-1].lower() in EXPECTED})
+
+
+def student_of(file: Path, folder: Path) -> Path:
+    """The student's folder in a class, or the file if it lies in the class itself."""
+    return folder / file.relative_to(folder).parts[0] if file != folder else file
+
+
+def passed_over(file: Path, folder: Path) -> list[str]:
+    """The other solvers in a student's folder, of which `file` is judged; none if none is."""
+    if not file.is_file():
+        return []
+    return [place_of(other, folder) for other in solvers_below(folder) if other != file]
+
+
+def refused_folder(folder: Path) -> FileCheck:
     """The message on a submission without a solver, or with several."""
     files = [place_of(file, folder) for file in solvers_below(folder)]
     if not files:
@@ -201,10 +246,12 @@ def one_of_several(folder: Path) -> FileCheck:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The file, or all solvers below a folder, sorted by name; exits 2 if there are none.
+    """The file, or the solver of each student of a class, sorted by name; exits 2 if there are
+    none.
 
-    Dangling links are included, and so are entries of students without a solver: an archive, a PDF,
-    or a folder that `is_missing`.
+    A folder stands for a student whose solver cannot be told (`chosen_of`). Dangling links are
+    included, and so are entries of students without a solver: an archive, a PDF, or a folder that
+    `is_missing`.
     """
     try:
         there = path.exists()
@@ -217,7 +264,9 @@ def files_of(path: Path) -> list[Path]:
     found = solvers_below(path)
     if not found:
         refuse([f"{path}: {nothing_in(path)}"])
-    owners = {file.relative_to(path).parts[0] for file in found}
+    owners: dict[str, list[Path]] = {}
+    for file in found:
+        owners.setdefault(file.relative_to(path).parts[0], []).append(file)
     loose = sum(file.parent == path for file in found)
     foldered = 2 * loose < len(found)
     missing = [
@@ -226,7 +275,8 @@ def files_of(path: Path) -> list[Path]:
         if one.name not in owners
         and (one.suffix.lower() in HANDED_IN if one.is_file() else is_missing(one, foldered))
     ]
-    return sorted(found + missing)
+    chosen = [one for name, mine in owners.items() for one in chosen_of(path / name, mine)]
+    return sorted(chosen + missing, key=alphabetical)
 
 
 def solvers_below(folder: Path) -> list[Path]:
@@ -239,6 +289,12 @@ def solvers_below(folder: Path) -> list[Path]:
         and (file.is_file() or dangling(file))
         and not is_handed_out(file)
     )
+
+
+def alphabetical(path: Path) -> tuple[str, Path]:
+    """A key for the order of a list of names: a letter with an accent is at the letter."""
+    letters = normalize("NFKD", path.as_posix())
+    return "".join(one for one in letters if not combining(one)).casefold(), path
 
 
 def visible(paths: Iterable[Path]) -> list[Path]:
@@ -316,13 +372,16 @@ def checked(files: Sequence[Path]) -> list[FileCheck]:
             found = not_checked(first, one) if isinstance(one, Failure) else one
             done |= {first: found} | {file: named_for(file, found) for file in alike[key][1:]}
             progress.done(f"checked {printable(str(first.relative_to(first.parent.parent)))}")
+    if len(files) > 1:
+        once = f", with {counted(len(tasks), 'different text')}: the same text is judged once"
+        say(f"checked {counted(len(files), 'submission')}{once * (len(tasks) < len(files))}")
     return [done[file] for file in files]
 
 
 def check_here(file: Path) -> FileCheck:
     """In a worker: the check of a file, in the process of the previous file if possible."""
     keep_processes()
-    return check_file(file)
+    return refused_folder(file) if file.is_dir() else check_file(file)
 
 
 def identity_of(file: Path) -> Hashable:
@@ -359,11 +418,11 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
     return [] if isinstance(found, Failure) else found  # the rows say how it failed
 
 
-def make_page(path: Path, one: FileCheck, scenes: Sequence[Smallest]) -> None:
+def make_page(path: Path, marked: Marked) -> None:
     """Write the page of a file."""
     from reports.check.page import write_page
 
-    put_page(path, partial(write_page, path, one, scenes))
+    put_page(path, partial(write_page, path, marked))
 
 
 def make_class_page(path: Path, marked: Sequence[Marked]) -> None:
@@ -405,3 +464,4 @@ def write(output: Output, text: str) -> None:
     except OSError as fault:
         why = fault.strerror or fault
         refuse([f"{output.option} {output.path}: {why}; name a file that can be written"])
+    say(f"{output.path.resolve()}")

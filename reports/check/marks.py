@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from adapters.own_solver.file import printable
 from reports.check.outcomes import OUTCOMES, Status
 from reports.check.points import Points
 from reports.check.rows import TASKS, UNKNOWN, CheckRow
@@ -47,9 +48,15 @@ class TaskMark(NamedTuple):
 class Marked:
     """A check with the student's id and points.
 
-    root: the file or folder given; worth: points of each question; low: whether feedback omits
-    causes, lines and formulas; not_read: other entries of `root`, without a row;
-    scenes: the smallest that show its faults, if a format has them.
+    Attributes:
+        root: the file or folder given.
+        worth: points of each question.
+        low: whether feedback omits causes, lines and formulas.
+        not_read: what lies in `root` without a row.
+        scenes: the smallest that show its faults, if a format has them.
+        beside: other solvers in the student's folder, which are not judged.
+        label: what tables call it, the id that a pattern took out of the path; "" for its place in
+            `root`.
     """
 
     id: str
@@ -59,6 +66,13 @@ class Marked:
     low: bool = False
     not_read: Sequence[str] = ()
     scenes: Sequence[Smallest] = ()
+    beside: Sequence[str] = ()
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """What tables of a class call it."""
+        return self.label or printable(place_of(self.check.path, self.root))
 
     @cached_property
     def tasks(self) -> list[TaskMark]:
@@ -86,6 +100,12 @@ class Marked:
         return rounded(sum(mark.not_judged for mark in self.tasks))
 
     @property
+    def total(self) -> str:
+        """A sentence with all points, and one with those that are not judged."""
+        said = f"{number(self.points)} of {number(self.most)} points."
+        return f"{said} {waiting(self.not_judged)}" if self.not_judged else said
+
+    @property
     def status(self) -> Status:
         """The status of the whole file."""
         if self.check.refused:
@@ -104,9 +124,13 @@ class Marked:
         """The text for a student above the tasks."""
         if self.check.refused:
             return self.brief
-        said = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
-        said = f"{said} {number(self.points)} of {number(self.most)} points."
-        return " ".join([said, *(f"{title} gives no points." for title in self.without_points)])
+        begin = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
+        said = [begin, self.total]
+        said += [f"{title} gives no points." for title in self.without_points]
+        if self.beside:
+            judged = f"{self.check.path.name} is judged; not judged: {', '.join(self.beside)}."
+            said.append(judged)
+        return " ".join(said)
 
     @property
     def without_points(self) -> list[str]:
@@ -119,6 +143,7 @@ class Marked:
         if self.check.refused:
             return [self.brief]
         rows = self.check.of(task)
+        points = next((mark.not_judged for mark in self.tasks if mark.task == task), 0.0)
         lines = [line for row in self.check.causes if row.task == task for line in self.of(row)]
         lines += [f"{row.name}: {row.cause}; it costs nothing" for row in rows if follows(row)]
         lines += [
@@ -129,7 +154,7 @@ class Marked:
         ]
         if not rows:
             lines += ["not asked: the file could not be used", *self.of(self.check.faults[0])]
-        return lines
+        return lines + [waiting(points)] * bool(points)
 
     def of(self, row: CheckRow) -> list[str]:
         """A fault for the student: question and numbers; unless `low` also the likely cause, the
@@ -215,6 +240,12 @@ def place_of(file: Path, root: Path) -> str:
 def rounded(points: float) -> float:
     """Points without the last bits of their sum."""
     return round(points, 6)
+
+
+def waiting(points: float) -> str:
+    """The sentence on points that are neither given nor lost."""
+    noun = "point" if points == 1 else "points"
+    return f"{number(points)} {noun} could not be judged: a person decides."
 
 
 def number(points: float) -> str:

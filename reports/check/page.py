@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from adapters.run import Run
+from reports.check.marks import Marked
 from reports.check.picture import data_url, legend
 from reports.check.rows import TASKS, Verdict, shown
 from reports.check.scene_words import faults_of, scene_lines, together
 from reports.check.smallest_scene import DT, Smallest
+from reports.check.terminal import points_of
 from reports.check.verdict import FileCheck, Tally
 from reports.page import style
 from reports.page.documents import ENGINE, render
@@ -62,9 +64,10 @@ class SceneShown(NamedTuple):
     caption: str
 
 
-def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None:
+def write_page(path: Path, marked: Marked) -> None:
     """Write the page of one file, with the smallest scenes that show its faults, to `path`,
     overwriting what is there."""
+    check, scenes = marked.check, marked.scenes
     shows = [scene_shown(check.path.name, smallest) for smallest in scenes]
     names = dict.fromkeys(name for one in shows for name in one.layers)
     looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
@@ -76,6 +79,8 @@ def write_page(path: Path, check: FileCheck, scenes: Sequence[Smallest]) -> None
         looks=looks,
         name=check.path.name,
         check=check,
+        points={mark.task: points_of(mark) for mark in marked.tasks},
+        total=marked.total,
         tasks=TASKS,
         groups=GROUPS,
         counted=Tally._fields,

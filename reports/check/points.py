@@ -29,6 +29,7 @@ QUESTIONS = {
     "loop": ("all spheres", "pairs", "integration first", "edges in a step", "edges", "ufo"),
     "scenes": ("forced", "head_on", "oblique", "row", "crowd", "first wrong collision"),
 }
+AS_A_WHOLE = "write 2c = 4 above the first [header], and delete [2c] with its questions"
 DECIMAL_COMMA = re.compile(r"=\s*\d+,\d")
 Points = Mapping[str, Mapping[str, float]]
 """Task -> question -> points. A task that is not in it gives none."""
@@ -52,6 +53,8 @@ def read_points(path: Path = DEFAULT) -> Points:
         raise BadPoints(f"{path}: line {line} is not UTF-8; save the file as UTF-8") from None
     except ValueError as fault:
         hint = "; write 4.5, not 4,5" if DECIMAL_COMMA.search(text) else ""
+        twice = re.search("overwrite|twice|declare", str(fault))
+        hint = f"; a task has points as a whole or by question: {AS_A_WHOLE}" if twice else hint
         raise BadPoints(f"{path}: is not TOML: {' '.join(str(fault).split())}{hint}") from None
     if unknown := [task for task in given if task not in QUESTIONS]:
         raise BadPoints(f"{path}: there is no task {unknown[0]!r}; tasks: {', '.join(QUESTIONS)}")
@@ -82,8 +85,14 @@ def of_task(path: Path, task: str, given: Any) -> dict[str, float]:
     for name in given:
         if name not in QUESTIONS[task]:
             known = ", ".join(QUESTIONS[task])
-            raise BadPoints(f"{path}: task {task} has no question {name!r}; questions: {known}")
+            why = f"{path}: task {task} has no question {name!r}; questions: {known}"
+            raise BadPoints(f"{why}{hint_for(name)}")
     return {name: amount(path, f"{task}, {name}", value) for name, value in given.items()}
+
+
+def hint_for(question: str) -> str:
+    """What to do if the name of a question is that of a task: it stands below another's header."""
+    return f"; for the points of a task: {AS_A_WHOLE}" if question in QUESTIONS else ""
 
 
 def shares(task: str) -> dict[str, float]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
@@ -26,7 +29,7 @@ from reports.check.projection import (
 )
 from reports.check.questions import QUESTIONS, SolverAnswer, ask_in_two_orders, was_stopped
 from reports.check.restitution import Restitution, restitution_of
-from reports.check.rows import CheckRow, judged, not_asked
+from reports.check.rows import SAME_AGAIN, CheckRow, judged, near, not_asked
 from reports.check.scenes import scene_rows
 
 
@@ -83,15 +86,57 @@ def rows_of(
     rows = [loads(process), *task_1(process, answers, others, text)]
     contact, restitution = task_2(process, answers, others, source, with_beside)
     rows += contact
-    faulty = any(row.verdict == "fault" for row in rows)
     if was_stopped(answers):
         rows.append(not_asked("step", "loop", "a call did not return"))
     else:
-        rows += loop_rows(process, faulty)
+        rows += step_of(process, rows, answers)
     e = restitution.for_scenes if restitution is not None else None
     rows = with_consequences([*rows, *scene_rows(process, rows, e)])
     rows = hinted(rows, text) if process.kind == "javascript" else rows
     return with_lines(rows, source), e
+
+
+def step_of(
+    process: SolverProcess, rows: Sequence[CheckRow], answers: dict[str, SolverAnswer]
+) -> list[CheckRow]:
+    """The rows of the step, of those questions that the faults of its functions leave open.
+
+    That every sphere is integrated once is compared with the file's own integrate. Which pairs
+    collide is seen by their velocities, which tells nothing where those are wrong.
+    """
+    faults = [row for row in rows if row.verdict == "fault"]
+    found = loop_rows(process, hide_the_step(faults, answers))
+    if not any(row.task[0] == "2" for row in faults):
+        return found
+    return [
+        not_asked(row.name, "loop", "the collision function has faults")
+        if row.name in BY_COLLISIONS
+        else row
+        for row in found
+    ]
+
+
+BY_COLLISIONS = ("pairs", "integration first")
+
+
+def hide_the_step(faults: Sequence[CheckRow], answers: dict[str, SolverAnswer]) -> bool:
+    """Whether these faults of the functions would show in all of a step as if they were its own: if
+    distant spheres collide, a function fails, or a sphere without force does not move by v dt."""
+    question, answer = QUESTIONS["coast"], answers.get("coast")
+    coasts = False
+    if answer is not None and answer.balls:
+        (before,), after, dt = question.balls, answer.last[0], question.calls[0][2]
+        coasts = near(after.v, before.v) and near(
+            after.x, np.add(before.x, np.multiply(before.v, dt))
+        )
+    return any(
+        row.task in ("file", "2a") or row.name in AS_A_WHOLE or (row.task == "1" and not coasts)
+        for row in faults
+    )
+
+
+# faults of a function, not of its numbers
+AS_A_WHOLE = ("implemented", "input only", SAME_AGAIN, "sphere kept", "force kept")
 
 
 def with_lines(rows: list[CheckRow], source: Source) -> list[CheckRow]:

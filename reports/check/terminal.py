@@ -10,7 +10,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from adapters.own_solver.file import printable
+from adapters.own_solver.file import KINDS, printable
+from reports.check.marks import Marked, TaskMark, number
 from reports.check.outcomes import OUTCOMES
 from reports.check.rows import TASKS, CheckRow
 from reports.check.scene_words import faults_of, scene_lines, together
@@ -18,7 +19,7 @@ from reports.check.verdict import FileCheck, Tally, headline, named, numbers_of
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import legible
-from reports.terminal.tables import print_table
+from reports.terminal.tables import print_table, print_texts, width_of
 
 if TYPE_CHECKING:
     from reports.check.smallest_scene import Smallest
@@ -30,17 +31,21 @@ STYLE = {
     "free choice": "yellow",
     "not asked": "dim",
 }
-LEGEND = (
-    "ok: no fault. FAULT: begin here. <-: wrong because of a FAULT to the left of it. -: not"
-    " asked, or only in part: the file has no such part, or a FAULT hides it."
-)
+LEGEND = {
+    "ok": "no fault",
+    "FAULT": "begin here",
+    "<-": "wrong because of a FAULT to the left of it",
+    "-": "not asked, or only in part: the file has no such part, or a FAULT hides it",
+    "total": "points; what is not judged is in none of them: a person decides",
+}
+WIDE = 1000  # columns of a table that is no terminal's: no name is cut
 LEAST = 24  # columns of a name: student and file are told by its ends
 
 
-def print_file(one: FileCheck) -> None:
+def print_file(marked: Marked) -> None:
     """Print the sentences with lines and numbers, the verdict of every task, the consequences of
     the faults, what could not be asked, and the free choices, each under an explaining title."""
-    console = Console()
+    console, one = Console(), marked.check
     if one.passed or one.refused:
         console.print(legible(one.sentences[0]), highlight=False)
     if one.refused:
@@ -48,7 +53,7 @@ def print_file(one: FileCheck) -> None:
     for k, row in enumerate(one.findings, 1):
         print_fault(console, k, row, one.also(row))
     console.print()
-    print_tasks(console, one)
+    print_tasks(console, marked)
     if more := one.causes[len(one.findings) :]:
         print_rows(console, "More faults:", more)
     if one.consequences:
@@ -83,14 +88,24 @@ def print_fault(console: Console, number: int, row: CheckRow, also: Sequence[Che
         console.print(Padding(grid, (0, 0, 0, 3)), highlight=False)
 
 
-def print_tasks(console: Console, one: FileCheck) -> None:
-    """Print the verdict of every task, the number of questions asked and of wrong answers."""
-    table = Table("task", "verdict", *Tally._fields, box=None, padding=(0, 2, 0, 0))
+def print_tasks(console: Console, marked: Marked) -> None:
+    """Print the verdict of every task, its points, and the number of questions asked and of wrong
+    answers; below, the sum of the points."""
+    one, marks = marked.check, {mark.task: mark for mark in marked.tasks}
+    rows: list[list[str | Text]] = []
     for task, title in TASKS.items():
         if one.of(task):
             verdict = Text(one.word(task), STYLE[one.tasks[task]])
-            table.add_row(title, verdict, *map(shown, one.tally(task)))
-    console.print(table)
+            points = points_of(marks[task]) if task in marks else ""
+            rows.append([title, verdict, points, *map(shown, one.tally(task))])
+    headings = ["task", "verdict", "points", *Tally._fields]
+    print_table(console, headings, rows, left=["verdict", "points"])
+    console.print(f"\n{marked.total}", highlight=False)
+
+
+def points_of(mark: TaskMark) -> str:
+    """The points of a task, and the points possible; "" if it gives none."""
+    return f"{number(mark.points)} of {number(mark.most)}" if mark.most else ""
 
 
 def shown(count: int) -> str:
@@ -127,11 +142,6 @@ def print_rows(console: Console, title: str, rows: Sequence[CheckRow]) -> None:
     console.print(Padding(grid, (0, 0, 0, 2)))
 
 
-def name_in(folder: Path, one: FileCheck) -> str:
-    """The name of a file within its class."""
-    return printable(str(one.path.relative_to(folder)))
-
-
 def elided(name: str, room: int) -> str:
     """A name that fits into `room` columns; a longer one loses its middle, because its ends name
     student and file."""
@@ -141,30 +151,28 @@ def elided(name: str, room: int) -> str:
     return f"{name[: max(room - end - 1, 1)]}…{name[-end:]}"
 
 
-def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[str] = ()) -> None:
-    """Print a row for each file with a verdict for every task and the numbers of questions; below,
-    the meaning of the signs, the first sentence of each file, the copies, and other entries of the
-    folder."""
-    console = Console()
-    widest = {
-        task: max(len(task), *(len(OUTCOMES[one.tasks[task]].short) for one in checks))
-        for task in TASKS
-    }
-    columns = [*widest.values(), *map(len, Tally._fields)]
-    beside = console.width - sum(width + 1 for width in columns)
-    room = (
-        beside if beside >= LEAST else console.width // 2
-    )  # then in two tables, one below the other
+def print_class(marked: Sequence[Marked], wide: bool = False) -> None:
+    """Print a row for each file with a verdict for every task, its points, and the numbers of
+    questions; below, the meaning of the signs, the first sentence of each file, the copies, and
+    other entries of the folder. wide: whether lines may be as long as the table needs."""
+    console, checks = Console(), [one.check for one in marked]
+    table = Console(width=WIDE) if wide else console
+    headings = [*TASKS, "total", *Tally._fields, "not judged"]
     rows: list[list[str | Text]] = []
-    for one in checks:
-        words = [Text(OUTCOMES[word].short, STYLE[word]) for word in one.tasks.values()]
-        rows.append([elided(name_in(folder, one), room), *words, *map(shown, one.tally())])
-    print_table(console, ["solver", *TASKS, *Tally._fields], rows, left=list(TASKS))
-    console.print(f"\n{LEGEND}", highlight=False)
+    for one in marked:
+        words = [Text(OUTCOMES[word].short, STYLE[word]) for word in one.check.tasks.values()]
+        waits = number(one.not_judged) if one.not_judged else ""
+        numbers = [number(one.points), *map(shown, one.check.tally()), waits]
+        rows.append([one.name, *words, *numbers])
+    room = room_for_names(table.width, headings, rows)
+    rows = [[elided(one.name, room), *row[1:]] for one, row in zip(marked, rows)]
+    print_table(table, ["solver", *headings], rows, left=list(TASKS))
+    console.print()
+    print_texts(console, LEGEND)
     first = {
-        name_in(folder, one): one.brief.removeprefix(f"{one.path}: ")
-        for one in checks
-        if not one.passed
+        one.name: one.check.brief.removeprefix(f"{one.check.path}: ")
+        for one in marked
+        if not one.check.passed
     }
     if first:
         console.print("\nTo begin with:")
@@ -172,33 +180,57 @@ def print_class(folder: Path, checks: Sequence[FileCheck], not_read: Sequence[st
         begin = Text.assemble((legible(name), "bold"), ": ", legible(sentence))
         console.print(Padding(begin, (0, 0, 0, 2)), highlight=False)
     console.print()
-    for names in same_code(folder, checks):
+    for names in same_code(marked[0].root, checks):
         said = f"The same code, but for spaces and lines of comments: {', '.join(names)}."
         console.print(legible(said), highlight=False)
-    print_total(checks, not_read)
+    print_total(marked)
 
 
-def print_total(checks: Sequence[FileCheck], not_read: Sequence[str] = ()) -> None:
+def room_for_names(
+    width: int, headings: Sequence[str], rows: Sequence[Sequence[str | Text]]
+) -> int:
+    """Columns for the names beside the other columns; half of the width if these leave too few, so
+    that the table becomes two, one below the other."""
+    beside = width - sum(
+        max(map(width_of, (heading, *(row[k] for row in rows)))) + 1
+        for k, heading in enumerate(headings, 1)
+    )
+    return beside if beside >= LEAST else width // 2
+
+
+def print_total(marked: Sequence[Marked]) -> None:
     """Print how many files have which result, and what is in the folder without a row."""
-    console = Console()
-    console.print(total(checks), highlight=False)
-    if any(one.faults for one in checks):
+    console, not_read = Console(), marked[0].not_read
+    console.print(total([one.check for one in marked]), highlight=False)
+    if waits := sum(bool(one.not_judged) for one in marked):
+        said = f"In {counted(waits, 'submission')} points are not judged: a person decides."
+        console.print(said, highlight=False)
+    if any(one.check.faults for one in marked):
         console.print("crosscheck check FILE shows the lines and the numbers of one.")
     if not_read:
         console.print(sentence_on(not_read), highlight=False)
 
 
 def sentence_on(not_read: Sequence[str]) -> str:
-    """A sentence on the entries of a class folder without a row."""
-    return f"Not read, as no .js and no .py file: {named(not_read)}."
+    """A sentence on the entries of a class folder without a row, and one on the solvers that are
+    not judged."""
+    solvers = [name for name in not_read if Path(name).suffix.lower() in KINDS]
+    others = [name for name in not_read if name not in solvers]
+    said = [f"Not read, as no .js and no .py file: {named(others)}."] * bool(others)
+    beside = f"Not judged, as an Exercise.js or solver.py is beside it: {named(solvers)}."
+    return " ".join(said + [beside] * bool(solvers))
 
 
 def total(checks: Sequence[FileCheck]) -> str:
-    """A sentence with the number of files and of each result."""
-    right, refused = sum(one.passed for one in checks), sum(bool(one.refused) for one in checks)
-    parts = [f"{right} without a fault", f"{len(checks) - right - refused} with a fault"]
-    parts += [f"{refused} that could not be checked"] * bool(refused)
-    return f"{counted(len(checks), 'solver')}: {', '.join(parts)}."
+    """A sentence with the number of submissions and of each result."""
+    return f"{counted(len(checks), 'submission')}: {results(checks)}."
+
+
+def results(checks: Sequence[FileCheck]) -> str:
+    """How many are without a fault, with one, and not judged at all."""
+    right, unjudged = sum(one.passed for one in checks), sum(one.unjudged for one in checks)
+    parts = [f"{right} without a fault", f"{len(checks) - right - unjudged} with a fault"]
+    return ", ".join(parts + [f"{unjudged} that could not be judged"] * bool(unjudged))
 
 
 def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
@@ -207,7 +239,9 @@ def same_code(folder: Path, checks: Sequence[FileCheck]) -> list[list[str]]:
     for one in checks:
         if one.solver is not None:
             comment = "#" if one.path.suffix.lower() == ".py" else "//"
-            names.setdefault(code_only(one.solver.text, comment), []).append(name_in(folder, one))
+            names.setdefault(code_only(one.solver.text, comment), []).append(
+                printable(str(one.path.relative_to(folder)))
+            )
     return [alike for alike in names.values() if len(alike) > 1]
 
 

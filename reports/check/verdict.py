@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from adapters.own_engine.surface import is_engine
 from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
+from adapters.own_solver.gl_matrix import lacks_gl_matrix
 from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
@@ -68,6 +69,11 @@ class FileCheck:
     def loaded(self) -> bool:
         """Whether the file was loaded, so that its tasks have rows."""
         return any(row.task != "file" for row in self.rows)
+
+    @property
+    def unjudged(self) -> bool:
+        """Whether nothing is known of its tasks."""
+        return bool(self.refused) or not self.loaded
 
     def of(self, task: str) -> list[CheckRow]:
         """The rows of a task."""
@@ -188,6 +194,10 @@ def check_of(path: Path) -> FileCheck:
         if is_engine(solver):
             raise NotASolver(f"{path}: {ENGINE}; {RUN_INSTEAD} {shlex.quote(str(path))}")
         rows, restitution = examine(solver)
+        if lacking := next((row.cause for row in rows if lacks_gl_matrix(row.cause)), ""):
+            raise NotASolver(
+                f"{path}: cannot be judged without the gl-matrix that it calls: {lacking}"
+            )
         return FileCheck(path, rows, restitution=restitution, solver=solver)
     except NotASolver as refusal:
         return FileCheck(path, [], str(refusal))

@@ -16,9 +16,10 @@ JUNIT = b'<testsuites name="crosscheck check"'
 
 def as_junit(marked: Sequence[Marked]) -> str:
     """A test suite for each file, a test case for each row; a fault is a failure, what was not
-    asked or follows from a fault is skipped."""
+    asked or follows from a fault is skipped. The class of the cases is the student's id."""
     suites = ElementTree.Element("testsuites", name="crosscheck check")
-    for one in (student.check for student in marked):
+    for student in marked:
+        one = student.check
         skipped = sum(OUTCOMES[row.verdict].junit == "skipped" for row in one.rows)
         suite = ElementTree.SubElement(
             suites,
@@ -31,14 +32,14 @@ def as_junit(marked: Sequence[Marked]) -> str:
         )
         if one.refused:
             case = ElementTree.SubElement(
-                suite, "testcase", classname=plain(one.path.name), name="file: is a solver"
+                suite, "testcase", classname=plain(student.id), name="file: is a solver"
             )
             ElementTree.SubElement(case, OUTCOMES["refused"].junit, message=plain(one.refused))
         for row in one.rows:
             case = ElementTree.SubElement(
                 suite,
                 "testcase",
-                classname=plain(one.path.name),
+                classname=plain(student.id),
                 name=plain(f"{row.task}: {row.name}"),
             )
             if OUTCOMES[row.verdict].junit == "failure":
@@ -46,6 +47,7 @@ def as_junit(marked: Sequence[Marked]) -> str:
                 failure.text = plain("\n".join([row.asked, *evidence(row)]))
             elif OUTCOMES[row.verdict].junit == "skipped":
                 ElementTree.SubElement(case, "skipped", message=plain(row.cause))
+        ElementTree.SubElement(suite, "system-out").text = plain(student.total)
     ElementTree.indent(suites)
     return sealed(ElementTree.tostring(suites, encoding="unicode", xml_declaration=True) + "\n")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from io import StringIO
@@ -12,15 +13,40 @@ from reports.check.terminal import print_class, print_file
 TITLE = "crosscheck check\n\n"
 
 
+class TextFor(StringIO):
+    """A text that is kept, for an output of this encoding."""
+
+    def __init__(self, encoding: str) -> None:
+        super().__init__()
+        self.written_in = encoding
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """What `legible` asks for."""
+        return self.written_in
+
+
 def table_text(marked: Sequence[Marked]) -> str:
     """The table of a class, or the check of a file, under a title by which a file is known."""
-    text = StringIO()
-    with redirect_stdout(text):
-        show(marked)
-    return TITLE + text.getvalue()
+    return TITLE + drawn(marked, "utf-8")
 
 
 def show(marked: Sequence[Marked]) -> None:
-    """Print it."""
-    root, checks = marked[0].root, [one.check for one in marked]
-    print_class(root, checks, marked[0].not_read) if root.is_dir() else print_file(checks[0])
+    """Print it; a table in a pipe is as wide as its names need."""
+    if sys.stdout.isatty():
+        draw(marked)
+    else:
+        sys.stdout.write(drawn(marked, sys.stdout.encoding or "utf-8"))
+
+
+def drawn(marked: Sequence[Marked], encoding: str) -> str:
+    """It as text, without spaces at the end of lines."""
+    text = TextFor(encoding)
+    with redirect_stdout(text):
+        draw(marked, wide=True)
+    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().split("\n")[:-1])
+
+
+def draw(marked: Sequence[Marked], wide: bool = False) -> None:
+    """Print it to whatever standard output is."""
+    print_class(marked, wide) if marked[0].root.is_dir() else print_file(marked[0])

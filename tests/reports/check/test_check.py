@@ -14,11 +14,11 @@ from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.functions import is_read
-from reports.check.questions import QUESTIONS, Ball, ask
-from reports.check.rows import TASKS
+from reports.check.questions import QUESTIONS, Ball, SolverAnswer, ask
+from reports.check.rows import TASKS, CheckRow
 from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
-from reports.check.solver import check_solver
-from reports.check.verdict import FileCheck
+from reports.check.solver import check_solver, hide_the_step
+from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.confusion import TABLE, judged, said_first, said_too
 from tests.solvers.mutants import CORRECT, MUTANTS
 
@@ -417,6 +417,39 @@ def test_who_calls_gl_matrix_where_there_is_none_is_reported_where_to_put_it(tmp
         SolverProcess(read_solver(path))
 
 
+COLLIDE = "function sphereSphereCollisionHandling(sphereA, sphereB) {\n"
+
+
+@pytest.mark.usefixtures("none_fetched")
+def test_a_file_whose_gl_matrix_is_missing_is_not_judged(tmp_path: Path):
+    """It may be right: it has no fault and no points, whether it calls gl-matrix where it is loaded
+    or only in a collision, or what lies beside it is no library."""
+    path = tmp_path / "Exercise.js"
+    path.write_text((CORRECT[0].parent / "gl_vec3.js").read_text())
+    at_once = check_file(path)
+    (tmp_path / "gl-matrix.js").write_text("import { vec2 } from 'elsewhere';")
+    no_library = check_file(path)
+    (tmp_path / "gl-matrix.js").unlink()
+    plain = next(file for file in CORRECT if file.name == "plain.js").read_text()
+    path.write_text(plain.replace(COLLIDE, COLLIDE + "  var n = vec2.create();\n"))
+    in_a_collision = check_file(path)
+
+    for one in (at_once, no_library, in_a_collision):
+        assert (one.rows, one.faults) == ([], [])
+        assert "cannot be judged without the gl-matrix that it calls" in one.refused
+        assert "put the gl-matrix.js that the exercise hands out beside the file" in one.refused
+
+
+def test_what_opens_a_window_in_a_browser_costs_nothing(tmp_path: Path):
+    """alert, confirm and prompt are closed at once, as by somebody who only wants to go on."""
+    path = tmp_path / "Exercise.js"
+    plain = next(file for file in CORRECT if file.name == "plain.js").read_text()
+    calls = "  if (confirm('go on?') || prompt('how far?')) return;\n  alert('x');\n"
+    path.write_text(plain.replace(COLLIDE, COLLIDE + calls))
+
+    assert check_file(path).passed
+
+
 def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
     """A call that does nothing to a sphere far away leaves its 12 numbers, bit for bit, in both
     languages."""
@@ -428,3 +461,45 @@ def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
             answer = ask(process, {"far": far})["far"]
 
         assert answer.last == list(far.balls)
+
+
+def test_the_step_is_judged_beside_a_wrong_impulse(tmp_path: Path):
+    """The file's own integrate gives what is expected: a ufo that is integrated twice is found, and
+    nothing is said of pairs, which are seen by their velocities."""
+    text = next(file for file in CORRECT if file.name == "plain.js").read_text()
+    path = tmp_path / "Exercise.js"
+    for old, new in ((REDUCED, SUM), (ONCE, 2 * ONCE)):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path.write_text(text)
+    one = check_file(path)
+    step = {row.name: row.verdict for row in one.of("loop")}
+
+    assert [row.cause for row in one.causes if row.task == "loop"] == [TWICE]
+    assert (step["all spheres"], step["pairs"]) == ("fault", "not asked")
+
+
+REDUCED, SUM = "(1 / sphereA.mass + 1 / sphereB.mass)", "(sphereA.mass + sphereB.mass)"
+ONCE, TWICE = "  integrate(ufo, dt);\n", "performSimStep integrates the ufo 2 times"
+
+
+def test_what_a_step_shows_is_hidden_by_some_faults_of_its_functions_only():
+    """Wrong numbers of a force or of a collision hide nothing; a sphere that does not move by v dt
+    does, and so does one that collides with distant ones, or a function that fails."""
+    (ball,) = QUESTIONS["coast"].balls
+    moved = ball._replace(x=tuple(x + 0.1 * v for x, v in zip(ball.x, ball.v)))
+    coasting, without_dt = (
+        {"coast": SolverAnswer([[ball._replace(x=x)]])}
+        for x in (moved.x, tuple(x + v for x, v in zip(ball.x, ball.v)))
+    )
+    force, impulse, overlap, fails = (
+        CheckRow(name, task, "", "", "", "fault", "any")
+        for name, task in (
+            *(("velocity", "1"), ("impulse", "2c"), ("overlap", "2a"), ("implemented", "2c")),
+        )
+    )
+
+    assert not hide_the_step([force, impulse], coasting)
+    assert hide_the_step([force], without_dt)
+    assert hide_the_step([overlap], coasting)
+    assert hide_the_step([fails], coasting)

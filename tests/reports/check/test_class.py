@@ -14,7 +14,7 @@ from reports.check import command
 from reports.check.rows import TASKS
 from reports.check.terminal import code_only, same_code
 from reports.check.verdict import Tally, check_file, named
-from tests.reports.terminal.command_line import crosscheck
+from tests.reports.terminal.command_line import crosscheck, on_terminal
 from tests.solvers.mutants import CORRECT, MUTANTS
 
 pytestmark = pytest.mark.slow  # each checks a class of files
@@ -35,7 +35,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_table_of_a_class_fits_a_terminal(folder: Path):
+def test_the_table_of_a_class_has_a_line_a_file(folder: Path):
     """A line a file, and how many are right of those that were checked; a link to nothing is
     reported, too."""
     (folder / "eve.js").symlink_to("gone.js")
@@ -44,8 +44,10 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     (folder / "eve.js").unlink()
     reported = done.stdout.replace("\n", " ")
 
-    assert "5 solvers: 1 without a fault, 2 with a fault, 2 that could not be checked." in reported
-    assert "<-: wrong because of a FAULT to the left of it." in reported
+    total = "5 submissions: 1 without a fault, 1 with a fault, 3 that could not be judged."
+    assert total in reported
+    assert "In 3 submissions points are not judged: a person decides." in reported
+    assert "<-     wrong because of a FAULT to the left of it" in reported
     assert "crosscheck check FILE shows the lines and the numbers of one." in reported
     (eve,) = (line for line in done.stdout.splitlines() if line.startswith("eve.js"))
     assert not {"ok", "FAULT"} & set(eve.split())
@@ -54,30 +56,31 @@ def test_the_table_of_a_class_fits_a_terminal(folder: Path):
     assert "ben/Exercise.js: Task 2c impulse: it divides by (mA + mB)" in re.sub(
         " +", " ", reported
     )
-    assert max(len(line) for line in done.stdout.splitlines()) <= 80
+    below = done.stdout.partition("\n\n")[2]  # in a pipe the table is as wide as its names need
+    assert max(map(len, below.splitlines())) <= 80
     assert "Traceback" not in done.stderr
 
 
 def test_a_student_with_a_long_name_and_one_with_an_empty_folder_have_a_row(tmp_path: Path):
-    """The middle of a name gives way; the table keeps its columns; what was not handed in is
-    reported."""
+    """On a terminal the middle of a name gives way, in a pipe nothing does; the table keeps its
+    columns; what was not handed in is reported."""
     for name in ("a" * 70, "b", "with nothing", ".git"):
         (tmp_path / name).mkdir()
     shutil.copy(RIGHT, tmp_path / ("a" * 70) / "Exercise.js")
     (tmp_path / "b" / "solver.py").write_text("")
     done = crosscheck("check", tmp_path, cwd=tmp_path)
+    narrow = on_terminal(80, "check", tmp_path, cwd=tmp_path).stdout
     header, long, *_ = lines = done.stdout.splitlines()
 
-    assert header.split() == ["solver", *TASKS, *Tally._fields]
-    assert long.startswith("aaaa")
-    assert "a…a" in long
-    assert long.split()[0].endswith("a/Exercise.js")
-    assert long.split()[1:] == [*["ok"] * 8, "42"]
+    assert header.split() == ["solver", *TASKS, "total", *Tally._fields, "not", "judged"]
+    assert long.split() == [f"{'a' * 70}/Exercise.js", *["ok"] * 8, "20", "42"]
+    assert not [line for line in lines if line != line.rstrip()]
+    assert re.search(r"aaaa…a+/Exercise\.js ", narrow)
     assert [line.split()[:3] for line in lines if line.startswith("with")] == [
         ["with", "nothing", "-"]
     ]
     assert "  with nothing: holds no .js and no .py file" in done.stdout
-    total = "3 solvers: 1 without a fault, 0 with a fault, 2 that could not be checked."
+    total = "3 submissions: 1 without a fault, 0 with a fault, 2 that could not be judged."
     assert total in done.stdout
     assert (done.returncode, ".git" in done.stdout) == (1, False)
 

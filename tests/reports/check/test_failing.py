@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from adapters.own_solver.file import SolverFailed
+from reports.check.accesses import Access, part_of
 from reports.check.failing import FAR, doubtful
 from reports.check.page import write_page
 from reports.check.questions import QUESTIONS, SolverAnswer
@@ -225,8 +226,27 @@ OVERLAPPING = "reach/0"
 def test_the_page_does_not_say_that_a_scene_was_searched_where_none_can_be_played(tmp_path: Path):
     """A file that fails in a collision plays no scene."""
     one = checked(tmp_path, JS, TOO_FAR | THROWS_IN_C)
-    write_page(tmp_path / "check.html", one, [])
+    write_page(tmp_path / "check.html", *marks_of(one))
     said = (tmp_path / "check.html").read_text()
 
     assert "No scene was played with this file. The rows below show the faults." in said
     assert "was found that shows" not in said
+
+
+def test_the_part_of_an_endless_loop_does_not_depend_on_where_it_was_stopped():
+    """A loop of (b) reads sizes and writes a position; whichever access is the latest, it is (b)'s.
+    One that reads velocities is not."""
+    once = [Access("r", who, field, [22]) for field in ("position", "size") for who in (0, 1)]
+    displacing = [
+        *(Access("r", who, "size", [26]) for who in (0, 1)),
+        *(Access(kind, 0, "position", [26]) for kind in "rw"),
+    ]
+    approaching = [Access("r", who, field, [26]) for who in (0, 1) for field in WITH_VELOCITY]
+
+    parts = {part_of([*once, *displacing * 100, last], 0, "") for last in displacing}
+    others = {part_of([*once, *approaching * 100, last], 0, "") for last in approaching}
+
+    assert (parts, others) == ({"2b"}, {"2c"})
+
+
+WITH_VELOCITY = ("position", "velocity")

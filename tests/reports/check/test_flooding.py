@@ -103,4 +103,4 @@ def test_junit_is_well_formed_for_a_file_with_control_characters_in_its_name(tmp
     suites = ElementTree.fromstring(as_junit(marks_of(FileCheck(path, [], "is no solver"))))
 
     assert suites[0].get("name", "").endswith("my\ufffd\ufffdsolver.py")
-    assert suites[0][0].get("classname") == "my\ufffd\ufffdsolver.py"
+    assert suites[0][0].get("classname") == "my\ufffd\ufffdsolver"

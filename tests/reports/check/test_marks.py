@@ -15,18 +15,20 @@ from xml.etree import ElementTree
 import jsonschema
 import pytest
 
-from reports.check.command import grading_of
+from reports.check.class_page import write_class_page
+from reports.check.command import alphabetical, grading_of
 from reports.check.formats.formats import FORMATS
 from reports.check.formats.prairielearn import LARGEST
 from reports.check.formats.questions_json import SCHEMA
 from reports.check.marks import Marked, id_of
 from reports.check.outcomes import OUTCOMES
-from reports.check.points import DEFAULT, QUESTIONS, BadPoints, Points, read_points
+from reports.check.points import AS_A_WHOLE, DEFAULT, QUESTIONS, BadPoints, Points, read_points
 from reports.check.rows import UNKNOWN, CheckRow, Verdict
 from reports.check.verdict import FileCheck
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
+REST = f"momentum, rest kept; for the points of a task: {AS_A_WHOLE}"
 DATA = Path(__file__).parents[2] / "data" / "marks"
 HOSTILE = "=1+1 <b>\x00\x1b[31m \udcff \N{PILE OF POO}\n\r" + "\N{SNOWMAN}" * 300
 
@@ -129,6 +131,9 @@ def test_points_are_given_a_task_or_a_question(tmp_path: Path):
         ("3 = 1", "there is no task '3'; tasks: 1, 2a,"),
         ("[1]\nvelosity = 1", "task 1 has no question 'velosity'; questions: velocity, position,"),
         ("1 = -1", "task 1: -1 is no number of points, 0 or more"),
+        # in a copy of tasks.toml: below all headers, and above them
+        (f"{DEFAULT.read_text()}2c = 4\n", f"questions: velocity of A, velocity of B, {REST}"),
+        (f"2c = 4\n{DEFAULT.read_text()}", f"as a whole or by question: {AS_A_WHOLE}"),
         ("[2c]\nimpulse = nan", "task 2c, impulse: nan is no number of points"),
         ("2a = true", "task 2a: True is no number"),
         ("2a = 'two'", "task 2a: 'two' is no number"),
@@ -291,6 +296,28 @@ def test_what_is_written_is_as_its_schema_says(name: str):
         assert kind.mark in text.encode(errors="backslashreplace")[:4096]
 
 
+def test_every_format_says_which_points_a_person_decides_on(tmp_path: Path):
+    """Beside the total, or the task: a file of which 10 of 20 points could not be judged, because
+    no collision was seen."""
+    unseen = ("2b", "2c", "2d")
+    rows = [one for one in marked().check.rows if one.task not in unseen]
+    rows += [row(task, "implemented", "not asked", "no pair collides") for task in unseen]
+    (tmp_path / "Exercise.js").touch()
+    check = replace(marked().check, path=tmp_path / "Exercise.js", rows=rows)
+    one = replace(marked(), check=check, root=tmp_path / "Exercise.js", low=True)
+    write_class_page(tmp_path / "class.html", [replace(one, root=tmp_path)])
+    said = "10 points could not be judged: a person decides."
+
+    assert (one.points, one.not_judged) == (10.0, 10.0)
+    for name in ("table", "junit", "gradescope", "prairielearn"):
+        assert said in FORMATS[name].text([one]), name
+    for name in ("gradescope", "prairielearn", "classroom"):
+        for points in (3, 4):
+            assert f"{points} points could not be judged" in FORMATS[name].text([one]), name
+    assert READERS["csv"](FORMATS["csv"].text([one]))[0]["not judged"] == "10"
+    assert "A person decides on the points under" in (tmp_path / "class.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("name", "edit"),
     [
@@ -402,3 +429,12 @@ def test_a_table_of_marks_names_who_handed_in_nothing():
     assert [one["total"] for one in rows][:2] == ["20", "15.5"]
     assert (rows[4]["total"], rows[4]["begin with"]) == ("0", "holds no .js file")
     assert rows[0]["seconds"] == "1.50"
+
+
+def test_names_are_sorted_as_people_do():
+    """A letter with an accent is at the letter, a small one at the large one."""
+    names = ["Zoe", "Ärger", "anna", "Bodo", "Émile", "Emil"]
+
+    assert [path.name for path in sorted(map(Path, names), key=alphabetical)] == [
+        *("anna", "Ärger", "Bodo", "Emil", "Émile", "Zoe"),
+    ]

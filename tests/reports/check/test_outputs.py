@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -26,6 +27,7 @@ from reports.check.rows import CheckRow
 from reports.check.smallest import smallest_scene, smallest_scenes
 from reports.check.smallest_scene import Smallest
 from reports.check.verdict import check_file
+from tests.reports.check.marked import marks_of
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, on_terminal, process
 from tests.solvers.mutants import CORRECT, MUTANTS
@@ -128,7 +130,8 @@ def test_a_class_is_a_row_a_file_and_one_bad_file_stops_nothing(folder: Path):
     suites = ElementTree.parse(folder / "class.xml").getroot()
     assert [int(s.get("failures", "")) > 0 for s in suites] == [False, True, True, False]
     assert [s.get("errors") for s in suites] == ["0", "0", "0", "1"]
-    assert sum(len(list(s)) for s in suites) == sum(int(s.get("tests", "")) for s in suites)
+    assert [len(s.findall("testcase")) for s in suites] == [int(s.get("tests", "")) for s in suites]
+    assert {one.get("classname") for one in suites[0].findall("testcase")} == {"anna"}
 
 
 @pytest.mark.parametrize(
@@ -262,19 +265,42 @@ def test_marks_of_a_class_are_written_in_several_formats_at_once(folder: Path, t
 
 
 def test_a_submission_is_a_file_or_its_folder_and_is_always_answered(folder: Path):
-    """The file that is named as the exercise says; none, or several, is said to the student."""
+    """The file that is named as the exercise says, with the names of the others; none, or several,
+    is said to the student."""
     (folder / "ben" / "old.js").write_text("x = 1\n")
+    shutil.copytree(folder / "ben", folder / "fay")
+    (folder / "fay" / "solver.py").write_text("x = 1\n")
     (folder / "none").mkdir()
     words = ("--format", "gradescope")
-    done = [crosscheck("check", name, *words, cwd=folder) for name in ("ben", "none", ".")]
+    done = [crosscheck("check", name, *words, cwd=folder) for name in ("ben", "none", "fay")]
+    of_class = crosscheck("check", folder, "--json", cwd=folder)
     (folder / "ben" / "old.js").unlink()
     (folder / "none").rmdir()
+    shutil.rmtree(folder / "fay")
     ben, none, several = (json.loads(one.stdout) for one in done)
+    rows = {one["id"]: one for one in json.loads(of_class.stdout)["files"]}
 
     assert [one.returncode for one in done] == [1, 1, 1]
     assert (ben["score"], ben["extra_data"]["id"]) == (17.0, "ben")
+    assert ben["output"].endswith("Exercise.js is judged; not judged: old.js.")
     assert (none["score"], none["output"]) == (0.0, "holds no .js and no .py file")
-    assert several["output"].startswith("holds 5 solvers: anna/Exercise.js, ben/Exercise.js,")
+    assert several["output"].startswith("holds 3 solvers: Exercise.js, old.js, solver.py; hand in")
+    # a class has the same rule, and one row a student
+    assert {"anna", "ben", "cem", "dora", "fay", "none"} <= set(rows)
+    assert len(rows) == len(json.loads(of_class.stdout)["files"])
+    assert rows["ben"]["points"] == 17.0
+    assert "ben/old.js" in json.loads(of_class.stdout)["not_read"]
+    assert "holds 3 solvers" in rows["fay"]["refused"]
+
+
+def test_a_class_is_no_submission(folder: Path):
+    """Exit 2 and nothing written: the results of one student would name the others."""
+    done = crosscheck("check", ".", "--format", "gradescope", "--out", "g.json", cwd=folder)
+
+    assert done.returncode == 2
+    assert done.stderr.startswith(".: holds the folders of 4 students: anna, ben, cem and 1 more")
+    assert done.stderr.endswith("--format gradescope is for one, --format csv for a class\n")
+    assert not (folder / "g.json").exists()
 
 
 @pytest.mark.slow
@@ -412,7 +438,8 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
     from reports.check.page import write_page
 
     page_path = folder / "page.html"
-    write_page(page_path, check_file(folder / "ben" / "Exercise.js"), [smallest])
+    (marked,) = marks_of(check_file(folder / "ben" / "Exercise.js"))
+    write_page(page_path, replace(marked, scenes=[smallest]))
     page, heard = opened(browser, page_path.as_uri(), viewport={"width": 1280, "height": 800})
     page.wait_for_function("players[1]")
     at_end = "name => { players[1].seek(1); return players[1].positions(name); }"
@@ -457,6 +484,6 @@ def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
 
     path = tmp_path / "evil.js"
     path.write_text("throw new Error('<script>alert(1)</script>')")
-    write_page(tmp_path / "check.html", check_file(path), [])
+    write_page(tmp_path / "check.html", *marks_of(check_file(path)))
 
     assert "<script>alert" not in (tmp_path / "check.html").read_text()

@@ -11,6 +11,7 @@ from playwright.sync_api import Browser
 
 from reports.check.page import WATCHED, speed_of, write_page
 from reports.check.verdict import FileCheck
+from tests.reports.check.marked import marks_of
 from tests.reports.check.test_outputs import faults_in
 from tests.reports.check.test_picture import smallest
 from tests.reports.page.browsing import opened
@@ -40,7 +41,8 @@ def test_where_a_sphere_has_gone_is_said(browser: Browser, tmp_path: Path):
     position[-1, 0] += [40.0, 0.0]
     gone = replace(one, yours=replace(one.yours, position=position))
     page_path = tmp_path / "page.html"
-    write_page(page_path, FileCheck(tmp_path / "a.js", faults_in("2c")), [gone])
+    (marked,) = marks_of(FileCheck(tmp_path / "a.js", faults_in("2c")))
+    write_page(page_path, replace(marked, scenes=[gone]))
     page, heard = opened(browser, page_path.as_uri(), viewport={"width": 1280, "height": 800})
     page.wait_for_function("() => window.players[1]")
     [early, late] = [page.evaluate(WRITTEN, t) for t in (0.0, one.scenario.duration)]

@@ -198,3 +198,23 @@ def test_the_grader_of_prairielearn_answers_every_submission(tmp_path: Path):
     ]
     assert play(wrong) != 0
     assert not (grade / "results" / "results.json").exists()
+
+
+def test_every_scaffold_fetches_gl_matrix_while_it_is_built(tmp_path: Path):
+    """By npm, which the extra js brings, into the cache that the check reads later: where students
+    are graded there is no network."""
+    places = {
+        "gradescope": ("setup.sh", "run_autograder", "$home/cache"),
+        "classroom": (*2 * (".github/workflows/classroom.yml",), "$RUNNER_TEMP/cache"),
+        "prairielearn": (*2 * ("image/Dockerfile",), "/crosscheck/cache"),
+    }
+    for kind, (builds, runs, cache) in places.items():
+        crosscheck("check", "--scaffold", kind, kind, cwd=tmp_path)
+        built = (tmp_path / kind / builds).read_text(encoding="utf-8")
+        run_later = (tmp_path / kind / runs).read_text(encoding="utf-8")
+
+        assert re.search(r'"\$\(echo \S*crosscheck2d-\*\.whl\)\[js\]"', built)
+        assert '-c "from adapters.npm_packages import fetch; fetch()"' in built
+        assert all(
+            re.search(rf'CROSSCHECK_CACHE="?{re.escape(cache)}', one) for one in (built, run_later)
+        )
