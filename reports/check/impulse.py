@@ -16,6 +16,8 @@ from reports.check.impacts import (
     SEPARATING,
     SWAPPED,
     UPDATES,
+    WITHOUT_J,
+    ZEROED,
     CollisionExplanation,
     in_call,
     tangent,
@@ -99,12 +101,23 @@ class CollisionCase:
 
 
 def impulse_rows(
-    answers: dict[str, SolverAnswer], restitution: Restitution, found: CollisionExplanation | None
+    answers: dict[str, SolverAnswer],
+    restitution: Restitution,
+    found: CollisionExplanation | None,
+    computed: bool,
 ) -> list[CheckRow]:
-    """The rows of (c) and (d)."""
+    """The rows of (c) and (d); `computed`: whether the function reads velocities to compute
+    something from them."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), quantities_kept(answers)]
     case, rest = case_to_show(answers, restitution, found), quantities_kept(answers)
+    if found and not found.impulse and found.update in WITHOUT_J:
+        why = "there is no impulse by which the velocities could be judged"
+        return [no_impulse(f"no impulse is computed: {found.update}"), *unseen("2d", why), rest]
+    if (idle := without_effect(answers, found)) and rest.verdict != "fault":
+        none = no_impulse("not implemented, or never reached: no velocity is read")
+        unknown = unseen("2c", "the velocities after the call do not depend on the impulse")
+        return [*(unknown if computed else [none]), no_velocities(idle), rest]
     if case.impulse == NEVER and rest.verdict == "fault":
         rest = replace(rest, cause=f"the velocities never change: {rest.cause} instead")
         case = replace(case, impulse=rest.cause)
@@ -126,6 +139,40 @@ def impulse_rows(
         symmetry(answers, case),
         rest,
     ]
+
+
+def without_effect(answers: dict[str, SolverAnswer], found: CollisionExplanation | None) -> str:
+    """Why no impulse shows in the velocities after a collision; "" if one does."""
+    if found is None or {found.impulse, found.update}.isdisjoint({NEVER, ZEROED}):
+        return ""
+    if found.update == ZEROED:
+        return ZEROED
+    if any(answers[name].returned for name in COLLISIONS):
+        return RETURNED
+    return NEVER
+
+
+RETURNED = (
+    "the velocities never change: sphereSphereCollisionHandling returns something new; it must"
+    " change the spheres it is given"
+)
+
+
+def no_impulse(cause: str) -> CheckRow:
+    """The fault that (c) is not implemented."""
+    asked = "Is an impulse computed from the velocities, the masses and e?"
+    return judged("implemented", "2c", asked, "no", "yes", False, cause)
+
+
+def no_velocities(cause: str) -> CheckRow:
+    """The fault that (d) is not implemented."""
+    asked = "Are the velocities changed by the impulse?"
+    return judged("implemented", "2d", asked, "no", "yes", False, cause)
+
+
+def unseen(task: str, why: str) -> list[CheckRow]:
+    """The rows of (c) or (d) if it cannot be judged."""
+    return [not_asked({"2c": "impulse", "2d": "velocity of A"}[task], task, why)]
 
 
 def in_task(row: CheckRow, task: str) -> CheckRow:
@@ -403,8 +450,7 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
         return chosen("none", "only pairs that approach get an impulse")
     law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
     if all(near(change(h, law(h, e), e), changed, 0.1) for h, changed in seen):
-        said = "as the formula is printed, pairs that move apart get an impulse, too"
-        return chosen("that of the formula", said)
+        return chosen("that of the formula", AS_PRINTED)
     got = "A is changed by {} m/s, B by {} m/s".format(*map(shown, seen[0][1]))
     cause = found.mistake if found else ""
     if all(near(change(h, -law(h, e), e), changed, 0.1) for h, changed in seen):
@@ -413,6 +459,7 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
     return judged("separating", task, asked, got, expected, False, cause)
 
 
+AS_PRINTED = "as the formula is printed, pairs that move apart get an impulse, too"
 ABSOLUTE = (
     "it takes the absolute value of (vA - vB).n: a pair that moves apart is driven further apart"
 )

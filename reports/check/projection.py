@@ -216,6 +216,7 @@ NOT_FINITE = (
     "the velocities of a pair at relative rest become NaN or infinite (a division by zero?)"
 )
 WITHOUT_IMPULSE = "a pair that needs no impulse does not keep its velocities"
+DISPLACES_VELOCITY = "the displacement changes the velocity, too"
 INSTEAD = "the displacement changes the velocity instead of the position"
 
 
@@ -229,7 +230,7 @@ def displaced_velocity(answers: dict[str, SolverAnswer]) -> str:
     if near(one, 0.0) or not near(one, other):
         return ""
     placed_as_before = all(near(x.x, y.x) for x, y in zip(before, after))
-    return INSTEAD if placed_as_before else "the displacement changes the velocity, too"
+    return INSTEAD if placed_as_before else DISPLACES_VELOCITY
 
 
 Pairs = list[tuple[tuple[Ball, ...], Shift, list[Ball]]]

@@ -14,11 +14,12 @@ from reports.check.detection import detection_rows
 from reports.check.failing import rows_until_failure
 from reports.check.functions import failed_calls, implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
-from reports.check.impulse import impulse_rows
+from reports.check.impulse import AS_PRINTED, impulse_rows
 from reports.check.lines import Source, named_line
 from reports.check.loop import loop_rows
 from reports.check.motion import TURNED, motion_rows
 from reports.check.projection import (
+    DISPLACES_VELOCITY,
     TAKEN_TO_BE_APART,
     moved_together,
     projection_rows,
@@ -26,7 +27,7 @@ from reports.check.projection import (
 )
 from reports.check.questions import QUESTIONS, SolverAnswer, ask_in_two_orders, was_stopped
 from reports.check.restitution import Restitution, restitution_of
-from reports.check.rows import CheckRow, judged, not_asked
+from reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
 
 
@@ -87,7 +88,8 @@ def rows_of(
     if was_stopped(answers):
         rows.append(not_asked("step", "loop", "a call did not return"))
     else:
-        rows += loop_rows(process, faulty)
+        kicks_apart = any(row.cause == AS_PRINTED for row in rows)
+        rows += loop_rows(process, faulty, kicks_apart)
     e = restitution.for_scenes if restitution is not None else None
     rows = with_consequences([*rows, *scene_rows(process, rows, e)])
     rows = hinted(rows, text) if process.kind == "javascript" else rows
@@ -177,10 +179,38 @@ def task_2(
         found = replace(found, impulse=BACKWARDS)
     rows += same_again("sphereSphereCollisionHandling", mine, others, text)
     rows += projection_rows(mine, found)
-    rows += impulse_rows(mine, restitution, found)
+    rows += impulse_rows(mine, restitution, found, source.computes_with("velocity"))
+    if not any((row.name, row.verdict) == ("impulse", "right") for row in rows):
+        rows = [unknown_at_touch(row) for row in rows]
+    if any(row.name == "rest kept" and row.verdict == "fault" for row in rows):
+        rows = [integrating(row) if source.integrates else row for row in rows]
     return sorted(rows, key=lambda row: row.task), restitution
 
 
+def unknown_at_touch(row: CheckRow) -> CheckRow:
+    """A row, if it is the one on spheres that just touch, without a claim about a pair that keeps
+    its velocities: a wrong impulse may be 0."""
+    if row.name != "just touching" or row.got == "yes":
+        return row
+    return replace(
+        row,
+        got="not known",
+        cause="not known: the pair keeps its velocities, but the impulse is not the right one",
+    )
+
+
+def integrating(row: CheckRow) -> CheckRow:
+    """A row of a collision function that calls integrate: its unexplained faults follow from
+    that."""
+    if row.verdict != "fault":
+        return row
+    if row.name == "rest kept":
+        return replace(row, cause=INTEGRATES)
+    late = row.cause == UNKNOWN or row.cause == DISPLACES_VELOCITY or "unknown:" in row.cause
+    return replace(row, verdict="follows", cause=FOLLOWS_INTEGRATION) if late else row
+
+
+FOLLOWS_INTEGRATION = "it follows from the call of integrate"
 NO_FURTHER = "the collision function cannot be judged further"
 HIDDEN = "the collision function fails, so that this cannot be seen"
 

@@ -4,6 +4,7 @@ makes the whole table."""
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -14,13 +15,15 @@ from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.functions import is_read
+from reports.check.loop import loop_rows
 from reports.check.questions import QUESTIONS, Ball, ask
 from reports.check.rows import TASKS
 from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck
 from tests.reports.check.confusion import TABLE, judged, said_first, said_too
-from tests.solvers.mutants import CORRECT, MUTANTS
+from tests.reports.check.marked import marks_of
+from tests.solvers.mutants import CORRECT, HERE, MUTANTS
 
 # A solver takes half a second: some here, of either language and any task; all of both lists in the
 # long test.
@@ -47,6 +50,27 @@ def test_no_correct_solver_is_faulted(solvers: list[Path]):
     assert faults == {}
 
 
+@pytest.mark.parametrize("e", ["0", "0.5", "1"])
+@pytest.mark.parametrize(
+    ("name", "approach"),
+    [("plain.js", "vn >= 0"), ("plain.py", "vn >= 0.0"), ("one_sided.js", "")],
+)
+def test_no_step_is_faulted_for_its_restitution(name: str, approach: str, e: str, tmp_path: Path):
+    """The exercise's step handles an asteroid and the ufo twice. Where rounding leaves an overlap
+    and pairs that move apart get an impulse, too, e = 1 restores the velocities."""
+    text = (HERE / "correct" / name).read_text("utf-8")
+    assert "restitution = 0.9" in text.lower()
+    assert approach in text
+    text = re.sub("(restitution) = 0.9", rf"\1 = {e}", text, flags=re.I)
+    text = text.replace(approach, "1 < 0") if approach else text
+    (tmp_path / name).write_text(text, "utf-8")
+    with SolverProcess(read_solver(tmp_path / name)) as process:
+        rows = loop_rows(process, faulty=False, kicks_apart=True)
+
+    assert len(rows) > 5
+    assert [row for row in rows if row.verdict == "fault"] == []
+
+
 def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
     """Some of the catalogue; the long test has them all."""
     checks = judged([mutant.write(tmp_path) for mutant in FAST])
@@ -55,6 +79,17 @@ def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
         mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])
     ] == []
     assert spread([checks[tmp_path / mutant.name] for mutant in FAST if not mutant.second]) == {}
+
+
+def test_what_is_missing_gives_no_points(tmp_path: Path):
+    """Nor does what is done instead of it: of 20 points, 8 are for task 1, 2 for each of its four
+    quantities, and 7 for the impulse and the new velocities."""
+    expected = {"no_impulse.js": 13.0, "exchanged.js": 13.0, "linear_missing.js": 16.0}
+    paths = [mutant.write(tmp_path) for mutant in MUTANTS if mutant.name in expected]
+
+    assert {
+        one.check.path.name: one.points for one in marks_of(*judged(paths).values())
+    } == expected
 
 
 def spread(checks: list[FileCheck]) -> dict[str, list[str]]:
