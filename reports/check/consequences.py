@@ -30,6 +30,7 @@ SAME_MISTAKE = (
         "they are moved with x and y of the normal exchanged",
         "x and y of the normal are exchanged",
     },
+    {"the sizes are used as diameters", "brackets are missing: sizes / 2 - distance"},
     {"the sizes are doubled", "brackets are missing: each is moved by sizes - distance / 2"},
     {
         "only the size of A is used",

@@ -17,7 +17,7 @@ import numpy as np
 from reports.check.collisions import Impulse, PairCollision, changes, collision_of
 from reports.check.new_speeds import speed_mistakes
 from reports.check.parts import Change, components, damping, scalar_products
-from reports.check.questions import COLLISIONS, QUESTIONS, Question, SolverAnswer, finite
+from reports.check.questions import COLLISIONS, SolverAnswer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import near
 from scenarios.model import Array
@@ -354,7 +354,7 @@ def explain(
     none do."""
     if not finite(answers, "v"):
         return None
-    seen = [in_call(QUESTIONS[name], answers[name]) for name in (*COLLISIONS, *SWAPPED)]
+    seen = [in_call(answers[name]) for name in (*COLLISIONS, *SWAPPED)]
     slipped = [name for name in MISTAKES if restitution.read.stated or name not in ELASTIC]
     impulses = [name for name in slipped if name in IMPULSES | ELASTIC]
     for e in restitution.candidates:
@@ -391,10 +391,10 @@ def fitting(
     return None
 
 
-def in_call(question: Question, answer: SolverAnswer) -> tuple[PairCollision, Array]:
+def in_call(answer: SolverAnswer) -> tuple[PairCollision, Array]:
     """A pair, and what its collision changed, in the order in which the call has them."""
-    (_, a, b), *_ = question.calls
-    before, after = (question.balls[a], question.balls[b]), [answer.last[a], answer.last[b]]
+    (_, a, b), *_ = answer.asked.calls
+    before, after = (answer.asked.balls[a], answer.asked.balls[b]), [answer.last[a], answer.last[b]]
     return collision_of(before, after), changes(before, after)
 
 
@@ -426,8 +426,8 @@ def impulse_if_separating(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether pairs that move apart get the impulse of the printed formula, or its opposite."""
     for name in SEPARATING:
         h, changed = (
-            collision_of(QUESTIONS[name].balls, answers[name].last),
-            changes(QUESTIONS[name].balls, answers[name].last),
+            collision_of(answers[name].asked.balls, answers[name].last),
+            changes(answers[name].asked.balls, answers[name].last),
         )
         right = np.array(UPDATES[""].change(h, IMPULSES[""](h, e), e))
         if not (near(right, changed, 0.1) or near(-right, changed, 0.1)):

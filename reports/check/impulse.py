@@ -22,7 +22,7 @@ from reports.check.impacts import (
     in_call,
     tangent,
 )
-from reports.check.questions import COLLISIONS, QUESTIONS, SolverAnswer, finite
+from reports.check.questions import COLLISIONS, SolverAnswer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -188,7 +188,7 @@ def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
         return []
     seen = [
         (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
-        for name, q in COLLISIONS.items()
+        for name, q in ((name, answers[name].asked) for name in COLLISIONS)
     ]
     right = [IMPULSES[""](pair, EXERCISE) for pair, _ in seen]
     for_a = [pair.ma * change[0] for pair, change in seen]
@@ -213,7 +213,7 @@ def case_to_show(
     """The collision to show, with the mistakes in it."""
     e = found.e if found else restitution.own
     name = next(iter(wrong_collisions(answers, e) or COLLISIONS))
-    balls, after = QUESTIONS[name].balls, answers[name].last
+    balls, after = answers[name].asked.balls, answers[name].last
     for_one = right_for_one(answers, e)
     if found:
         impulse, update = found.impulse, found.update if found.task == "2d" else ""
@@ -235,7 +235,7 @@ def case_to_show(
 def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether in every collision A or B has the right velocity afterwards."""
     for name in (*COLLISIONS, *SWAPPED):
-        pair, changed = in_call(QUESTIONS[name], answers[name])
+        pair, changed = in_call(answers[name])
         right = UPDATES[""].change(pair, IMPULSES[""](pair, e), e)
         if not any(near(one, wanted) for one, wanted in zip(changed, right)):
             return False
@@ -245,7 +245,8 @@ def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
 def opposite_impulses(answers: dict[str, SolverAnswer]) -> bool:
     """Whether every pair keeps its momentum, whichever sphere is called A."""
     for name in (*COLLISIONS, *SWAPPED):
-        balls, (a, b) = QUESTIONS[name].balls, changes(QUESTIONS[name].balls, answers[name].last)
+        balls = answers[name].asked.balls
+        a, b = changes(balls, answers[name].last)
         if not near(balls[0].m * a, -balls[1].m * b):
             return False
     return True
@@ -344,7 +345,7 @@ def no_number(answers: dict[str, SolverAnswer], e: float) -> list[CheckRow]:
         name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in COLLISIONS
     }
     name = next(name for name in COLLISIONS if any(lost[name]))
-    balls, after = QUESTIONS[name].balls, answers[name].last
+    balls, after = answers[name].asked.balls, answers[name].last
     collision, changed = collision_of(balls, after), changes(balls, after)
     P = IMPULSES[""](collision, e)
     a, b = (any(both) for both in zip(*lost.values()))
@@ -398,7 +399,8 @@ FRICTION = "the velocities along the tangent are changed, too: the exercise has 
 
 def only_across(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether the impulse along the normal is right in every collision, and momentum is kept."""
-    for name, question in COLLISIONS.items():
+    for name in COLLISIONS:
+        question = answers[name].asked
         h = collision_of(question.balls, answers[name].last)
         changed = changes(question.balls, answers[name].last)
         along = h.ma * changed[0] @ h.n
@@ -412,7 +414,8 @@ def only_across(answers: dict[str, SolverAnswer], e: float) -> bool:
 def wrong_collisions(answers: dict[str, SolverAnswer], e: float) -> list[str]:
     """The questions of `COLLISIONS` whose velocities differ from the formula."""
     wrong = []
-    for name, question in COLLISIONS.items():
+    for name in COLLISIONS:
+        question = answers[name].asked
         h = collision_of(question.balls, answers[name].last)
         if not near(
             UPDATES[""].change(h, IMPULSES[""](h, e), e),
@@ -437,8 +440,8 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
     expected = "none, or that of the formula"
     seen = [
         (
-            collision_of(QUESTIONS[n].balls, answers[n].last),
-            changes(QUESTIONS[n].balls, answers[n].last),
+            collision_of(answers[n].asked.balls, answers[n].last),
+            changes(answers[n].asked.balls, answers[n].last),
         )
         for n in SEPARATING
     ]
@@ -510,8 +513,8 @@ def quantities_kept(answers: dict[str, SolverAnswer]) -> CheckRow:
     changed = [
         word
         for field, word in words.items()
-        for name, question in COLLISIONS.items()
-        for before, after in zip(question.balls, answers[name].last)
+        for name in COLLISIONS
+        for before, after in zip(answers[name].asked.balls, answers[name].last)
         if not near(getattr(after, field), getattr(before, field))
     ]
     what = ", ".join(dict.fromkeys(changed))

@@ -163,13 +163,14 @@ class Source:
     def __init__(self, process: SolverProcess, text: str) -> None:
         self.process, self.text, self.lines = process, text, text.splitlines()
         self.traced: dict[str, list[Access]] = {}
+        self.questions = dict(QUESTIONS)
 
     def accesses(self, question: str) -> list[Access]:
         """The accesses that a question causes; none if the file lacks the function."""
-        needed = QUESTIONS[question].calls[0][0]
+        needed = self.questions[question].calls[0][0]
         if question not in self.traced:
             has = self.process.functions[needed]
-            found = accesses_of(self.process, QUESTIONS[question], self.text) if has else []
+            found = accesses_of(self.process, self.questions[question], self.text) if has else []
             self.traced[question] = found
         return self.traced[question]
 

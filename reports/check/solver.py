@@ -25,7 +25,15 @@ from reports.check.projection import (
     projection_rows,
     reacts,
 )
-from reports.check.questions import QUESTIONS, SolverAnswer, ask_in_two_orders, was_stopped
+from reports.check.questions import (
+    CLOSER,
+    QUESTIONS,
+    SolverAnswer,
+    ask,
+    ask_in_two_orders,
+    renew,
+    was_stopped,
+)
 from reports.check.restitution import Restitution, restitution_of
 from reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
@@ -172,6 +180,10 @@ def task_2(
         return with_not_asked(rows, NO_FURTHER), None
     rows += detection_rows(mine, text)
     if not reacts(mine):
+        renew(process)
+        mine |= ask(process, CLOSER)
+        source.questions |= CLOSER
+    if failed_calls(mine) or not reacts(mine):
         return with_not_asked(rows, TAKEN_TO_BE_APART), None
     restitution = restitution_of(with_beside, mine)
     found = explain(mine, restitution)

@@ -92,6 +92,31 @@ def test_what_is_missing_gives_no_points(tmp_path: Path):
     } == expected
 
 
+def test_a_file_with_a_short_reach_is_asked_about_deeper_overlaps(tmp_path: Path):
+    """Sizes taken as diameters cost the detection, and leave no task without a judgement."""
+    (mutant,) = (mutant for mutant in MUTANTS if mutant.name == "diameters.py")
+    (mark,) = marks_of(*judged([mutant.write(tmp_path)]).values())
+
+    assert (mark.points, mark.not_judged) == (18.0, 0.0)
+
+
+def test_a_step_without_a_scene_is_said_not_to_be_judged(tmp_path: Path):
+    """In the same sentence that says that no fault was found."""
+    text = (HERE / "correct" / "plain.js").read_text("utf-8")
+    (tmp_path / "a.js").write_text(text.replace("function initScene", "function start"), "utf-8")
+    (one,) = judged([tmp_path / "a.js"]).values()
+
+    assert one.passed
+    assert "performSimStep was not judged: the file has no function initScene" in one.sentences[0]
+
+
+def test_the_end_of_a_file_is_in_its_last_line(tmp_path: Path):
+    """Where a bracket is missing V8 reads on, beyond the file's text."""
+    (tmp_path / "a.js").write_text("function integrate(sphere, dt) {\n  if (dt) {\n}\n", "utf-8")
+    with pytest.raises(SolverFailed, match="line 3"):
+        SolverProcess(read_solver(tmp_path / "a.js"))
+
+
 def spread(checks: list[FileCheck]) -> dict[str, list[str]]:
     """Of files with one fault each, those that are said to have faults in several tasks."""
     tasks = {one.path.name: sorted({row.task for row in one.faults}) for one in checks}
