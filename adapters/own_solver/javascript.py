@@ -160,6 +160,9 @@ class JavaScriptSolver:
         line, column = int(place[1]), caret.find("^") + 1
         if stack and not isinstance(error, JSParseException):
             line, column = int(stack[1]), int(stack[2])
+        lines = self.solver.text.splitlines()
+        if line > len(lines):  # the end of the text, which is followed by its name for stack traces
+            line, column = len(lines), len(lines[-1]) if lines else 0
         return SolverFailed("error", plainly(place[2]), line, column)
 
 

@@ -30,6 +30,7 @@ SAME_MISTAKE = (
         "they are moved with x and y of the normal exchanged",
         "x and y of the normal are exchanged",
     },
+    {"the sizes are used as diameters", "brackets are missing: sizes / 2 - distance"},
     {"the sizes are doubled", "brackets are missing: each is moved by sizes - distance / 2"},
     {
         "only the size of A is used",
@@ -78,13 +79,20 @@ def followed(row: CheckRow, first: dict[str, str], spoilt: dict[str, str]) -> Ch
         return replace(row, verdict="follows")
     if (task := first.get(row.cause, row.task)) != row.task:
         return replace(row, verdict="follows", cause=f"it follows from the fault in {task}")
-    if row.task in spoilt and row.cause.startswith(NOT_EXPLAINED):
+    unexplained = row.cause.startswith(NOT_EXPLAINED)
+    if row.task in spoilt and (unexplained or (row.cause, spoilt[row.task]) in FROM_KEPT):
         return replace(row, verdict="follows", cause=spoilt[row.task])
-    if row.name == "restitution" and row.cause.startswith("the file has e = ") and IMPULSE in first:
+    from_impulse = (row.name, row.cause) == ("separating", UNKNOWN) or (
+        row.name == "restitution" and row.cause.startswith("the file has e = ")
+    )
+    if from_impulse and IMPULSE in first:
         return replace(row, verdict="follows", cause="it follows from the fault in the impulse")
     return row
 
 
+KEPT = "it may follow from the value that is kept from one call to the next"
+# in a fresh world the mean of J and the J before it, which is 0, and the sum of the two
+FROM_KEPT = {(cause, KEPT) for cause in ("the impulse is halved", "the impulse is counted twice")}
 IMPULSE = "the impulse is wrong"  # a key of `first`, which is no cause
 
 
@@ -99,9 +107,7 @@ def spoilers(rows: Iterable[CheckRow]) -> dict[str, str]:
     for row in rows:
         if keeps_state([row]):
             parts = ("1",) if row.task == "1" else ("2a", "2b", "2c", "2d")
-            spoilt |= dict.fromkeys(
-                parts, "it may follow from the value that is kept from one call to the next"
-            )
+            spoilt |= dict.fromkeys(parts, KEPT)
     return spoilt
 
 

@@ -79,7 +79,7 @@ def left_by(process: SolverProcess, names: Iterable[str], limit: float) -> dict[
         reply, spheres = process.request(
             [("ask", QUESTIONS[name].request, limit), ("left", None, LIMIT)]
         )
-        found[name] = answered(reply)
+        found[name] = answered(reply, QUESTIONS[name])
         if found[name].failed and not isinstance(spheres, SolverFailed):
             found[name] = replace(found[name], balls=[[ball(numbers) for numbers in spheres]])
     return found

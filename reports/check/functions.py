@@ -71,7 +71,9 @@ def same_again(
     mine = {name: other for name, other in others.items() if name in answers}
     if not mine:
         return []
-    kept = {name for answer in mine.values() for name in answer.kept} or globals_changed(text)
+    # After a question that made it NaN, later calls leave it as it is.
+    kept = {name for k, other in mine.items() for name in (*other.kept, *answers[k].kept)}
+    kept = kept or globals_changed(text)
     kept = {name for name in kept if is_read(name, text)}
     where = f" in the global {min(kept)}" if len(kept) == 1 else ""
     return [

@@ -16,8 +16,8 @@ import numpy as np
 
 from reports.check.collisions import Impulse, PairCollision, changes, collision_of
 from reports.check.new_speeds import speed_mistakes
-from reports.check.parts import Change, components, scalar_products
-from reports.check.questions import COLLISIONS, QUESTIONS, Question, SolverAnswer, finite
+from reports.check.parts import Change, components, damping, scalar_products
+from reports.check.questions import COLLISIONS, SolverAnswer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import near
 from scenarios.model import Array
@@ -104,6 +104,7 @@ IMPULSES: dict[str, Impulse] = {
     "it divides by (mA + mB) instead of (1/mA + 1/mB)": scaled(
         lambda h, e: 1 / (h.ma + h.mb) / h.mu
     ),
+    "the masses are squared": scaled(lambda h, e: 1 / (1 / h.ma**2 + 1 / h.mb**2) / h.mu),
     "it multiplies by (1/mA + 1/mB) instead of dividing": scaled(lambda h, e: 1 / h.mu**2),
     "it multiplies by mA mB without dividing by mA + mB": scaled(lambda h, e: h.ma * h.mb / h.mu),
     "only the mass of A is used": scaled(lambda h, e: h.ma / h.mu),
@@ -152,6 +153,9 @@ IMPULSES: dict[str, Impulse] = {
     ),
     "the whole relative velocity is used, with its tangential part": lambda h, e: (
         -(1 + e) * h.u * h.mu
+    ),
+    "the relative speed, which is never negative, is used instead of (vA - vB).n": lambda h, e: (
+        -(1 + e) * np.hypot(*h.u) * h.mu * h.n
     ),
     "the relative speed is used instead of its normal part": lambda h, e: (
         (1 + e) * np.hypot(*h.u) * h.mu * h.n
@@ -217,12 +221,26 @@ def misplaced(h: PairCollision, P: Array, axis: Array) -> tuple[Array, Array]:
     return P / h.ma + lost, -P / h.mb - lost
 
 
+# Updates that need no J, with neither masses nor a normal
+EXCHANGED = "the velocities are exchanged"
+WITHOUT_J = {
+    EXCHANGED: Update(lambda h, P, e: (-h.u, h.u)),
+    f"{EXCHANGED} and multiplied by e": Update(lambda h, P, e: (e * h.vb - h.va, e * h.va - h.vb)),
+    "each velocity is reversed and multiplied by e": Update(
+        lambda h, P, e: (-(1 + e) * h.va, -(1 + e) * h.vb)
+    ),
+    "each velocity is reversed": Update(lambda h, P, e: (-2 * h.va, -2 * h.vb)),
+}
+ZEROED = "both velocities are set to 0, whatever they were"
 NOT_TURNED_BACK = "the new velocities are left along n and the tangent, not turned back to x and y"
 UPDATES: dict[str, Update] = {
     "": Update(lambda h, P, e: (P / h.ma, -P / h.mb)),
     "the impulse on B has the sign of that on A": Update(lambda h, P, e: (P / h.ma, P / h.mb)),
     "the impulse on B is divided by the mass of A": Update(lambda h, P, e: (P / h.ma, -P / h.ma)),
     "the impulse on A is divided by the mass of B": Update(lambda h, P, e: (P / h.mb, -P / h.mb)),
+    "the impulse is divided by the squares of the masses": Update(
+        lambda h, P, e: (P / h.ma**2, -P / h.mb**2)
+    ),
     "the masses are exchanged": Update(lambda h, P, e: (P / h.mb, -P / h.ma)),
     "the impulse on B has the sign of that on A and is divided by the mass of A": Update(
         lambda h, P, e: (P / h.ma, P / h.ma)
@@ -249,14 +267,10 @@ UPDATES: dict[str, Update] = {
     "the y component of the impulse is used for x, too": Update(
         lambda h, P, e: (P[1] / h.ma * ONES, -P[1] / h.mb * ONES)
     ),
-    "the velocities are exchanged": Update(lambda h, P, e: (-h.u, h.u)),
     "each sphere bounces off the other as off a wall": Update(
         lambda h, P, e: (-(1 + e) * (h.va @ h.n) * h.n, -(1 + e) * (h.vb @ h.n) * h.n)
     ),
-    "each velocity is reversed and multiplied by e": Update(
-        lambda h, P, e: (-(1 + e) * h.va, -(1 + e) * h.vb)
-    ),
-    "each velocity is reversed": Update(lambda h, P, e: (-2 * h.va, -2 * h.vb)),
+    ZEROED: Update(lambda h, P, e: (-h.va, -h.vb)),
     "the new velocities are multiplied by e": Update(
         lambda h, P, e: (e * P / h.ma - (1 - e) * h.va, -e * P / h.mb - (1 - e) * h.vb)
     ),
@@ -285,7 +299,8 @@ UPDATES: dict[str, Update] = {
     ),
     "the change of vB.x is made to vA.x": Update(lambda h, P, e: misplaced(h, P, np.eye(2)[0])),
     "the change of vB.y is made to vA.y": Update(lambda h, P, e: misplaced(h, P, np.eye(2)[1])),
-} | {mistake: Update(change) for mistake, change in speed_mistakes().items()}
+}
+UPDATES |= WITHOUT_J | {mistake: Update(change) for mistake, change in speed_mistakes().items()}
 
 
 # only for a file that states an e other than 1, because a file may be written for e = 1
@@ -339,7 +354,7 @@ def explain(
     none do."""
     if not finite(answers, "v"):
         return None
-    seen = [in_call(QUESTIONS[name], answers[name]) for name in (*COLLISIONS, *SWAPPED)]
+    seen = [in_call(answers[name]) for name in (*COLLISIONS, *SWAPPED)]
     slipped = [name for name in MISTAKES if restitution.read.stated or name not in ELASTIC]
     impulses = [name for name in slipped if name in IMPULSES | ELASTIC]
     for e in restitution.candidates:
@@ -348,7 +363,7 @@ def explain(
             slips := components(seen, IMPULSES[""], e)
         ) is not None:
             found = CollisionExplanation("", slips[0], "2d", e, IMPULSES[""], slips[1])
-        found = found or without_masses(seen, e)
+        found = found or without_masses(seen, e) or multiplied(seen, e)
         if found := found or fitting(product(impulses, UPDATES), seen, e):
             wrong_way = found.impulse == NEVER and impulse_if_separating(answers, e)
             return replace(found, impulse=APPROACH) if wrong_way else found
@@ -376,10 +391,10 @@ def fitting(
     return None
 
 
-def in_call(question: Question, answer: SolverAnswer) -> tuple[PairCollision, Array]:
+def in_call(answer: SolverAnswer) -> tuple[PairCollision, Array]:
     """A pair, and what its collision changed, in the order in which the call has them."""
-    (_, a, b), *_ = question.calls
-    before, after = (question.balls[a], question.balls[b]), [answer.last[a], answer.last[b]]
+    (_, a, b), *_ = answer.asked.calls
+    before, after = (answer.asked.balls[a], answer.asked.balls[b]), [answer.last[a], answer.last[b]]
     return collision_of(before, after), changes(before, after)
 
 
@@ -395,12 +410,24 @@ def without_masses(
     return None
 
 
+def multiplied(
+    seen: Sequence[tuple[PairCollision, Array]], e: float
+) -> CollisionExplanation | None:
+    """The explanation that the velocities are also multiplied by a number, which may be 0, before
+    the right impulse is computed or after it has acted."""
+    found = damping(seen, IMPULSES[""], e)
+    if found is None:
+        return None
+    mistake, change = found
+    return CollisionExplanation("", mistake, "2d", e, IMPULSES[""], change)
+
+
 def impulse_if_separating(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether pairs that move apart get the impulse of the printed formula, or its opposite."""
     for name in SEPARATING:
         h, changed = (
-            collision_of(QUESTIONS[name].balls, answers[name].last),
-            changes(QUESTIONS[name].balls, answers[name].last),
+            collision_of(answers[name].asked.balls, answers[name].last),
+            changes(answers[name].asked.balls, answers[name].last),
         )
         right = np.array(UPDATES[""].change(h, IMPULSES[""](h, e), e))
         if not (near(right, changed, 0.1) or near(-right, changed, 0.1)):

@@ -16,11 +16,13 @@ from reports.check.impacts import (
     SEPARATING,
     SWAPPED,
     UPDATES,
+    WITHOUT_J,
+    ZEROED,
     CollisionExplanation,
     in_call,
     tangent,
 )
-from reports.check.questions import COLLISIONS, QUESTIONS, SolverAnswer, finite
+from reports.check.questions import COLLISIONS, SolverAnswer, finite
 from reports.check.restitution import Restitution
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
@@ -99,12 +101,23 @@ class CollisionCase:
 
 
 def impulse_rows(
-    answers: dict[str, SolverAnswer], restitution: Restitution, found: CollisionExplanation | None
+    answers: dict[str, SolverAnswer],
+    restitution: Restitution,
+    found: CollisionExplanation | None,
+    computed: bool,
 ) -> list[CheckRow]:
-    """The rows of (c) and (d)."""
+    """The rows of (c) and (d); `computed`: whether the function reads velocities to compute
+    something from them."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), quantities_kept(answers)]
     case, rest = case_to_show(answers, restitution, found), quantities_kept(answers)
+    if found and not found.impulse and found.update in WITHOUT_J:
+        why = "there is no impulse by which the velocities could be judged"
+        return [no_impulse(f"no impulse is computed: {found.update}"), *unseen("2d", why), rest]
+    if (idle := without_effect(answers, found)) and rest.verdict != "fault":
+        none = no_impulse("not implemented, or never reached: no velocity is read")
+        unknown = unseen("2c", "the velocities after the call do not depend on the impulse")
+        return [*(unknown if computed else [none]), no_velocities(idle), rest]
     if case.impulse == NEVER and rest.verdict == "fault":
         rest = replace(rest, cause=f"the velocities never change: {rest.cause} instead")
         case = replace(case, impulse=rest.cause)
@@ -128,6 +141,40 @@ def impulse_rows(
     ]
 
 
+def without_effect(answers: dict[str, SolverAnswer], found: CollisionExplanation | None) -> str:
+    """Why no impulse shows in the velocities after a collision; "" if one does."""
+    if found is None or {found.impulse, found.update}.isdisjoint({NEVER, ZEROED}):
+        return ""
+    if found.update == ZEROED:
+        return ZEROED
+    if any(answers[name].returned for name in COLLISIONS):
+        return RETURNED
+    return NEVER
+
+
+RETURNED = (
+    "the velocities never change: sphereSphereCollisionHandling returns something new; it must"
+    " change the spheres it is given"
+)
+
+
+def no_impulse(cause: str) -> CheckRow:
+    """The fault that (c) is not implemented."""
+    asked = "Is an impulse computed from the velocities, the masses and e?"
+    return judged("implemented", "2c", asked, "no", "yes", False, cause)
+
+
+def no_velocities(cause: str) -> CheckRow:
+    """The fault that (d) is not implemented."""
+    asked = "Are the velocities changed by the impulse?"
+    return judged("implemented", "2d", asked, "no", "yes", False, cause)
+
+
+def unseen(task: str, why: str) -> list[CheckRow]:
+    """The rows of (c) or (d) if it cannot be judged."""
+    return [not_asked({"2c": "impulse", "2d": "velocity of A"}[task], task, why)]
+
+
 def in_task(row: CheckRow, task: str) -> CheckRow:
     """A row, with its fault, if it is one, in this task."""
     return replace(row, task=task) if row.verdict == "fault" else row
@@ -141,7 +188,7 @@ def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
         return []
     seen = [
         (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
-        for name, q in COLLISIONS.items()
+        for name, q in ((name, answers[name].asked) for name in COLLISIONS)
     ]
     right = [IMPULSES[""](pair, EXERCISE) for pair, _ in seen]
     for_a = [pair.ma * change[0] for pair, change in seen]
@@ -166,7 +213,7 @@ def case_to_show(
     """The collision to show, with the mistakes in it."""
     e = found.e if found else restitution.own
     name = next(iter(wrong_collisions(answers, e) or COLLISIONS))
-    balls, after = QUESTIONS[name].balls, answers[name].last
+    balls, after = answers[name].asked.balls, answers[name].last
     for_one = right_for_one(answers, e)
     if found:
         impulse, update = found.impulse, found.update if found.task == "2d" else ""
@@ -188,7 +235,7 @@ def case_to_show(
 def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether in every collision A or B has the right velocity afterwards."""
     for name in (*COLLISIONS, *SWAPPED):
-        pair, changed = in_call(QUESTIONS[name], answers[name])
+        pair, changed = in_call(answers[name])
         right = UPDATES[""].change(pair, IMPULSES[""](pair, e), e)
         if not any(near(one, wanted) for one, wanted in zip(changed, right)):
             return False
@@ -198,7 +245,8 @@ def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
 def opposite_impulses(answers: dict[str, SolverAnswer]) -> bool:
     """Whether every pair keeps its momentum, whichever sphere is called A."""
     for name in (*COLLISIONS, *SWAPPED):
-        balls, (a, b) = QUESTIONS[name].balls, changes(QUESTIONS[name].balls, answers[name].last)
+        balls = answers[name].asked.balls
+        a, b = changes(balls, answers[name].last)
         if not near(balls[0].m * a, -balls[1].m * b):
             return False
     return True
@@ -297,7 +345,7 @@ def no_number(answers: dict[str, SolverAnswer], e: float) -> list[CheckRow]:
         name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in COLLISIONS
     }
     name = next(name for name in COLLISIONS if any(lost[name]))
-    balls, after = QUESTIONS[name].balls, answers[name].last
+    balls, after = answers[name].asked.balls, answers[name].last
     collision, changed = collision_of(balls, after), changes(balls, after)
     P = IMPULSES[""](collision, e)
     a, b = (any(both) for both in zip(*lost.values()))
@@ -351,7 +399,8 @@ FRICTION = "the velocities along the tangent are changed, too: the exercise has 
 
 def only_across(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether the impulse along the normal is right in every collision, and momentum is kept."""
-    for name, question in COLLISIONS.items():
+    for name in COLLISIONS:
+        question = answers[name].asked
         h = collision_of(question.balls, answers[name].last)
         changed = changes(question.balls, answers[name].last)
         along = h.ma * changed[0] @ h.n
@@ -365,7 +414,8 @@ def only_across(answers: dict[str, SolverAnswer], e: float) -> bool:
 def wrong_collisions(answers: dict[str, SolverAnswer], e: float) -> list[str]:
     """The questions of `COLLISIONS` whose velocities differ from the formula."""
     wrong = []
-    for name, question in COLLISIONS.items():
+    for name in COLLISIONS:
+        question = answers[name].asked
         h = collision_of(question.balls, answers[name].last)
         if not near(
             UPDATES[""].change(h, IMPULSES[""](h, e), e),
@@ -390,8 +440,8 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
     expected = "none, or that of the formula"
     seen = [
         (
-            collision_of(QUESTIONS[n].balls, answers[n].last),
-            changes(QUESTIONS[n].balls, answers[n].last),
+            collision_of(answers[n].asked.balls, answers[n].last),
+            changes(answers[n].asked.balls, answers[n].last),
         )
         for n in SEPARATING
     ]
@@ -403,8 +453,7 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
         return chosen("none", "only pairs that approach get an impulse")
     law, change = (found.law, found.change) if found else (IMPULSES[""], UPDATES[""].change)
     if all(near(change(h, law(h, e), e), changed, 0.1) for h, changed in seen):
-        said = "as the formula is printed, pairs that move apart get an impulse, too"
-        return chosen("that of the formula", said)
+        return chosen("that of the formula", AS_PRINTED)
     got = "A is changed by {} m/s, B by {} m/s".format(*map(shown, seen[0][1]))
     cause = found.mistake if found else ""
     if all(near(change(h, -law(h, e), e), changed, 0.1) for h, changed in seen):
@@ -413,6 +462,7 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
     return judged("separating", task, asked, got, expected, False, cause)
 
 
+AS_PRINTED = "as the formula is printed, pairs that move apart get an impulse, too"
 ABSOLUTE = (
     "it takes the absolute value of (vA - vB).n: a pair that moves apart is driven further apart"
 )
@@ -463,8 +513,8 @@ def quantities_kept(answers: dict[str, SolverAnswer]) -> CheckRow:
     changed = [
         word
         for field, word in words.items()
-        for name, question in COLLISIONS.items()
-        for before, after in zip(question.balls, answers[name].last)
+        for name in COLLISIONS
+        for before, after in zip(answers[name].asked.balls, answers[name].last)
         if not near(getattr(after, field), getattr(before, field))
     ]
     what = ", ".join(dict.fromkeys(changed))

@@ -8,14 +8,16 @@ from collections.abc import Sequence
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of
 from reports.check.accesses import LOOPS, Access, accesses_of, is_write, part_of, repeated
-from reports.check.functions import CHANGED
+from reports.check.functions import CHANGED, FUNCTIONS
 from reports.check.impacts import APPROACH, AS_IF_EQUAL
+from reports.check.parts import BEFORE
 from reports.check.questions import QUESTIONS
-from reports.check.rows import SAME_AGAIN, UNKNOWN, CheckRow
+from reports.check.rows import INTEGRATES, SAME_AGAIN, UNKNOWN, CheckRow
 
 # task -> the question that is traced
 SHOWN = {"1": "force", "2": "collision/light on heavy"}
 MOST = 5  # lines in a row
+MOST_UNKNOWN = 8  # in a row whose cause is unknown
 LONGEST = 160  # characters of a line; a minified file is a single line
 # row of task 1 -> the fields that it judges
 WRITTEN = {
@@ -36,6 +38,8 @@ CALLED = {
     "all spheres": "integrate",
     "pairs": "sphereSphereCollisionHandling",
     "itself": "sphereSphereCollisionHandling",
+    "each pair once": "sphereSphereCollisionHandling",
+    "edges last": "projectObjects",
     "integration first": "sphereSphereCollisionHandling",
     "edges in a step": "projectObjects",
 }
@@ -47,10 +51,23 @@ AFTER = "after the displacement"
 NO_MASSES = "the masses are missing"
 ABOUT_OTHERS = re.compile(r"velocit|normal part|overlap|sum of the sizes")
 DECIDES = re.compile(r"compar|taken to collide")
+ONE_SPHERE = re.compile(r"\bv?[AB]\b")
+SHARES = re.compile(r"\bshares?\b|\bmoved by .* times\b")  # of the displacement
 GUARD = re.compile(r"==\s*0\b")  # two at the same place
 HEAD_OF_LOOP = re.compile(r"\b(?:for|while|do|forEach|map)\b")
 BRANCH = re.compile(r"\bif\b.*[<>]|[<>].*\?")  # on the order of two numbers
 ASSIGNS = re.compile(r"([\w.,\s\[\]]+?)\s*[-+*/]?=(?![=>])")
+
+
+HEAD_OF_FUNCTION = re.compile(r"^\s*(?:function|def|async|class)\b")
+# fields that a normal is not computed from, and those that an impulse is not
+NOT_OF_NORMAL = re.compile(r"\bsize\b|\bmass\b|\bvelocity\b")
+NOT_OF_IMPULSE = re.compile(r"\bposition\b|\bsize\b")
+
+
+def names_in(statement: str) -> set[str]:
+    """The variables that a line of code names: not what comes after a point."""
+    return {*re.findall(r"(?<![\w.])[A-Za-z_]\w*", statement)}
 
 
 def assigned(statement: str) -> list[str]:
@@ -91,6 +108,15 @@ def displacement_lines(seen: Sequence[Access], cause: str) -> list[int]:
     writes = [a.line for a in seen if is_write(a, "position") and a.sphere in spheres]
     overlap = [a.line for a in seen if a.field == "size" and a.line not in writes][-1:]
     return [*(overlap if re.search(r"size|overlap|bracket", cause) else []), *writes]
+
+
+def first_writes(seen: Sequence[Access], writes: Sequence[Access]) -> list[int]:
+    """The lines of those writes of velocities that come before the last line that only reads
+    velocities."""
+    written = {a.line for a in seen if is_write(a, "velocity")}
+    reads = [k for k, a in enumerate(seen) if a.field == "velocity" and a.line not in written]
+    early = {a.line for a in seen[: max(reads, default=0)] if is_write(a, "velocity")}
+    return [a.line for a in writes if a.line in early] or [a.line for a in writes]
 
 
 def impulse_lines(seen: Sequence[Access], cause: str) -> list[int]:
@@ -137,13 +163,14 @@ class Source:
     def __init__(self, process: SolverProcess, text: str) -> None:
         self.process, self.text, self.lines = process, text, text.splitlines()
         self.traced: dict[str, list[Access]] = {}
+        self.questions = dict(QUESTIONS)
 
     def accesses(self, question: str) -> list[Access]:
         """The accesses that a question causes; none if the file lacks the function."""
-        needed = QUESTIONS[question].calls[0][0]
+        needed = self.questions[question].calls[0][0]
         if question not in self.traced:
             has = self.process.functions[needed]
-            found = accesses_of(self.process, QUESTIONS[question], self.text) if has else []
+            found = accesses_of(self.process, self.questions[question], self.text) if has else []
             self.traced[question] = found
         return self.traced[question]
 
@@ -151,9 +178,28 @@ class Source:
         """The part of task 2 in which the call of a question failed, at the line `failed_at`."""
         return part_of(self.accesses(question), failed_at, self.text)
 
+    def computes_with(self, field: str) -> bool:
+        """Whether the collision function reads this field on lines that do not write it; True if
+        its accesses are not known."""
+        seen = self.accesses(SHOWN["2"])
+        written = {a.line for a in seen if is_write(a, field)}
+        return not seen or any(a.field == field and a.line not in written for a in seen)
+
+    @property
+    def integrates(self) -> bool:
+        """Whether the collision function calls integrate: both write the angle on the same line."""
+        turned = [
+            {a.line for a in self.accesses(SHOWN[task]) if is_write(a, "alpha") and a.line}
+            for task in ("1", "2")
+        ]
+        return not turned[0].isdisjoint(turned[1])
+
     def of(self, row: CheckRow) -> list[tuple[int, str]]:
         """The lines that a row is about, at most `MOST`, each with its number from 1."""
-        if named := named_line(row.cause, self.text):
+        if row.cause == INTEGRATES:
+            seen = self.accesses(SHOWN["2"])
+            numbers = [a.lines[1] for a in seen if is_write(a, "alpha") and len(a.lines) > 1]
+        elif named := named_line(row.cause, self.text):
             # What performSimStep calls fails by what it is called with: that is at its loops.
             numbers = [named[0][0], *(self.loops() if row.task == "loop" else [])]
         elif row.name == "box":
@@ -162,11 +208,16 @@ class Source:
             numbers = self.calls(row.name)
         elif "does not come back" in row.cause:
             numbers = self.endless_lines(self.accesses(SHOWN["1" if row.task == "1" else "2"]))
+        elif "returns something new" in row.cause:
+            numbers = self.returns(FUNCTIONS["1" if row.task == "1" else "2a"])
         elif row.name == SAME_AGAIN:
             numbers = self.assignment_lines(re.findall(r"global (\w+)", row.cause))
         else:
             numbers = self.access_lines(row)
-        shown = sorted([k for k in dict.fromkeys(numbers) if k][:MOST])
+            if row.task == "1" or row.cause == UNKNOWN or SHARES.search(row.cause):
+                numbers = [*numbers, *self.feeding(numbers)]
+        most = MOST_UNKNOWN if row.cause == UNKNOWN else MOST
+        shown = sorted([k for k in dict.fromkeys(numbers) if k][:most])
         return [(k, cut(self.lines[k - 1].strip())) for k in shown if k <= len(self.lines)]
 
     def access_lines(self, row: CheckRow) -> list[int]:
@@ -174,9 +225,13 @@ class Source:
         seen = self.accesses(SHOWN["1" if row.task == "1" else "2"])
         if row.name in WRITTEN:
             who = {"velocity of A": {0}, "velocity of B": {1}}.get(row.name, {0, 1})
+            if row.cause != UNKNOWN and not ONE_SPHERE.search(row.cause):
+                who = {0, 1}
             writes = [a for a in seen if a.kind == "w" and a.field in WRITTEN[row.name]]
             # Where one sphere is not written at all, its lines belong beside those of the other.
             of_it = [a for a in writes if a.sphere in who] or writes
+            if BEFORE in row.cause:
+                return first_writes(seen, of_it)
             return [*calls_for_one(writes, of_it), *(a.line for a in of_it)]
         made = self.normal_lines(seen, row.cause)
         if row.task == "2a":
@@ -205,7 +260,7 @@ class Source:
         if row.task == "2c" and NO_MASSES in row.cause:
             return self.lines_of_j(seen) or impulse_lines(seen, row.cause)
         if row.task == "2c":
-            return made or impulse_lines(seen, row.cause)
+            return made or self.with_results(impulse_lines(seen, row.cause), seen, row.cause)
         return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
 
     def branches(self, lines: Sequence[int]) -> list[int]:
@@ -269,11 +324,59 @@ class Source:
         ]
         changes = [k for k in between if made & {*assigned(code[k - 1])}]
         if ABOUT_NORMAL.search(cause):
+            changes = changes or self.derived(reads, min(kicks, default=0), NOT_OF_NORMAL)
             return [*reads, *changes] if len(reads + changes) <= MOST else [*changes, *reads]
         used = rf"\b(?:{'|'.join(made)})\b"
         sums = [k for k in range(max(reads) + 1, max(reads) + 5) if k - 1 < len(code)]
         sums = [k for k in sums if k not in changes and not GUARD.search(code[k - 1])]
         return [k for k in sums if made and re.search(used, code[k - 1])][:2]
+
+    def with_results(self, lines: list[int], seen: Sequence[Access], cause: str) -> list[int]:
+        """Lines that read the numbers for the impulse; if they are several, or only the beginning
+        of what the cause is about, also those that compute it from their variables, up to the first
+        that writes a velocity."""
+        if len({*lines}) < 2 and "relative speed" not in cause:
+            return lines
+        ends = [a.line for a in seen if is_write(a, "velocity") and a.line > max(lines, default=0)]
+        return [*lines, *self.derived(lines, min(ends, default=0), NOT_OF_IMPULSE)]
+
+    def derived(self, lines: Sequence[int], end: int, others: re.Pattern[str]) -> list[int]:
+        """The lines before `end` that set a variable from those that these lines set; without
+        lines that name `others`, and without those that use what such lines set."""
+        code = code_of(self.text).splitlines()
+        made = {name for line in lines for name in assigned(code[line - 1])}
+        found, apart = [], set[str]()
+        for k in range(min(lines, default=end), end):
+            names, used = {*assigned(code[k - 1])}, names_in(code[k - 1])
+            if others.search(code[k - 1]) or used & apart:
+                apart |= names
+            elif k not in lines and names and made & used - names:
+                made |= names
+                found.append(k)
+        return found
+
+    def feeding(self, lines: Sequence[int]) -> list[int]:
+        """The lines above these that last set a variable used in them, the nearest first; a line
+        of a function only feeds those below it in the same function."""
+        code = code_of(self.text).splitlines()
+        found: list[int] = []
+        for line in lines:
+            if not 0 < line <= len(code):
+                continue
+            heads = [k for k in range(1, line) if HEAD_OF_FUNCTION.search(code[k - 1])]
+            begin = max(heads, default=0)
+            for name in names_in(code[line - 1]):
+                above = (k for k in range(line - 1, begin, -1) if name in assigned(code[k - 1]))
+                found += [k for k in [next(above, 0)] if k and k not in (*found, *lines)]
+        return sorted(found, reverse=True)
+
+    def returns(self, function: str) -> list[int]:
+        """The lines on which a function returns something."""
+        code = code_of(self.text).splitlines()
+        begin = next(iter(self.heads(function)), len(code))
+        ends = (k for k in range(begin + 1, len(code) + 1) if HEAD_OF_FUNCTION.search(code[k - 1]))
+        body = range(begin, next(ends, len(code) + 1))
+        return [k for k in body if re.search(r"\breturn\s+[\w\[{(]", code[k - 1])]
 
     def calls(self, name: str) -> list[int]:
         """The lines of performSimStep that a row of the step is about; for a row about the edges
@@ -287,8 +390,9 @@ class Source:
             for k, line in enumerate(code[begin:], begin + 1)
             if re.search(rf"\b{function}\s*\(", line) and k not in self.heads(function)
         ]
-        if found and name == "itself":  # the loop over j stands last, its head before the call
-            return [found[-1] - 1, found[-1]]
+        if found and name in ("itself", "each pair once"):  # the loop over j stands last
+            heads = (k for k in range(found[-1], begin, -1) if HEAD_OF_LOOP.search(code[k - 1]))
+            return [next(heads, found[-1]), found[-1]]
         return found or self.heads("performSimStep")
 
     def loops(self) -> list[int]:

@@ -3,6 +3,7 @@ give the expected results."""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -30,14 +31,15 @@ A, B = Ball((-0.2, 0.0), (1.0, 0.2), r=0.3), Ball((0.25, 0.1), (-1.0, 0.1), m=2.
 LEFT, RIGHT = Ball((-0.3, 0.0), (1.0, 0.0), r=0.3), Ball((0.3015, 0.0), (-1.0, 0.0), r=0.3)
 
 
-def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
+def loop_rows(process: SolverProcess, faulty: bool, kicks_apart: bool) -> list[CheckRow]:
     """The rows of the step; if the file has no step, a row that says so.
 
-    `faulty`: whether the functions that it calls have faults.
+    faulty: whether the functions that it calls have faults. kicks_apart: whether overlapping pairs
+    that move apart get an impulse.
     """
     has = process.functions
     if not (has["begin"] and has["step"]):
-        missing = "initScene" if not has["begin"] else "performSimStep"
+        missing = "performSimStep" if not has["step"] else "initScene"
         return [not_asked("step", "loop", f"the file has no function {missing}")]
     start, no_scene = scene_of(process)
     if no_scene:
@@ -58,7 +60,7 @@ def loop_rows(process: SolverProcess, faulty: bool) -> list[CheckRow]:
     elif faulty:
         rows = call_rows(asked, answers, len(start))
     else:
-        rows = step_rows(asked, answers)
+        rows = step_rows(asked, answers, kicks_apart)
     if has["wrap"]:
         rows += edges(asked["edges"], answers["edges"], start, process.surface == "exercise")
     return rows
@@ -91,20 +93,23 @@ def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None
     return start, None
 
 
-def step_rows(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> list[CheckRow]:
-    """The rows of a step whose functions are right."""
+def step_rows(
+    asked: dict[str, Question], answers: dict[str, SolverAnswer], kicks_apart: bool
+) -> list[CheckRow]:
+    """The rows of a step whose functions are right; `kicks_apart` as above."""
     itself = against_itself(asked["free"], answers)
     if itself and itself.verdict == "fault":
         return [itself, not_asked("all spheres", "loop", "a sphere collides with itself")]
     moved, met = integrated(asked["free"], answers), pairs(asked, answers)
-    rows = [moved, met, *([itself] if itself else [])]
+    twice = handled_twice(answers["watched"], kicks_apart)
+    rows = [moved, met, *([itself] if itself else []), *twice]
     if moved.verdict == met.verdict == "right":
         rows.append(integration_first(asked, answers))
     if "edges in a step" in answers:
         rows.append(
             wrapping(asked["edges in a step"], answers["edges in a step"], answers["edges"])
         )
-    return rows
+    return [*rows, *edges_last(answers["watched"])]
 
 
 def worlds(n: int, wraps: bool) -> dict[str, Question]:
@@ -208,7 +213,7 @@ def call_rows(
         wrapped = wrapped or not stayed(asked["edges in a step"], answers["edges in a step"])
         question, got = "Does a step call projectObjects?", "yes" if wrapped else "no"
         rows.append(judged("edges in a step", "loop", question, got, "yes", wrapped, NOT_WRAPPED))
-    return rows
+    return [*rows, *edges_last(answers["watched"])]
 
 
 def stayed(question: Question, answer: SolverAnswer) -> bool:
@@ -272,6 +277,11 @@ def against_itself(question: Question, answers: dict[str, SolverAnswer]) -> Chec
     expected = "two different spheres"
     right = integrated(question, answers).verdict == "right"
     cause = "performSimStep lets a sphere collide with itself: j begins at i, not at i + 1"
+    if again := pairs_again(answers["watched"]):
+        cause = (
+            "performSimStep lets a sphere collide with itself, and handles"
+            f" {len(again)} pairs of asteroids twice: j begins at 0, not at i + 1"
+        )
     if right:
         cause = f"{who} is also tested against itself, which changes nothing"
         return CheckRow("itself", "loop", asked, got, "any", "free choice", cause)
@@ -283,6 +293,45 @@ def is_with_itself(call: tuple[Any, ...]) -> bool:
     return bool(call[0] == "collide" and call[1] == call[2] >= 0)
 
 
+def pairs_again(watched: SolverAnswer) -> set[frozenset[int]]:
+    """The pairs of different asteroids that a step gives to the collision function more than
+    once."""
+    met = [frozenset(call[1:]) for call in watched.calls if call[0] == "collide"]
+    return {
+        pair
+        for pair, times in Counter(met).items()
+        if times > 1 and len(pair) == 2 and min(pair) > 0
+    }
+
+
+def handled_twice(watched: SolverAnswer, kicks_apart: bool) -> list[CheckRow]:
+    """A row if pairs of asteroids are handled more than once: a fault if the second call gives them
+    an impulse where rounding has left an overlap, else a free choice."""
+    again = pairs_again(watched)
+    if not again:
+        return []
+    asked = "Which pairs of asteroids does a step give to the collision function more than once?"
+    got, said = f"{len(again)} pairs", "every pair of asteroids is handled more than once"
+    if not kicks_apart:
+        said += ", which changes nothing: the pair no longer approaches"
+        return [CheckRow("each pair once", "loop", asked, got, "any", "free choice", said)]
+    cause = f"{said}: where rounding leaves an overlap, the impulse acts again"
+    return [judged("each pair once", "loop", asked, got, "none", False, cause)]
+
+
+def edges_last(watched: SolverAnswer) -> list[CheckRow]:
+    """The fault that a step calls projectObjects before other functions; nothing if it comes last,
+    or if the calls are not known."""
+    called = [call[0] for call in watched.calls]
+    if not {"integrate", "wrap"} <= {*called} or called[-1] == "wrap":
+        return []
+    asked, last = "What does a step call last?", called[-1]
+    names = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
+    got = names[last]
+    cause = f"performSimStep calls {got} after projectObjects: a sphere may end beyond an edge"
+    return [judged("edges last", "loop", asked, got, "projectObjects", False, cause)]
+
+
 def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on pairs: every overlapping pair collides, and no other sphere changes."""
     silent, others = [], []
@@ -291,9 +340,9 @@ def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> Check
             continue
         i, j = map(int, name.split()[1:])
         struck = struck_in(question, answers[name])
-        if not {i, j} <= struck:
+        if not met(question, answers[name], i, j):
             silent.append(name_of(i, j))
-        elif struck != {i, j}:
+        elif not struck <= {i, j}:
             others.append(name_of(min(struck - {i, j})))
     got = (
         f"no collision of {', '.join(silent)}"
@@ -316,6 +365,18 @@ def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> Check
     )
 
 
+def met(question: Question, answer: SolverAnswer, i: int, j: int) -> bool:
+    """Whether a step lets spheres i and j collide: it changes the velocities of both, or they do
+    not overlap afterwards.
+
+    A step may give a pair to the collision function twice, as the exercise's own does. Where
+    rounding leaves an overlap, the second impulse acts, too, and e = 1 restores the velocities.
+    """
+    a, b = answer.last[i], answer.last[j]
+    apart, reach = float(np.hypot(*np.subtract(a.x, b.x))), a.r + b.r
+    return {i, j} <= struck_in(question, answer) or apart > reach or near(apart, reach)
+
+
 def struck_in(question: Question, answer: SolverAnswer) -> set[int]:
     """The spheres whose velocities a step without forces changes."""
     return {k for k, (b, a) in enumerate(zip(question.balls, answer.last)) if not near(a.v, b.v)}
@@ -327,7 +388,8 @@ def integration_first(asked: dict[str, Question], answers: dict[str, SolverAnswe
     missed = [
         name_of(*map(int, name.split()[-2:]))
         for name, question in asked.items()
-        if name.startswith("about to meet") and not struck_in(question, answers[name])
+        if name.startswith("about to meet")
+        and not met(question, answers[name], *map(int, name.split()[-2:]))
     ]
     return judged(
         "integration first",

@@ -27,15 +27,18 @@ def taken(vector: Array, part: int) -> Array:
     return np.full_like(vector, vector.flat[part if vector.ndim else 0])
 
 
+OWN_MOI = "pi / 2 size4 is used as MoI, which it is for every sphere of the exercise"
+NEVER = "it is never changed"  # of each quantity: several that are missing are several faults
 # (v or w, force or torque, mass or inertia, the other of the two, dt) -> v' or w'
 UNDER_FORCE: dict[str, Law] = {
     "": lambda v, f, m, _o, dt: v + f / m * dt,
-    "it is never changed": lambda v, *_: v,
+    NEVER: lambda v, *_: v,
     "the force is not divided by the {mass}": lambda v, f, _m, _o, dt: v + f * dt,
     "the force is divided by the {other} instead of the {mass}": lambda v, f, _m, o, dt: (
         v + f / o * dt
     ),
     "the force is multiplied by the {mass}": lambda v, f, m, _o, dt: v + f * m * dt,
+    "the {mass} is squared": lambda v, f, m, _o, dt: v + f / m**2 * dt,
     "dt is missing": lambda v, f, m, _o, _dt: v + f / m,
     "dt is squared": lambda v, f, m, _o, dt: v + f / m * dt * dt,
     "dt is halved": lambda v, f, m, _o, dt: v + f / m * dt / 2,
@@ -79,9 +82,7 @@ UNDER_TORQUE: dict[str, Law] = {
         w + t / (m * r * r / 2) * dt
     ),
     "mass size2 is used instead of the {mass}": lambda w, t, _i, m, dt, r: w + t / (m * r * r) * dt,
-    "pi / 2 size4 is used instead of the sphere's own {mass}": lambda w, t, _i, _m, dt, r: (
-        w + t / (np.pi / 2 * r**4) * dt
-    ),
+    OWN_MOI: lambda w, t, _i, _m, dt, r: w + t / (np.pi / 2 * r**4) * dt,
 }
 # (x or alpha, v or w before, the same after, acceleration by the right formula, dt) -> x' or alpha'
 MOVED: dict[str, Law] = {
@@ -89,7 +90,7 @@ MOVED: dict[str, Law] = {
     "it is moved by the old {velocity} (explicit Euler); symplectic Euler takes the new one": (
         lambda x, v, _n, _a, dt: x + v * dt
     ),
-    "it is never changed": lambda x, *_: x,
+    NEVER: lambda x, *_: x,
     "dt is missing": lambda x, _v, new, _a, _dt: x + new,
     "dt is missing, and it is moved by the old {velocity}": lambda x, v, _n, _a, _dt: x + v,
     "dt is squared": lambda x, _v, new, _a, dt: x + new * dt * dt,
@@ -230,7 +231,10 @@ def law_row(
         found = one_axis(laws, given, answers) or limited(laws[""], given, answers)
     if found is None:
         found = multiplied(laws[""], given, answers)
-    cause = (found or "").format(**words)
+    if found == OWN_MOI:
+        got, expected = f"{shown(answers[0])} {unit}", f"{shown(right)} {unit}"
+        return CheckRow(name, "1", asked, got, expected, "free choice", OWN_MOI)
+    cause = f"the {name} is never changed" if found == NEVER else (found or "").format(**words)
     if name == "spin":
         cause = cause.replace("the force", "the torque").replace("F/m", "torque/MoI")
     if not np.isfinite(np.asarray(answers[0], float)).all():

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from reports.check.collisions import Impulse, PairCollision
-from reports.check.rows import near
+from reports.check.rows import near, shown
 from scenarios.model import Array
 
 Change = Callable[[PairCollision, Array, float], tuple[Array, Array]]
@@ -72,6 +72,7 @@ COMPONENTS: dict[str, Callable[..., float]] = {
     ),
     "is divided by the mass of the other": lambda p, q, whole, m, other, v, e: p / other,
     "is not divided by its mass": lambda p, q, whole, m, other, v, e: p,
+    "is divided by its mass squared": lambda p, q, whole, m, other, v, e: p / m**2,
     "is multiplied by its mass": lambda p, q, whole, m, other, v, e: p * m,
     "is changed twice": lambda p, q, whole, m, other, v, e: 2 * p / m,
     "is changed along x and along y": lambda p, q, whole, m, other, v, e: (p + q) / m,
@@ -114,3 +115,70 @@ def component(name: str | None, h: PairCollision, P: Array, who: int, axis: int,
     return COMPONENTS[name or ""](
         sign * P[axis], sign * P[1 - axis], sign * (P @ h.n), own, other, v[axis], e
     )
+
+
+BEFORE = "before the impulse is computed"
+
+
+def damping(
+    seen: Sequence[tuple[PairCollision, Array]], right: Impulse, e: float
+) -> tuple[str, Change] | None:
+    """The mistake that the velocities of A and of B are each multiplied by a number, before the
+    impulse or after it, and its effect; None if no numbers give the collisions.
+
+    The new velocities are linear in the two numbers, which least squares finds.
+    """
+    for when, new in ((BEFORE, multiplied_before), ("after the impulse", multiplied_after)):
+        terms = np.concatenate([new(h, right, e) for h, _ in seen])
+        wanted = np.concatenate([[*h.va, *h.vb] + changed.ravel() for h, changed in seen])
+        factors = np.linalg.lstsq(terms, wanted, rcond=None)[0]
+        if near(terms @ factors, wanted, 0.1):
+            return f"{multiplied_by(*factors)} {when}", effect(new, right, factors)
+    return None
+
+
+# (pair, law, e) -> (4, 2), its product with both numbers gives the new velocities, of A and of B
+NewVelocities = Callable[[PairCollision, Impulse, float], Array]
+
+
+def multiplied_before(h: PairCollision, right: Impulse, e: float) -> Array:
+    """The new velocities for vA = 1 vA, vB = 0, and those for vA = 0, vB = 1 vB."""
+    parts = []
+    for va, vb in ((h.va, 0 * h.vb), (0 * h.va, h.vb)):
+        P = right(h._replace(va=va, vb=vb), e)
+        parts.append([*(va + P / h.ma), *(vb - P / h.mb)])
+    return np.array(parts).T
+
+
+def multiplied_after(h: PairCollision, right: Impulse, e: float) -> Array:
+    """The right new velocity of A, and that of B."""
+    P = right(h, e)
+    a, b = h.va + P / h.ma, h.vb - P / h.mb
+    return np.array([[*a, 0.0, 0.0], [0.0, 0.0, *b]]).T
+
+
+def effect(new: NewVelocities, right: Impulse, factors: Array) -> Change:
+    """The changes of both velocities with these two numbers."""
+
+    def change(h: PairCollision, _P: Array, e: float) -> tuple[Array, Array]:
+        after = new(h, right, e) @ factors
+        return after[:2] - h.va, after[2:] - h.vb
+
+    return change
+
+
+def multiplied_by(a: float, b: float) -> str:
+    """What happens to the velocities, in words."""
+    if near(a, b):
+        return f"both velocities are {done(a)}"
+    parts = [
+        f"the velocity of {who} is {done(factor)}"
+        for who, factor in (("A", a), ("B", b))
+        if not near(factor, 1.0)
+    ]
+    return " and ".join(parts)
+
+
+def done(factor: float) -> str:
+    """What a number does to a velocity."""
+    return "set to 0" if near(factor, 0.0) else f"multiplied by {shown(factor)}"

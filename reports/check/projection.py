@@ -16,7 +16,7 @@ from reports.check.impacts import (
     CollisionExplanation,
     in_degrees,
 )
-from reports.check.questions import COLLISIONS, QUESTIONS, Ball, SolverAnswer, direction, finite
+from reports.check.questions import COLLISIONS, Ball, SolverAnswer, direction, finite
 from reports.check.rows import CheckRow, judged, near, not_asked, shown
 from scenarios.model import Array
 
@@ -83,7 +83,7 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 
 def moved_together(answers: dict[str, SolverAnswer]) -> bool:
     """Whether colliding pairs are moved into each other."""
-    shifts = [shift_of(question.balls, answers[name].last) for name, question in COLLISIONS.items()]
+    shifts = [shift_of(answers[name].asked.balls, answers[name].last) for name in COLLISIONS]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 
 
@@ -107,9 +107,10 @@ def reacts(answers: dict[str, SolverAnswer]) -> bool:
     return all(
         answers[name].failed
         or not np.array_equal(
-            [b.numbers() for b in answers[name].last], [b.numbers() for b in question.balls]
+            [b.numbers() for b in answers[name].last],
+            [b.numbers() for b in answers[name].asked.balls],
         )
-        for name, question in COLLISIONS.items()
+        for name in COLLISIONS
     )
 
 
@@ -119,7 +120,7 @@ def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
         return [not_asked("one point", "2b", TAKEN_TO_BE_APART)]
     readable = all(answers[name].balls for name in DISPLACED)
     if not readable or not all(
-        displaced(question.balls, answers[name]) for name, question in COLLISIONS.items()
+        displaced(answers[name].asked.balls, answers[name]) for name in COLLISIONS
     ):
         return [not_asked("one point", "2b", "the call fails before it has moved both spheres")]
     return projection_rows(answers, None)
@@ -151,7 +152,7 @@ def projection_rows(
     """The rows of (b); `found`: the explanation of the velocities."""
     seen = [
         (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
-        for name, q in COLLISIONS.items()
+        for name, q in ((name, answers[name].asked) for name in COLLISIONS)
     ]
     met = [near(distance_of(after), shift.sizes, 0.1) for _, shift, after in seen]
     balls, shift, after = seen[met.index(False) if False in met else 0]
@@ -192,9 +193,10 @@ def at_rest(answers: dict[str, SolverAnswer], explained: bool) -> list[CheckRow]
     """The row on a pair at relative rest, whose displacement must not change a velocity, and one in
     (d) if something else changes it. None if a mistake in the impulse explains the change, or
     velocities are not numbers."""
-    still, after = QUESTIONS["at rest to each other"].balls, answers["at rest to each other"].last
+    answer = answers["at rest to each other"]
+    still, after = answer.asked.balls, answer.last
     kept = all(near(x.v, y.v) for x, y in zip(still, after))
-    if not kept and answers["at rest to each other"].failed:
+    if not kept and answer.failed:
         return [not_asked("velocities", "2b", "the call fails after it has changed velocities")]
     if not kept and (explained or not finite(answers, "v")):
         return []
@@ -216,6 +218,7 @@ NOT_FINITE = (
     "the velocities of a pair at relative rest become NaN or infinite (a division by zero?)"
 )
 WITHOUT_IMPULSE = "a pair that needs no impulse does not keep its velocities"
+DISPLACES_VELOCITY = "the displacement changes the velocity, too"
 INSTEAD = "the displacement changes the velocity instead of the position"
 
 
@@ -224,12 +227,12 @@ def displaced_velocity(answers: dict[str, SolverAnswer]) -> str:
 
     Only then a pair at relative rest gets the same change whatever its velocity is.
     """
-    before, after = QUESTIONS[AT_REST[0]].balls, answers[AT_REST[0]].last
-    one, other = (changes(QUESTIONS[name].balls, answers[name].last) for name in AT_REST)
+    before, after = answers[AT_REST[0]].asked.balls, answers[AT_REST[0]].last
+    one, other = (changes(answers[name].asked.balls, answers[name].last) for name in AT_REST)
     if near(one, 0.0) or not near(one, other):
         return ""
     placed_as_before = all(near(x.x, y.x) for x, y in zip(before, after))
-    return INSTEAD if placed_as_before else "the displacement changes the velocity, too"
+    return INSTEAD if placed_as_before else DISPLACES_VELOCITY
 
 
 Pairs = list[tuple[tuple[Ball, ...], Shift, list[Ball]]]
@@ -419,7 +422,7 @@ ONE = (
 
 def separation(answer: SolverAnswer) -> CheckRow:
     """The row on a pair that overlaps and moves apart: whether to displace it is a free choice."""
-    shift = shift_of(QUESTIONS["separate"].balls, answer.last)
+    shift = shift_of(answer.asked.balls, answer.last)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     if answer.failed and not moved:
         return not_asked("separating pair", "2b", "the call fails before it moves such a pair")

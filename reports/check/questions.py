@@ -78,6 +78,9 @@ class Question(NamedTuple):
         }
 
 
+NOTHING = Question((), ())
+
+
 @dataclass(frozen=True)
 class SolverAnswer:
     """The answer to a question.
@@ -92,6 +95,7 @@ class SolverAnswer:
         calls: the calls of the file, for a watched question: ("integrate", sphere, dt),
             ("collide", sphere, sphere), ("wrap",).
         failed: how it failed, or None.
+        asked: the question.
     """
 
     balls: list[list[Ball]]
@@ -101,6 +105,7 @@ class SolverAnswer:
     kept: tuple[str, ...] = ()
     calls: tuple[tuple[Any, ...], ...] = ()
     failed: SolverFailed | None = None
+    asked: Question = NOTHING
 
     @property
     def last(self) -> list[Ball]:
@@ -205,6 +210,23 @@ def questions() -> dict[str, Question]:
 QUESTIONS = questions()
 
 
+def closer(question: Question, share: float) -> Question:
+    """A question on two spheres, with their distance multiplied by `share`."""
+    a, b = question.balls
+    place = np.array(a.x) + share * np.subtract(b.x, a.x)
+    return question._replace(balls=(a, b._replace(x=(float(place[0]), float(place[1])))))
+
+
+# The questions on 2b to 2d for a file that takes their overlaps for gaps: these are below the
+# smaller of the two sizes.
+CLOSER = {
+    name: closer(question, 0.35)
+    for name, question in QUESTIONS.items()
+    if name.startswith(("collision/", "swapped/", "at rest", "separate"))
+    or name in ("slow", "even", "fast")
+}
+
+
 def ask(
     process: SolverProcess, asked: dict[str, Question], afresh: bool = False
 ) -> dict[str, SolverAnswer]:
@@ -218,7 +240,7 @@ def ask(
         for name in names:
             requests += [*before, ("ask", asked[name].request, LIMIT)]
         replies = process.request(requests)[len(before) :: len(before) + 1]
-        answers |= {name: answered(reply) for name, reply in zip(names, replies)}
+        answers |= {name: answered(reply, asked[name]) for name, reply in zip(names, replies)}
     return answers
 
 
@@ -291,10 +313,10 @@ def was_stopped(answers: dict[str, SolverAnswer]) -> bool:
     )
 
 
-def answered(reply: dict[str, Any] | SolverFailed) -> SolverAnswer:
+def answered(reply: dict[str, Any] | SolverFailed, asked: Question) -> SolverAnswer:
     """The answer from a reply of the worker."""
     if isinstance(reply, SolverFailed):
-        return SolverAnswer([], failed=reply)
+        return SolverAnswer([], failed=reply, asked=asked)
     failed = None if reply["error"] is None else SolverFailed(**reply["error"])
     balls = [[ball(numbers) for numbers in state] for state in reply["states"]]
     return SolverAnswer(
@@ -305,6 +327,7 @@ def answered(reply: dict[str, Any] | SolverFailed) -> SolverAnswer:
         tuple(reply["kept"]),
         tuple(map(tuple, reply["calls"])),
         failed,
+        asked,
     )
 
 

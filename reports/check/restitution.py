@@ -16,7 +16,7 @@ from adapters.own_solver.restitution import (
     own_restitution,
     separation,
 )
-from reports.check.questions import QUESTIONS, SolverAnswer
+from reports.check.questions import SolverAnswer
 from reports.check.rows import FOLLOWS, CheckRow, judged, near, shown
 
 
@@ -140,9 +140,7 @@ class Restitution:
 
 def restitution_of(text: str, answers: dict[str, SolverAnswer]) -> Restitution:
     """The `Restitution` from the file's text and its collisions."""
-    measured, slow, fast = (
-        restitution_in(answers[name], name) for name in ("even", "slow", "fast")
-    )
+    measured, slow, fast = (restitution_in(answers[name]) for name in ("even", "slow", "fast"))
     out_of_range = not 0 <= measured <= 1 and any(near(e, measured) for e in named_in(text))
     return Restitution(
         own_restitution(text, measured), out_of_range, decimal_comma(text), slow, fast
@@ -162,10 +160,10 @@ def decimal_comma(text: str) -> str:
     return f"line {code.count(chr(10), 0, found.start()) + 1} has {found[0].rstrip('; ')}"
 
 
-def restitution_in(answer: SolverAnswer, name: str) -> float:
-    """The e of the head-on pair of a question; NaN if the call failed."""
+def restitution_in(answer: SolverAnswer) -> float:
+    """The e of a head-on pair; NaN if the call failed."""
     if answer.failed or not answer.balls:
         return float("nan")
-    a, b = QUESTIONS[name].balls
+    a, b = answer.asked.balls
     after = answer.last
     return separation(a.v[0] - b.v[0], after[0].v[0], after[1].v[0])

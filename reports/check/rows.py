@@ -16,6 +16,7 @@ TOLERANCE = 1e-6
 FOLLOWS = "it follows from the faults above"
 SAME_AGAIN = "same answer again"  # the row on state that a file keeps between calls
 UNKNOWN = "unknown: no known mistake gives these numbers"
+INTEGRATES = "the collision function calls integrate: spheres that collide move on in time, too"
 TASKS = {
     "file": "the file",
     "1": "1 integrate",
@@ -53,7 +54,9 @@ FORMULAS = {
     "integration first": "integrate every sphere, then handle the collisions, then projectObjects",
     "pairs": "every asteroid with the ufo; for i < j the pair of asteroids i and j",
     "itself": "for i < j the pair of asteroids i and j: j begins at i + 1",
+    "each pair once": "for i < j the pair of asteroids i and j: j begins at i + 1",
     "edges in a step": "projectObjects ends the step",
+    "edges last": "projectObjects ends the step",
     "edges": "a centre beyond an edge is moved to the opposite edge",
     "ufo": "a ufo that leaves the box is moved back to its start",
 }

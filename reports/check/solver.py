@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
@@ -17,19 +14,28 @@ from reports.check.detection import detection_rows
 from reports.check.failing import rows_until_failure
 from reports.check.functions import failed_calls, implemented, same_again
 from reports.check.impacts import APPROACH, BACKWARDS, explain
-from reports.check.impulse import impulse_rows
+from reports.check.impulse import AS_PRINTED, impulse_rows
 from reports.check.lines import Source, named_line
 from reports.check.loop import loop_rows
 from reports.check.motion import TURNED, motion_rows
 from reports.check.projection import (
+    DISPLACES_VELOCITY,
     TAKEN_TO_BE_APART,
     moved_together,
     projection_rows,
     reacts,
 )
-from reports.check.questions import QUESTIONS, SolverAnswer, ask_in_two_orders, was_stopped
+from reports.check.questions import (
+    CLOSER,
+    QUESTIONS,
+    SolverAnswer,
+    ask,
+    ask_in_two_orders,
+    renew,
+    was_stopped,
+)
 from reports.check.restitution import Restitution, restitution_of
-from reports.check.rows import SAME_AGAIN, CheckRow, judged, near, not_asked
+from reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, not_asked
 from reports.check.scenes import scene_rows
 
 
@@ -86,57 +92,16 @@ def rows_of(
     rows = [loads(process), *task_1(process, answers, others, text)]
     contact, restitution = task_2(process, answers, others, source, with_beside)
     rows += contact
+    faulty = any(row.verdict == "fault" for row in rows)
     if was_stopped(answers):
         rows.append(not_asked("step", "loop", "a call did not return"))
     else:
-        rows += step_of(process, rows, answers)
+        kicks_apart = any(row.cause == AS_PRINTED for row in rows)
+        rows += loop_rows(process, faulty, kicks_apart)
     e = restitution.for_scenes if restitution is not None else None
     rows = with_consequences([*rows, *scene_rows(process, rows, e)])
     rows = hinted(rows, text) if process.kind == "javascript" else rows
     return with_lines(rows, source), e
-
-
-def step_of(
-    process: SolverProcess, rows: Sequence[CheckRow], answers: dict[str, SolverAnswer]
-) -> list[CheckRow]:
-    """The rows of the step, of those questions that the faults of its functions leave open.
-
-    That every sphere is integrated once is compared with the file's own integrate. Which pairs
-    collide is seen by their velocities, which tells nothing where those are wrong.
-    """
-    faults = [row for row in rows if row.verdict == "fault"]
-    found = loop_rows(process, hide_the_step(faults, answers))
-    if not any(row.task[0] == "2" for row in faults):
-        return found
-    return [
-        not_asked(row.name, "loop", "the collision function has faults")
-        if row.name in BY_COLLISIONS
-        else row
-        for row in found
-    ]
-
-
-BY_COLLISIONS = ("pairs", "integration first")
-
-
-def hide_the_step(faults: Sequence[CheckRow], answers: dict[str, SolverAnswer]) -> bool:
-    """Whether these faults of the functions would show in all of a step as if they were its own: if
-    distant spheres collide, a function fails, or a sphere without force does not move by v dt."""
-    question, answer = QUESTIONS["coast"], answers.get("coast")
-    coasts = False
-    if answer is not None and answer.balls:
-        (before,), after, dt = question.balls, answer.last[0], question.calls[0][2]
-        coasts = near(after.v, before.v) and near(
-            after.x, np.add(before.x, np.multiply(before.v, dt))
-        )
-    return any(
-        row.task in ("file", "2a") or row.name in AS_A_WHOLE or (row.task == "1" and not coasts)
-        for row in faults
-    )
-
-
-# faults of a function, not of its numbers
-AS_A_WHOLE = ("implemented", "input only", SAME_AGAIN, "sphere kept", "force kept")
 
 
 def with_lines(rows: list[CheckRow], source: Source) -> list[CheckRow]:
@@ -215,6 +180,10 @@ def task_2(
         return with_not_asked(rows, NO_FURTHER), None
     rows += detection_rows(mine, text)
     if not reacts(mine):
+        renew(process)
+        mine |= ask(process, CLOSER)
+        source.questions |= CLOSER
+    if failed_calls(mine) or not reacts(mine):
         return with_not_asked(rows, TAKEN_TO_BE_APART), None
     restitution = restitution_of(with_beside, mine)
     found = explain(mine, restitution)
@@ -222,10 +191,38 @@ def task_2(
         found = replace(found, impulse=BACKWARDS)
     rows += same_again("sphereSphereCollisionHandling", mine, others, text)
     rows += projection_rows(mine, found)
-    rows += impulse_rows(mine, restitution, found)
+    rows += impulse_rows(mine, restitution, found, source.computes_with("velocity"))
+    if not any((row.name, row.verdict) == ("impulse", "right") for row in rows):
+        rows = [unknown_at_touch(row) for row in rows]
+    if any(row.name == "rest kept" and row.verdict == "fault" for row in rows):
+        rows = [integrating(row) if source.integrates else row for row in rows]
     return sorted(rows, key=lambda row: row.task), restitution
 
 
+def unknown_at_touch(row: CheckRow) -> CheckRow:
+    """A row, if it is the one on spheres that just touch, without a claim about a pair that keeps
+    its velocities: a wrong impulse may be 0."""
+    if row.name != "just touching" or row.got == "yes":
+        return row
+    return replace(
+        row,
+        got="not known",
+        cause="not known: the pair keeps its velocities, but the impulse is not the right one",
+    )
+
+
+def integrating(row: CheckRow) -> CheckRow:
+    """A row of a collision function that calls integrate: its unexplained faults follow from
+    that."""
+    if row.verdict != "fault":
+        return row
+    if row.name == "rest kept":
+        return replace(row, cause=INTEGRATES)
+    late = row.cause == UNKNOWN or row.cause == DISPLACES_VELOCITY or "unknown:" in row.cause
+    return replace(row, verdict="follows", cause=FOLLOWS_INTEGRATION) if late else row
+
+
+FOLLOWS_INTEGRATION = "it follows from the call of integrate"
 NO_FURTHER = "the collision function cannot be judged further"
 HIDDEN = "the collision function fails, so that this cannot be seen"
 

@@ -106,11 +106,16 @@ class FileCheck:
         if self.refused:
             return [self.refused]
         if not self.faults:
-            return [
-                f"No fault found: {self.tally().asked} questions, {len(self.choices)} of them about"
-                " free choices."
-            ]
+            said = f"No fault found: {self.tally().asked} questions, {len(self.choices)} of them"
+            return [f"{said} about free choices.{self.own_step}"]
         return [sentence(row) for row in self.findings]
+
+    @property
+    def own_step(self) -> str:
+        """A sentence that the file's own performSimStep was not judged; "" if it was, or if the
+        file has none."""
+        why = next((row.cause for row in self.of("loop") if row.name == "step"), "")
+        return f" Its performSimStep was not judged: {why}." if "initScene" in why else ""
 
     @property
     def brief(self) -> str:

@@ -4,6 +4,7 @@ makes the whole table."""
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -14,13 +15,15 @@ from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.functions import is_read
-from reports.check.questions import QUESTIONS, Ball, SolverAnswer, ask
-from reports.check.rows import TASKS, CheckRow
+from reports.check.loop import loop_rows
+from reports.check.questions import QUESTIONS, Ball, ask
+from reports.check.rows import TASKS
 from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
-from reports.check.solver import check_solver, hide_the_step
+from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck, check_file
 from tests.reports.check.confusion import TABLE, judged, said_first, said_too
-from tests.solvers.mutants import CORRECT, MUTANTS
+from tests.reports.check.marked import marks_of
+from tests.solvers.mutants import CORRECT, HERE, MUTANTS
 
 # A solver takes half a second: some here, of either language and any task; all of both lists in the
 # long test.
@@ -47,6 +50,27 @@ def test_no_correct_solver_is_faulted(solvers: list[Path]):
     assert faults == {}
 
 
+@pytest.mark.parametrize("e", ["0", "0.5", "1"])
+@pytest.mark.parametrize(
+    ("name", "approach"),
+    [("plain.js", "vn >= 0"), ("plain.py", "vn >= 0.0"), ("one_sided.js", "")],
+)
+def test_no_step_is_faulted_for_its_restitution(name: str, approach: str, e: str, tmp_path: Path):
+    """The exercise's step handles an asteroid and the ufo twice. Where rounding leaves an overlap
+    and pairs that move apart get an impulse, too, e = 1 restores the velocities."""
+    text = (HERE / "correct" / name).read_text("utf-8")
+    assert "restitution = 0.9" in text.lower()
+    assert approach in text
+    text = re.sub("(restitution) = 0.9", rf"\1 = {e}", text, flags=re.I)
+    text = text.replace(approach, "1 < 0") if approach else text
+    (tmp_path / name).write_text(text, "utf-8")
+    with SolverProcess(read_solver(tmp_path / name)) as process:
+        rows = loop_rows(process, faulty=False, kicks_apart=True)
+
+    assert len(rows) > 5
+    assert [row for row in rows if row.verdict == "fault"] == []
+
+
 def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
     """Some of the catalogue; the long test has them all."""
     checks = judged([mutant.write(tmp_path) for mutant in FAST])
@@ -55,6 +79,42 @@ def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):
         mutant.name for mutant in FAST if not said_first(mutant, checks[tmp_path / mutant.name])
     ] == []
     assert spread([checks[tmp_path / mutant.name] for mutant in FAST if not mutant.second]) == {}
+
+
+def test_what_is_missing_gives_no_points(tmp_path: Path):
+    """Nor does what is done instead of it: of 20 points, 8 are for task 1, 2 for each of its four
+    quantities, and 7 for the impulse and the new velocities."""
+    expected = {"no_impulse.js": 13.0, "exchanged.js": 13.0, "linear_missing.js": 16.0}
+    paths = [mutant.write(tmp_path) for mutant in MUTANTS if mutant.name in expected]
+
+    assert {
+        one.check.path.name: one.points for one in marks_of(*judged(paths).values())
+    } == expected
+
+
+def test_a_file_with_a_short_reach_is_asked_about_deeper_overlaps(tmp_path: Path):
+    """Sizes taken as diameters cost the detection, and leave no task without a judgement."""
+    (mutant,) = (mutant for mutant in MUTANTS if mutant.name == "diameters.py")
+    (mark,) = marks_of(*judged([mutant.write(tmp_path)]).values())
+
+    assert (mark.points, mark.not_judged) == (18.0, 0.0)
+
+
+def test_a_step_without_a_scene_is_said_not_to_be_judged(tmp_path: Path):
+    """In the same sentence that says that no fault was found."""
+    text = (HERE / "correct" / "plain.js").read_text("utf-8")
+    (tmp_path / "a.js").write_text(text.replace("function initScene", "function start"), "utf-8")
+    (one,) = judged([tmp_path / "a.js"]).values()
+
+    assert one.passed
+    assert "performSimStep was not judged: the file has no function initScene" in one.sentences[0]
+
+
+def test_the_end_of_a_file_is_in_its_last_line(tmp_path: Path):
+    """Where a bracket is missing V8 reads on, beyond the file's text."""
+    (tmp_path / "a.js").write_text("function integrate(sphere, dt) {\n  if (dt) {\n}\n", "utf-8")
+    with pytest.raises(SolverFailed, match="line 3"):
+        SolverProcess(read_solver(tmp_path / "a.js"))
 
 
 def spread(checks: list[FileCheck]) -> dict[str, list[str]]:
@@ -464,8 +524,7 @@ def test_a_worker_answers_in_order_and_reads_back_what_it_was_given():
 
 
 def test_the_step_is_judged_beside_a_wrong_impulse(tmp_path: Path):
-    """The file's own integrate gives what is expected: a ufo that is integrated twice is found, and
-    nothing is said of pairs, which are seen by their velocities."""
+    """By its calls: a ufo that is integrated twice is found, and the pairs are right."""
     text = next(file for file in CORRECT if file.name == "plain.js").read_text()
     path = tmp_path / "Exercise.js"
     for old, new in ((REDUCED, SUM), (ONCE, 2 * ONCE)):
@@ -476,30 +535,8 @@ def test_the_step_is_judged_beside_a_wrong_impulse(tmp_path: Path):
     step = {row.name: row.verdict for row in one.of("loop")}
 
     assert [row.cause for row in one.causes if row.task == "loop"] == [TWICE]
-    assert (step["all spheres"], step["pairs"]) == ("fault", "not asked")
+    assert (step["all spheres"], step["pairs"]) == ("fault", "right")
 
 
 REDUCED, SUM = "(1 / sphereA.mass + 1 / sphereB.mass)", "(sphereA.mass + sphereB.mass)"
 ONCE, TWICE = "  integrate(ufo, dt);\n", "performSimStep integrates the ufo 2 times"
-
-
-def test_what_a_step_shows_is_hidden_by_some_faults_of_its_functions_only():
-    """Wrong numbers of a force or of a collision hide nothing; a sphere that does not move by v dt
-    does, and so does one that collides with distant ones, or a function that fails."""
-    (ball,) = QUESTIONS["coast"].balls
-    moved = ball._replace(x=tuple(x + 0.1 * v for x, v in zip(ball.x, ball.v)))
-    coasting, without_dt = (
-        {"coast": SolverAnswer([[ball._replace(x=x)]])}
-        for x in (moved.x, tuple(x + v for x, v in zip(ball.x, ball.v)))
-    )
-    force, impulse, overlap, fails = (
-        CheckRow(name, task, "", "", "", "fault", "any")
-        for name, task in (
-            *(("velocity", "1"), ("impulse", "2c"), ("overlap", "2a"), ("implemented", "2c")),
-        )
-    )
-
-    assert not hide_the_step([force, impulse], coasting)
-    assert hide_the_step([force], without_dt)
-    assert hide_the_step([overlap], coasting)
-    assert hide_the_step([fails], coasting)

@@ -453,3 +453,21 @@ def test_an_unknown_fault_follows_from_nothing_that_is_right():
 
     assert with_consequences(rows) == rows
     assert [row.verdict for row in with_consequences(pushed)] == ["fault", "follows", "follows"]
+
+
+LINES = {  # mutant -> the beginning of the line with its mistake
+    "mass_squared.js": "var m2",
+    "speed_not_normal.js": "var vn",
+    "velocities_returned.js": "return [",
+    "mean_with_last.js": "lastJ = J",
+    "a_stopped_first.js": "sphereA.velocity.x = sphereA.velocity.y = 0",
+}
+
+
+def test_the_line_of_a_local_variable_is_among_those_of_its_fault(tmp_path: Path):
+    """A mistake may be in a line that reads and writes no sphere."""
+    paths = [mutant.write(tmp_path) for mutant in MUTANTS if mutant.name in LINES]
+    lines = {p.name: [text for _, text in begin_with(c).lines] for p, c in judged(paths).items()}
+
+    assert set(lines) == set(LINES)
+    assert all(any(line.startswith(LINES[name]) for line in lines[name]) for name in LINES), lines

@@ -192,7 +192,7 @@ CALLS = {
     ),
     "frozen.js": (
         within(JS, "integrate", "Object.freeze(sphere.velocity);"),
-        "velocity: it is never changed",
+        "velocity: the velocity is never changed",
     ),
     "awaits.js": (
         JS.replace(
