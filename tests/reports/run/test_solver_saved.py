@@ -26,6 +26,7 @@ from reports.run.cells import Cell
 from reports.run.playing import play_here
 from reports.run.trajectories import load_trajectory
 from scenarios.catalogue import scenario
+from tests.reports.check.marked import marks_of
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
@@ -232,7 +233,8 @@ def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
     digest = read_solver(path).digest
     check = check_file(path)
     path.unlink()
-    make_page(tmp_path / "check.html", check, scenes_of(check))
+    (marked,) = marks_of(check)
+    make_page(tmp_path / "check.html", replace(marked, scenes=scenes_of(check)))
     page = (tmp_path / "check.html").read_text()
 
     assert check.faults
