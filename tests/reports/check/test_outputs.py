@@ -53,15 +53,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-# A process of its own loads for seconds what this one has; that it ends the same is for the gate.
-@pytest.fixture(scope="module", params=[crosscheck, pytest.param(process, marks=pytest.mark.slow)])
-def checked(
-    request: pytest.FixtureRequest, folder: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Any, Any, Path]:
-    """How the command ends for the right file and for the wrong one, and where it was given."""
+@pytest.fixture(scope="module")
+def checked(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any, Path]:
+    """How the command ends, as a process, for the right file and for the wrong one, and where it
+    was given."""
     where = tmp_path_factory.mktemp("here")
     right, wrong = (
-        request.param("check", folder / who / "Exercise.js", cwd=where) for who in ("anna", "ben")
+        process("check", folder / who / "Exercise.js", cwd=where) for who in ("anna", "ben")
     )
     return right, wrong, where
 

@@ -246,8 +246,8 @@ def test_a_solver_that_hangs_keeps_no_other_tab_waiting(
 @pytest.mark.slow  # its check hangs, too, and is waited for
 def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
     """As soon as the patience with it is at its end: exit 0, and nothing but where it was and that
-    it has stopped."""
-    solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
+    it has stopped. It hangs in flight, after its check."""
+    solver(tmp_path, AFTER.format(calls=3000, act=FOREVER))
     words = [CROSSCHECK, "play", "--port", "8300", "--engine", "Exercise.js"]
     with subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
@@ -256,7 +256,7 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
         url = started.stdout.readline().split()[0].rstrip("/")
         with connect(url.replace("http", "ws") + "/fly", origin=url) as tab:  # type: ignore[arg-type]
             tab.recv(timeout=20)
-            for _ in range(2):
+            for _ in range(3):  # 12 frames, 16 steps of 21 disks each
                 tab.send('{"do": "frames", "count": 4}')
             sleep(0.3)
             began = monotonic()
