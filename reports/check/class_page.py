@@ -22,6 +22,7 @@ BINS = 10  # bars of the distribution, each a tenth of the points
 
 
 NOTHING = "No file that can be checked."
+UNJUDGED = "nothing judged"
 PLACE = re.compile(r" \(line \d+, column \d+\)")
 
 
@@ -64,12 +65,16 @@ def shared_ids(marked: Sequence[Marked]) -> list[str]:
 
 
 def distribution(marked: Sequence[Marked]) -> dict[str, int]:
-    """The number of students in each tenth of the possible points; the last bar includes full
-    marks."""
+    """The number of submissions in each tenth of the possible points, the last bar with full marks;
+    before them, if there are any, those of which nothing could be judged."""
     most = marked[0].most
-    tenths = Counter(min(int(one.points / most * BINS), BINS - 1) for one in marked)
+    judged = [one for one in marked if one.not_judged < most]
+    tenths = Counter(min(int(one.points / most * BINS), BINS - 1) for one in judged)
     names = [f"{number(most * k / BINS)} to {number(most * (k + 1) / BINS)}" for k in range(BINS)]
-    return {name: tenths[k] for k, name in enumerate(names)}
+    without = len(marked) - len(judged)
+    return ({UNJUDGED: without} if without else {}) | {
+        name: tenths[k] for k, name in enumerate(names)
+    }
 
 
 def causes(marked: Sequence[Marked]) -> dict[str, int]:

@@ -136,6 +136,8 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
         console.print()
         headings, *rows = rows_of_collisions(record, every)
         print_table(console, headings, rows, left=HEADINGS[2:4])
+        if len({*record.events[:, 0]}) < len(record.events):
+            console.print("Collisions at one instant are listed by disk, not in their order.")
     for title, texts in outcomes_in_words(record).items():
         console.print()
         print_texts(console, texts, title)

@@ -39,7 +39,9 @@ class Axis {
     const first = Math.ceil(this.low / step - 1e-9) * step;
     const found = [];
     for (let v = first; v <= this.high + 1e-9 * span; v += step) if (v >= this.low + this.foot && !(this.foot && 10 ** v <= EMPTY)) found.push(Math.abs(v) < 1e-9 * step ? 0 : v);
-    const numbers = this.log && found.length < 2 ? this.withinADecade() : found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v)]);
+    // enough digits to tell two neighbours apart
+    const digits = Math.max(3, Math.ceil(Math.log10(Math.max(...found.map(Math.abs), step) / step)) + 1);
+    const numbers = this.log && found.length < 2 ? this.withinADecade() : found.map((v) => this.log ? [10 ** v, power(v)] : [v, short(v, digits)]);
     return this.foot ? [[0, "0"], ...numbers] : numbers;
   }
 
@@ -59,7 +61,7 @@ function niceStep(wanted) {
 }
 
 const power = (v) => v >= -3 && v <= 3 ? short(10 ** v) : `10${String(Math.round(v)).replace(/[-\d]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)])}`;
-const short = (v) => (v !== 0 && (Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5) ? v.toExponential(1) : String(Number(v.toPrecision(3)))).replace("-", "−");
+const short = (v, digits = 3) => (v !== 0 && (Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5) ? v.toExponential(1) : String(Number(v.toPrecision(digits)))).replace("-", "−");
 
 function drawChart(chart) {
   const figure = document.createElement("figure");

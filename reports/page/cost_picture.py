@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -27,7 +28,7 @@ def picture(table: pd.DataFrame, axis: str) -> Figure:
     drawn = table[table.cost.notna() & np.isfinite(table.error)]
     costs, errors = (drawn[column].to_numpy(float) for column in ("cost", "error"))
     x_axis: dict[str, Any] = {"title": axis} | decades(np.append(costs, 1.0))
-    x_axis["range"] = cost_range(np.append(costs, bare(drawn)))
+    x_axis = with_two_ticks(x_axis | {"range": cost_range(np.append(costs, bare(drawn)))})
     broken, floor = (
         broken_axis(errors, FINEST) if (errors >= FINEST).any() else (decades(errors), 0)
     )
@@ -52,6 +53,17 @@ def cost_range(costs: Array) -> list[float]:
     if not len(costs):
         return [0.0, 1.0]
     return [float(np.log10(costs.min())) - 0.25, float(np.log10(costs.max())) + 0.35]
+
+
+def with_two_ticks(axis: dict[str, Any]) -> dict[str, Any]:
+    """A log axis with ticks at 1, 2 and 5 times powers of ten, if its range has fewer than two of
+    its own."""
+    low, high = axis["range"]
+    if sum(low <= np.log10(tick) <= high for tick in axis["tickvals"]) >= 2:
+        return axis
+    every = [k * 10.0**n for n in range(math.floor(low), math.ceil(high) + 1) for k in (1, 2, 5)]
+    ticks = [tick for tick in every if low <= np.log10(tick) <= high]
+    return axis | {"tickvals": ticks, "ticktext": [style.number(tick) for tick in ticks]}
 
 
 def room_above(axis: dict[str, Any]) -> float:

@@ -187,7 +187,7 @@ def closest(off: pd.DataFrame) -> str:
 def worth_of_settings(off: pd.DataFrame) -> str:
     """How much matched settings reduce the deviation of an engine."""
     if off.empty:
-        return "Without an exact answer the effect of settings is not known."
+        return "No scene is scored, so this run does not show the effect of settings."
     moved = {}  # engine -> the number of scenes in which it gets closer, and farther
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"
@@ -243,9 +243,11 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
         return f"More than one radius off, or without a result: {who}; {cells}"
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
+    least = off.min(axis=1).where(defeated == defeated.max())  # of the best engine there
+    hardest = least.replace(np.inf, np.finfo(float).max).idxmax()
     return (
         f"More than one radius off, or without a result: {who} of {len(off)} scenes. In the hardest"
-        f" scene, {defeated.idxmax()}, {defeated.max()} of {counted(lost.shape[1], 'engine')} fail;"
+        f" scene, {hardest}, {defeated.max()} of {counted(lost.shape[1], 'engine')} fail;"
         f" {cells}"
     )
 

@@ -11,6 +11,7 @@ from reports.compare.comparison import Comparison
 from reports.compare.fast_disks import can_pass
 from reports.page import cost_points, error_cost, pooled, situations
 from reports.page.charts import Drawing, packed_charts
+from reports.page.overview import names_of
 from reports.page.own_solvers import Said
 from reports.page.style import number
 
@@ -42,6 +43,7 @@ class FirstScreen:
         no_times: why no times are shown, or "".
         timed: the scenes that were timed, if times are shown.
         answers: the engines ranked, a row for each situation.
+        libraries: whether there are libraries among them, which are then ranked alone.
         fast: the scenes in which a disk can pass through another, or a wall, in a coarsest step.
         flukes: (scene, engine) of `pooled.flukes`.
         early: scene -> up to when its exact answer goes, where that is before its end.
@@ -66,6 +68,7 @@ class FirstScreen:
     no_times: str
     timed: Sequence[str]
     answers: Sequence[situations.Recommendation]
+    libraries: bool
     fast: Sequence[str]
     flukes: Sequence[tuple[str, str]]
     early: Mapping[str, str]
@@ -109,6 +112,7 @@ def first_screen(
         no_times=clock.fault,
         timed=[] if clock.fault else list(dict.fromkeys(clock.table.scenario)),
         answers=answers,
+        libraries=situations.ENGINE in situations.grouped(names_of(comparisons)),
         fast=[each.scenario.name for each in comparisons if can_pass(each)],
         flukes=pooled.flukes(scores[~scores.name.isin(untrusted)]),
         early=early_ends(comparisons),

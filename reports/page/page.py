@@ -46,7 +46,7 @@ def write_page(
         untrusted: the engines that are not scored, as they break the protocol.
         conformance: a row for each question of a probe.
         known_answers: a row for each reproduced published number.
-        about: command, seed, machine, versions, started, seconds.
+        about: command, seed, machine, versions, started, seconds, and why it is unfinished, or "".
         lessons: name -> an object with its number, title and question.
         clock: the times of the run.
         said: a solver's file -> what `crosscheck check` says of it.

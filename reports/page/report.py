@@ -18,6 +18,7 @@ from reports.run.archive import Archive
 from reports.run.made import writing
 from reports.run.tables import TABLES, comparisons_of, make_tables
 from reports.run.timing_pass import noise_floor
+from reports.terminal.counts import counted
 
 PAGE = "report.html"
 
@@ -108,7 +109,7 @@ def made_report(
         untrusted=untrusted,
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
-        about=header | {"seconds": archive.seconds},
+        about=header | {"seconds": archive.seconds, "unfinished": unfinished(archive)},
         clock=RunTimes(tables.timed, noise_floor(archive), header["timings"]),
         lessons=lessons,
         said={name: with_lines(one["says"], one.get("shown", [])) for name, one in checks.items()},
@@ -116,6 +117,13 @@ def made_report(
     )
     says = {name: one["says"] for name, one in checks.items()}
     return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, says)
+
+
+def unfinished(archive: Archive) -> str:
+    """A sentence for the page of a run that has not ended; "" for one that has."""
+    if archive.complete:
+        return ""
+    return f"The run was stopped after {counted(len(archive.records), 'cell')}."
 
 
 def how_broken(row: Mapping[str, Any]) -> str:

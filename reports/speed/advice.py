@@ -44,6 +44,7 @@ ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
 # `FEW`, as a step with them costs no less
 MOST_WORK, FEW = 1_000_000, 10
 TOO_FAR_OFF, SAVES_TIME, NEARER, NO_GAIN = "too far off", "saves time", "more accurate", "no gain"
+NOT_COMPARED = "times not compared"
 ONLY_HERE = "only at this dt"
 # Times are not compared if the noise, or the number of cores kept busy by others, is above these.
 # An option is timed in separate runs, so that less than a tenth cannot be resolved on a quiet
@@ -104,7 +105,7 @@ class ChangedOption(NamedTuple):
 
     def verdict(self, bound: float, floor: float) -> str:
         """The effect of the change: on the error, or else on the cost, if the cost changes by more
-        than the fraction `floor`.
+        than the fraction `floor`; inf where costs cannot be compared.
 
         The error of a single step size depends on where in a step each collision falls: it counts
         as smaller only if it is smaller at the neighbouring step sizes, too.
@@ -115,7 +116,7 @@ class ChangedOption(NamedTuple):
         if ratio < 1 - floor:
             return SAVES_TIME
         if self.changed.error > HALF * self.plain.error:
-            return NO_GAIN
+            return NO_GAIN if isfinite(floor) else NOT_COMPARED
         return NEARER if all(new <= HALF * old for old, new in self.nearby) else ONLY_HERE
 
 

@@ -75,7 +75,8 @@ def lies_on(engine: str, own: bool, bound: float, unit: str = "") -> Claim:
     own: whether it is set as the engine is; bound: what the rounding of both may add up to.
     """
     if own:
-        within = f"within {number(bound, 2)} {unit}".strip() if bound else "to the last digit"
+        rounding = f"up to rounding, which is at most {number(bound, 2)} {unit}".rstrip()
+        within = rounding if bound else "to the last digit"
         return Claim(
             f"With this setting the ablated reference lies on {engine}, {within}.",
             lambda shown: shown.gap(ABLATED, engine) <= bound,

@@ -34,6 +34,7 @@ def test_each_cause_counts_a_student_once_and_each_student_has_one_bar():
     }
     assert sum(distribution(students()).values()) == len(students())
     assert distribution([marked()])["18 to 20"] == 1
+    assert "nothing judged" not in distribution([marked()])
     assert causes(students())[NOTHING] == 1
     throws = row("1", "implemented", "fault", "x is not defined (line 6, column 7)")
     assert list(causes([marked(throws)])) == ["Task 1 integrate: x is not defined."]

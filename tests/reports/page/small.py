@@ -64,6 +64,7 @@ def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
         "seed": 0,
         "machine": {"system": HOSTILE},
         "seconds": 1.0,
+        "unfinished": "",
     }
     about |= {
         "versions": {"pymunk": "7.3.1"},

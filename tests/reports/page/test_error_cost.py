@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from reports.compare.comparison import Comparison
+from reports.page.cost_picture import with_two_ticks
 from reports.page.cost_points import RunTimes
 from reports.page.cost_sentences import surely_less
 from reports.page.error_cost import ErrorCost, error_cost
@@ -151,6 +152,16 @@ def test_what_no_step_reaches_and_what_failed_are_drawn_as_such():
     assert dotted == [STUCK]
     assert lost == [NEAR]
     assert figure["layout"]["yaxis"]["ticktext"][-1] == "failed"
+
+
+def test_an_axis_has_two_numbers_however_short_it_is():
+    """Between 11 and 90 there is no power of ten but 10 below it; a long axis is left as it is."""
+    powers = {"tickvals": [10.0, 100.0], "ticktext": ["10", "100"]}
+    short = with_two_ticks(powers | {"range": [1.05, 1.95]})
+    long = powers | {"range": [0.9, 2.1]}
+
+    assert (short["tickvals"], short["ticktext"]) == ([20.0, 50.0], ["20", "50"])
+    assert with_two_ticks(long) == long
 
 
 def test_the_light_mark_is_the_cost_without_the_binding():

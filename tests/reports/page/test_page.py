@@ -325,6 +325,7 @@ def test_a_page_of_nothing_can_be_written(tmp_path: Path) -> None:
         "versions": {},
         "started": "",
         "seconds": 0,
+        "unfinished": "",
     }
     nothing = pd.DataFrame()
     write_page(

@@ -329,6 +329,15 @@ def test_one_scene_is_described_without_counts_of_scenes():
     )
 
 
+def test_of_scenes_in_which_as_many_engines_fail_the_hardest_is_that_of_the_largest_error():
+    """Of the engine that is nearest there; a scene without any result is harder still."""
+    both = pd.DataFrame({"a:b": [2.0, 3.0], "c:d": [9.0, 4.0]}, index=["one", "two"])
+
+    assert "In the hardest scene, two, 2 of 2" in findings.where_it_fails(both, ["ok"])
+    both.loc["one"] = np.inf
+    assert "In the hardest scene, one, 2 of 2" in findings.where_it_fails(both, ["ok"])
+
+
 def test_findings_and_summary_have_one_median(comparisons: list[Comparison]):
     """Of every engine, one without any result included: it is infinitely far off in both."""
     names = overview.names_of(comparisons)

@@ -38,12 +38,15 @@ def test_resume_plays_what_a_torn_journal_does_not_have_and_nothing_else(
 def test_an_interrupted_run_can_be_reported_and_says_it_is_not_finished(
     small: Path, tmp_path: Path
 ):
-    """Tables and page from what there is; the terminal says how many cells have ended."""
+    """Tables and page from what there is; terminal and page say how many cells have ended. The page
+    of the whole run says nothing of it."""
     part = broken_off(small, tmp_path / "out", after=15)
     done = crosscheck("report", "out", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert "Not finished: 11 cells ended so far" in done.stdout
+    assert "The run was stopped after 11 cells." in (part / "report.html").read_text()
+    assert "The run was stopped" not in (small / "report.html").read_text()
     assert len(pd.read_csv(part / "runs.csv")) == 11
 
 

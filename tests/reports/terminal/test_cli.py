@@ -177,6 +177,9 @@ def test_truth_prints_the_exact_answer(tmp_path: Path):
     for word in ("closed form", "horizon", "error bound", "258 more: --events"):
         assert word in reported
     assert len(listed.splitlines()) > 272
+    assert "listed by disk, not in their order" not in listed
+    row = crosscheck("truth", "cradle_touching", cwd=tmp_path).stdout
+    assert "Collisions at one instant are listed by disk, not in their order." in row
     answer = json.loads(crosscheck("truth", "asteroids", "--json", cwd=tmp_path).stdout)
     assert answer["method"] in ("certified", "two-precision")
     assert (answer["horizon_s"], answer["reason"], len(answer["collisions"])) == (10.0, "", 20)
