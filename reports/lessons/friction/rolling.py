@@ -97,10 +97,14 @@ def sliding(spin: float, friction: float) -> Legs:
 
 
 def facts(played: Simulation) -> list[tuple[str, str]]:
-    """The motion of each engine's disk at the end."""
+    """The motion of each engine's disk at the end, and how deep it was in the floor."""
     motions = {run.name: run.trajectory for run in played.runs} | {"exact answer": played.truth}
     return [
-        (name, f"in the end {tidy(each.velocity[-1, 0, 0])} m/s, slip {tidy(slip(each)[-1])} m/s")
+        (
+            name,
+            f"in the end {tidy(each.velocity[-1, 0, 0])} m/s, slip {tidy(slip(each)[-1])} m/s;"
+            f" in the floor by at most {tidy(max(1e3 * deepest(each), 0.0))} mm",
+        )
         for name, each in motions.items()
         if each is not None
     ]
@@ -265,8 +269,8 @@ def slip_claims(spin: float, mu: float, k: int) -> list[Claim]:
             f"In {BOX2D_V3} the disk sinks into the floor, here by up to {number(1e3 * depth)} mm:"
             " the point that touches turns with the disk within a step, and Box2D takes the rise of"
             " that point for a gap. The faster the spin and the longer the step, the deeper. The"
-            " ablated reference sinks as deep and ends within 4 mm/s of its velocity. Without this"
-            " mechanism it sinks by less than 0.1 mm.",
+            " ablated reference, which is not drawn here, sinks as deep and ends within 4 mm/s of"
+            " its velocity. Without this mechanism it sinks by less than 0.1 mm.",
             lambda shown: (
                 abs(deepest(played(shown, BOX2D_V3)) - depth) <= 2e-6 + 2e-3 * depth
                 and level < min(depth, 1e-4)
