@@ -8,7 +8,8 @@ from dataclasses import replace
 
 from reports.check.functions import keeps_state
 from reports.check.impacts import ABSOLUTE_NORMAL
-from reports.check.impulse import UNALIKE
+from reports.check.impulse import ONLY, UNALIKE
+from reports.check.projection import WITHOUT_IMPULSE
 from reports.check.rows import FOLLOWS, TASKS, UNKNOWN, CheckRow
 
 # The causes that different tasks report for one mistake in the distance or the normal.
@@ -54,7 +55,7 @@ SAME_MISTAKE = (
     },
 )
 # causes of wrong velocities that no known formula gives
-NOT_EXPLAINED = (UNKNOWN, "unknown: ", "the restitution depends", "the file has e = ")
+NOT_EXPLAINED = (UNKNOWN, "unknown: ", ONLY, "the restitution depends", "the file has e = ")
 
 
 def with_consequences(rows: Sequence[CheckRow]) -> list[CheckRow]:
@@ -66,6 +67,8 @@ def with_consequences(rows: Sequence[CheckRow]) -> list[CheckRow]:
                 first.setdefault(cause, row.task)
         if (row.name, row.verdict) == ("impulse", "fault"):
             first[IMPULSE] = row.task
+        if row.verdict == "fault" and row.cause.startswith(ONLY):
+            first[ONE_VELOCITY] = row.task
     spoilt = spoilers(rows)
     return [followed(row, first, spoilt) if row.verdict == "fault" else row for row in rows]
 
@@ -79,6 +82,9 @@ def followed(row: CheckRow, first: dict[str, str], spoilt: dict[str, str]) -> Ch
         return replace(row, verdict="follows")
     if (task := first.get(row.cause, row.task)) != row.task:
         return replace(row, verdict="follows", cause=f"it follows from the fault in {task}")
+    if row.cause == WITHOUT_IMPULSE and ONE_VELOCITY in first:
+        why = "it follows from the fault in the velocity of one sphere"
+        return replace(row, verdict="follows", cause=why)
     unexplained = row.cause.startswith(NOT_EXPLAINED)
     if row.task in spoilt and (unexplained or (row.cause, spoilt[row.task]) in FROM_KEPT):
         return replace(row, verdict="follows", cause=spoilt[row.task])
@@ -93,7 +99,9 @@ def followed(row: CheckRow, first: dict[str, str], spoilt: dict[str, str]) -> Ch
 KEPT = "it may follow from the value that is kept from one call to the next"
 # in a fresh world the mean of J and the J before it, which is 0, and the sum of the two
 FROM_KEPT = {(cause, KEPT) for cause in ("the impulse is halved", "the impulse is counted twice")}
-IMPULSE = "the impulse is wrong"  # a key of `first`, which is no cause
+# keys of `first` that are no causes
+IMPULSE = "the impulse is wrong"
+ONE_VELOCITY = "the velocity of one sphere is wrong"
 
 
 def spoilers(rows: Iterable[CheckRow]) -> dict[str, str]:

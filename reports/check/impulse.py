@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -105,16 +106,17 @@ def impulse_rows(
     restitution: Restitution,
     found: CollisionExplanation | None,
     computed: bool,
+    written: bool,
 ) -> list[CheckRow]:
     """The rows of (c) and (d); `computed`: whether the function reads velocities to compute
-    something from them."""
+    something from them; `written`: whether it writes velocities."""
     if not finite(answers, "v"):
         return [*no_number(answers, restitution.own), quantities_kept(answers)]
     case, rest = case_to_show(answers, restitution, found), quantities_kept(answers)
     if found and not found.impulse and found.update in WITHOUT_J:
         why = "there is no impulse by which the velocities could be judged"
         return [no_impulse(f"no impulse is computed: {found.update}"), *unseen("2d", why), rest]
-    if (idle := without_effect(answers, found)) and rest.verdict != "fault":
+    if (idle := without_effect(answers, found, written)) and rest.verdict != "fault":
         none = no_impulse("not implemented, or never reached: no velocity is read")
         unknown = unseen("2c", "the velocities after the call do not depend on the impulse")
         return [*(unknown if computed else [none]), no_velocities(idle), rest]
@@ -141,17 +143,21 @@ def impulse_rows(
     ]
 
 
-def without_effect(answers: dict[str, SolverAnswer], found: CollisionExplanation | None) -> str:
-    """Why no impulse shows in the velocities after a collision; "" if one does."""
+def without_effect(
+    answers: dict[str, SolverAnswer], found: CollisionExplanation | None, written: bool
+) -> str:
+    """Why no impulse shows in the velocities after a collision; "" if one does. `written`: whether
+    the function writes velocities."""
     if found is None or {found.impulse, found.update}.isdisjoint({NEVER, ZEROED}):
         return ""
     if found.update == ZEROED:
         return ZEROED
     if any(answers[name].returned for name in COLLISIONS):
         return RETURNED
-    return NEVER
+    return UNCHANGED if written else NEVER
 
 
+UNCHANGED = "the velocities never change: the function writes the velocities, but unchanged"
 RETURNED = (
     "the velocities never change: sphereSphereCollisionHandling returns something new; it must"
     " change the spheres it is given"
@@ -217,6 +223,8 @@ def case_to_show(
     for_one = right_for_one(answers, e)
     if found:
         impulse, update = found.impulse, found.update if found.task == "2d" else ""
+    elif only := only_wrong(answers, e):
+        impulse, update = "", only
     else:
         known = partly(answers, e)
         impulse, update = ("", known) if for_one else (known, "")
@@ -230,6 +238,36 @@ def case_to_show(
         opposite_impulses(answers),
         for_one,
     )
+
+
+def only_wrong(answers: dict[str, SolverAnswer], e: float) -> str:
+    """The cause that in all collisions no velocity is wrong but that of one sphere, or one
+    component of it; "" if more are wrong, or none."""
+    wrong = wrong_components(answers, e)
+    if len({who for who, _ in wrong}) != 1:
+        return ""
+    (who, axis), *more = sorted(wrong)
+    name = "AB"[who] + ("" if more else f".{'xy'[axis]}")
+    return f"{ONLY}{name} is wrong: no known mistake gives its numbers"
+
+
+ONLY = "only v"  # how these causes begin
+
+
+def wrong_components(answers: dict[str, SolverAnswer], e: float) -> set[tuple[int, int]]:
+    """The components of velocities, (0: A, 1: B; 0: x, 1: y), that differ from the formula in a
+    collision, with A and B in the order of the call."""
+    wrong = set()
+    for name in (*COLLISIONS, *SWAPPED):
+        pair, changed = in_call(answers[name])
+        wrong |= differing(pair, changed, IMPULSES[""](pair, e), e)
+    return wrong
+
+
+def differing(pair: PairCollision, changed: Array, P: Array, e: float) -> set[tuple[int, int]]:
+    """The components of the changes of both velocities that differ from those by the impulse P."""
+    right = UPDATES[""].change(pair, P, e)
+    return {k for k in product((0, 1), (0, 1)) if not near(changed[k], right[k[0]][k[1]])}
 
 
 def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
@@ -456,6 +494,10 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
         return chosen("that of the formula", AS_PRINTED)
     got = "A is changed by {} m/s, B by {} m/s".format(*map(shown, seen[0][1]))
     cause = found.mistake if found else ""
+    if case.update.startswith(ONLY):
+        wrong = wrong_components(answers, e)
+        alike = all(differing(h, changed, law(h, e), e) <= wrong for h, changed in seen)
+        cause = case.update if alike else ""
     if all(near(change(h, -law(h, e), e), changed, 0.1) for h, changed in seen):
         cause = ABSOLUTE
     task = "2d" if case.right_c and not case.right_d else "2c"

@@ -7,7 +7,15 @@ from collections.abc import Sequence
 
 from adapters.own_solver.process import SolverProcess
 from adapters.own_solver.restitution import code_of
-from reports.check.accesses import LOOPS, Access, accesses_of, is_write, part_of, repeated
+from reports.check.accesses import (
+    LOOPS,
+    Access,
+    accesses_of,
+    any_write,
+    is_write,
+    part_of,
+    repeated,
+)
 from reports.check.functions import CHANGED, FUNCTIONS
 from reports.check.impacts import APPROACH, AS_IF_EQUAL
 from reports.check.parts import BEFORE
@@ -184,6 +192,10 @@ class Source:
         seen = self.accesses(SHOWN["2"])
         written = {a.line for a in seen if is_write(a, field)}
         return not seen or any(a.field == field and a.line not in written for a in seen)
+
+    def writes(self, field: str) -> bool:
+        """Whether the collision function writes this field, as far as its accesses are known."""
+        return any_write(self.accesses(SHOWN["2"]), field)
 
     @property
     def integrates(self) -> bool:
@@ -393,18 +405,24 @@ class Source:
         if found and name in ("itself", "each pair once"):  # the loop over j stands last
             heads = (k for k in range(found[-1], begin, -1) if HEAD_OF_LOOP.search(code[k - 1]))
             return [next(heads, found[-1]), found[-1]]
+        if found and name in ("all spheres", "pairs"):  # the bounds of a loop may leave some out
+            return [*self.loops_around(found), *found]
         return found or self.heads("performSimStep")
 
     def loops(self) -> list[int]:
         """The lines of performSimStep that collide pairs, and the heads of their loops."""
+        begin = next(iter(self.heads("performSimStep")), 0)
+        return [k for k in self.calls("pairs") if k > begin]
+
+    def loops_around(self, calls: Sequence[int]) -> list[int]:
+        """The nearest head of a loop at or above each of these lines of performSimStep; 0 if there
+        is none."""
         code = code_of(self.text).splitlines()
         begin = next(iter(self.heads("performSimStep")), 0)
-        calls = [k for k in self.calls("pairs") if k > begin]
-        heads = [
+        return [
             next((k for k in range(call, begin, -1) if HEAD_OF_LOOP.search(code[k - 1])), 0)
             for call in calls
         ]
-        return [*heads, *calls]
 
     def heads(self, function: str) -> list[int]:
         """The lines where a function is defined."""

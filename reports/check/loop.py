@@ -4,6 +4,8 @@ give the expected results."""
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -334,18 +336,20 @@ def edges_last(watched: SolverAnswer) -> list[CheckRow]:
 
 def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on pairs: every overlapping pair collides, and no other sphere changes."""
-    silent, others = [], []
+    silent, others, handled = [], [], []
     for name, question in asked.items():
         if not name.startswith("pair"):
             continue
         i, j = map(int, name.split()[1:])
         struck = struck_in(question, answers[name])
         if not met(question, answers[name], i, j):
-            silent.append(name_of(i, j))
-        elif not struck <= {i, j}:
+            silent.append((i, j))
+            continue
+        handled.append((i, j))
+        if not struck <= {i, j}:
             others.append(name_of(min(struck - {i, j})))
     got = (
-        f"no collision of {', '.join(silent)}"
+        f"no collision of {left_out(silent, handled, answers['watched'])}"
         if silent
         else f"a third sphere changes, too: {others[0]}"
         if others
@@ -363,6 +367,22 @@ def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> Check
         not silent and not others,
         cause,
     )
+
+
+def left_out(
+    silent: Sequence[tuple[int, int]], handled: Sequence[tuple[int, int]], watched: SolverAnswer
+) -> str:
+    """The pairs asked that do not collide, in words; with the number of all that are left out, if
+    the step's calls tell it: a step that leaves out pairs far apart calls for none here."""
+    named = ", ".join(name_of(*pair) for pair in silent)
+    calls = collided(watched)
+    if not handled or not all(frozenset(pair) in calls for pair in handled):
+        return named
+    n = len(watched.last)
+    missing = [pair for pair in combinations(range(n), 2) if frozenset(pair) not in calls]
+    if len(missing) <= len(silent):
+        return named
+    return f"{len(missing)} pairs, for example {named}"
 
 
 def met(question: Question, answer: SolverAnswer, i: int, j: int) -> bool:

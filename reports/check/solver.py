@@ -191,7 +191,8 @@ def task_2(
         found = replace(found, impulse=BACKWARDS)
     rows += same_again("sphereSphereCollisionHandling", mine, others, text)
     rows += projection_rows(mine, found)
-    rows += impulse_rows(mine, restitution, found, source.computes_with("velocity"))
+    computed, written = source.computes_with("velocity"), source.writes("velocity")
+    rows += impulse_rows(mine, restitution, found, computed, written)
     if not any((row.name, row.verdict) == ("impulse", "right") for row in rows):
         rows = [unknown_at_touch(row) for row in rows]
     if any(row.name == "rest kept" and row.verdict == "fault" for row in rows):

@@ -15,8 +15,8 @@ from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import SolverFailed, read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.functions import is_read
-from reports.check.loop import loop_rows
-from reports.check.questions import QUESTIONS, Ball, ask
+from reports.check.loop import left_out, loop_rows
+from reports.check.questions import QUESTIONS, Ball, SolverAnswer, ask
 from reports.check.rows import TASKS
 from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
 from reports.check.solver import check_solver
@@ -69,6 +69,19 @@ def test_no_step_is_faulted_for_its_restitution(name: str, approach: str, e: str
 
     assert len(rows) > 5
     assert [row for row in rows if row.verdict == "fault"] == []
+
+
+def test_the_pairs_that_a_step_leaves_out_are_counted_if_its_calls_are_known():
+    """Of a ufo and three asteroids: asteroids 0 and 1, and 1 and 2. A step that gives only near
+    pairs to the collision function calls for none of those that are far apart."""
+    spheres = [[Ball((0.0, 0.0))] * 4]
+    calls = tuple(("collide", *pair) for pair in ((1, 0), (2, 0), (3, 0), (1, 3)))
+    first = "asteroid 0 and asteroid 1"
+    known, unknown = SolverAnswer(spheres, calls=calls), SolverAnswer(spheres)
+
+    assert left_out([(1, 2)], [(0, 1)], known) == f"2 pairs, for example {first}"
+    assert left_out([(1, 2), (2, 3)], [(0, 1)], known) == f"{first}, asteroid 1 and asteroid 2"
+    assert left_out([(1, 2)], [(0, 1)], unknown) == first
 
 
 def test_a_mutant_is_found_with_its_cause_first(tmp_path: Path):

@@ -17,6 +17,7 @@ from reports.check.accesses import Access, accesses_of, part_of
 from reports.check.consequences import with_consequences
 from reports.check.formats.questions_json import SCHEMA, as_json
 from reports.check.lines import Source
+from reports.check.loop import LEAVES_PAIRS_OUT
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
 from reports.check.rows import UNKNOWN, CheckRow
 from reports.check.verdict import FileCheck, check_file
@@ -33,6 +34,7 @@ FAULTY = (
     "two_overlap_and_b_sign.js",
     "impulse_sign.js",
     "size_of_a_twice.js",
+    "added_in_one_component.js",
 )
 COUNTS = {  # keeps a count of its calls, which it also writes into the sphere
     "count.js": "let n = 0;\nfunction integrate(s, dt) { s.alpha = ++n; }\n",
@@ -254,6 +256,16 @@ def test_the_lines_are_those_in_which_the_cause_is(cause: str, task: str, lines:
     assert [line for line, _ in found] == lines
 
 
+def test_pairs_that_are_left_out_show_the_calls_and_the_heads_of_their_loops():
+    """Of performSimStep in plain.js: where a loop begins and ends decides which pairs it has."""
+    solver = read_solver(CORRECT_FILES / "plain.js")
+    row = CheckRow("pairs", "loop", "", "", "", "fault", LEAVES_PAIRS_OUT)
+    with SolverProcess(solver) as process:
+        found = Source(process, solver.text).of(row)
+
+    assert [line for line, _ in found] == [85, 86, 87, 88]
+
+
 PUSH = (
     (
         "function norm",
@@ -320,6 +332,24 @@ def test_the_lines_lead_to_the_mistake(
     for (number, shown), begin in zip(first.lines, lines):
         assert shown.startswith(begin)
         assert text.splitlines()[number - 1].strip() == shown
+
+
+def test_one_wrong_component_is_one_fault_and_costs_one_question(checks: dict[str, FileCheck]):
+    """No known formula gives vA.y: pairs at rest, moving apart or exchanged, and the momentum, show
+    the same mistake. The lines are those that write the velocity of A."""
+    one = checks["added_in_one_component.js"]
+    wrong = {row.name for row in one.rows if row.verdict in ("fault", "follows")}
+    (mark,) = marks_of(one)
+
+    assert {row.cause for row in one.faults} == {
+        "only vA.y is wrong: no known mistake gives its numbers"
+    }
+    assert wrong > {"velocity of A", "momentum", "separating", "A and B exchanged", "at rest"}
+    assert [text for _, text in begin_with(one).lines] == [
+        "sphereA.velocity.x += J / sphereA.mass * nx;",
+        "sphereA.velocity.y += (2 * unA + J / sphereA.mass) * ny;",
+    ]
+    assert (mark.points, mark.not_judged) == (18.5, 0.0)
 
 
 def test_a_size_used_twice_is_one_fault(checks: dict[str, FileCheck]):
