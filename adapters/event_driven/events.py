@@ -324,19 +324,18 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
 def surfaces(walls: Array) -> NDArray[np.int64]:
     """(w,) the number of the surface that each wall belongs to, as in `Walls`; exact, in
     rationals."""
-    number = np.arange(len(walls))
+    number, low, high = np.arange(len(walls)), walls.min(axis=1), walls.max(axis=1)
     for w, one in enumerate(walls):
-        for k in range(w):
+        # most walls lie elsewhere: only the others are compared in rationals
+        near = (low[:w] <= high[w]).all(axis=1) & (low[w] <= high[:w]).all(axis=1)
+        for k in np.flatnonzero(near & (number[:w] != number[w])):
             if number[k] != number[w] and joined(one, walls[k]):
                 number[number == number[w]] = number[k]
     return number
 
 
 def joined(one: Array, other: Array) -> bool:
-    """Whether two walls (2, 2) lie in line and overlap or share an end."""
-    (low, high), (first, last) = np.sort(one, axis=0), np.sort(other, axis=0)
-    if (first > high).any() or (low > last).any():
-        return False
+    """Whether two walls (2, 2), whose extents in x and in y overlap or touch, lie in line."""
     (px, py), (qx, qy), *ends = [[Fraction(x) for x in end.tolist()] for end in (*one, *other)]
     return all((qx - px) * (y - py) == (qy - py) * (x - px) for x, y in ends)
 

@@ -15,7 +15,9 @@ from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Scene, Thrust
 from scenarios.truth.exact import ACCURACY, computed
+from scenarios.truth.oracle import contact_finder
 from scenarios.truth.oracle import resting as oracle_resting
+from scenarios.truth.oracle.contact_finder import collinear, points_in_line
 from scenarios.truth.oracle.numbers import has_balls, mpfr
 from scenarios.truth.record import TruthRecord
 from tests.scenarios.exercise_box import boxed, lasting
@@ -473,3 +475,30 @@ def test_the_bounces_listed_do_not_depend_on_the_unit_of_time():
     ones."""
     slow, fast = (computed(dropped(0.5, 4.0, scale)).events for scale in (1.0, 2.0**-12))
     assert len(fast) >= len(slow) - 2
+
+
+@given(
+    st.lists(st.tuples(*[st.integers(-3, 3)] * 2), min_size=2, max_size=12, unique=True),
+    st.sampled_from([1.0, 1e-9, 0.1, 1e9]),
+)
+def test_float64_excludes_no_point_that_lies_on_the_line_of_a_wall(
+    points: list[tuple[int, int]], scale: float
+):
+    """Many points of a grid lie in line, or miss it by the rounding of a tenth."""
+    at = scale * np.array(points, dtype=float)
+
+    assert points_in_line(at[:2], at) == [k for k in range(len(at)) if collinear(at[:2], at[k])]
+
+
+def test_of_many_walls_few_points_are_compared_exactly(monkeypatch: pytest.MonkeyPatch):
+    """In rationals all of some thousand walls would take minutes."""
+    asked: list[object] = []
+    real = contact_finder.collinear
+    monkeypatch.setattr(
+        contact_finder, "collinear", lambda *pair: bool(asked.append(pair)) or real(*pair)
+    )
+    corners = 10.0 * np.exp(2j * np.pi * np.arange(400) / 400)
+    ends = np.stack([corners.real, corners.imag], axis=-1)
+
+    assert {len(points_in_line(pair, ends)) for pair in zip(ends, np.roll(ends, -1, axis=0))} == {2}
+    assert len(asked) <= 4 * len(ends)

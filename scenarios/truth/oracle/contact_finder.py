@@ -3,7 +3,8 @@ where these do not decide."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from scenarios.truth.oracle.filter import soonest, touching
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact, Touch
 
+# of two equal products: by how much float64 may make them differ, some roundings
+NOT_EXCLUDED = 1e-12
 LATE = 1e-6  # relative; a search goes so far beyond its limit, to find contacts at the limit itself
 
 
@@ -26,21 +29,25 @@ class ContactFinder:
         self.bounds, self.codes = np.empty(most), np.empty(most, np.int64)
         # For each wall the ends of walls on its line: a disk that rests on the wall slides over
         # them, or off them.
-        ends = range(self.scene.n, len(bodies.legs))
-        self.in_line = [
-            {j for j in ends if collinear(wall, bodies.table[j, :2])} for wall in self.scene.walls
-        ]
-        self.surface = [self._surface(w) for w in range(len(self.scene.walls))]
+        n, walls = self.scene.n, self.scene.walls
+        ends = bodies.table[n : len(bodies.legs), :2]
+        self.in_line = [{n + k for k in points_in_line(wall, ends)} for wall in walls]
+        ending_at: dict[tuple[float, ...], set[int]] = defaultdict(set)
+        for w, wall in enumerate(walls.tolist()):
+            for end in wall:
+                ending_at[tuple(end)].add(w)
+        self.surface = [self._surface(w, ending_at) for w in range(len(walls))]
 
-    def _surface(self, w: int) -> list[int]:
+    def _surface(self, w: int, ending_at: Mapping[tuple[float, ...], set[int]]) -> list[int]:
         """The walls that lie in line with wall w and overlap it or share an end with it, directly
-        or through others, with wall w itself: a disk slides over them as over one wall."""
-        walls, ends = self.scene.walls, self.bodies.table[sorted(self.in_line[w]), :2]
-        spans = {
-            k: line_span(walls[w], wall)
-            for k, wall in enumerate(walls)
-            if all((ends == end).all(axis=1).any() for end in wall)
-        }
+        or through others, with wall w itself: a disk slides over them as over one wall.
+
+        ending_at: a point -> the walls that end there.
+        """
+        walls = self.scene.walls
+        points = {tuple(self.bodies.table[j, :2].tolist()) for j in self.in_line[w]}
+        ends = Counter(k for point in points for k in ending_at[point])
+        spans = {k: line_span(walls[w], walls[k]) for k, count in ends.items() if count == 2}
         (low, high), found = spans[w], {w}
         while more := {
             k for k, (a, b) in spans.items() if k not in found and a <= high and b >= low
@@ -293,6 +300,15 @@ def line_span(along: np.ndarray, wall: np.ndarray) -> tuple[float, float]:
     axis = int(np.argmax(np.abs(way)))
     low, high = sorted((np.sign(way[axis]) * wall[:, axis]).tolist())
     return low, high
+
+
+def points_in_line(wall: np.ndarray, points: np.ndarray) -> list[int]:
+    """The points (p, 2) that lie on the line of a wall (2, 2): in rationals, of those that float64
+    does not exclude."""
+    (px, py), (qx, qy) = wall
+    one, other = (qx - px) * (points[:, 1] - py), (qy - py) * (points[:, 0] - px)
+    possible = np.abs(one - other) <= NOT_EXCLUDED * (np.abs(one) + np.abs(other))
+    return [int(k) for k in np.flatnonzero(possible) if collinear(wall, points[k])]
 
 
 def collinear(wall: np.ndarray, point: np.ndarray) -> bool:

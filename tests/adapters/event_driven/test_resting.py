@@ -311,3 +311,16 @@ def test_a_planted_bug_in_rest_is_caught(right, wrong, monkeypatch):
     monkeypatch.setattr(events, "event_loop", plain_kernels(right, wrong))
     with pytest.raises((AssertionError, NoTruth)):
         play_all()
+
+
+def test_of_many_walls_only_neighbours_are_compared_exactly(monkeypatch: pytest.MonkeyPatch):
+    """In rationals all pairs of some thousand walls would take minutes whenever a scene is
+    loaded."""
+    corners = 10.0 * np.exp(2j * np.pi * np.arange(401) / 400)
+    ends = np.stack([corners.real, corners.imag], axis=-1)
+    walls, asked = np.stack([ends[:-1], ends[1:]], axis=1), []
+    real = events.joined
+    monkeypatch.setattr(events, "joined", lambda *pair: bool(asked.append(pair)) or real(*pair))
+
+    assert len({*events.surfaces(walls)}) == len(walls)
+    assert len(walls) <= len(asked) + 1 <= 2 * len(walls)
