@@ -17,13 +17,14 @@ UNHEARD = not_judged("an engine reports no collisions")
 
 def restitution(view: View) -> Value | None:
     """Median e = -(dv after).n / (dv before).n over the collisions that can be read off the
-    samples."""
+    samples; where gravity leaves a range of e, its value nearest to what the scene states."""
     read = view.restitutions
     return _read(float(np.median(read.values)), read) if len(read.values) else _unread(read)
 
 
 def restitution_error(view: View) -> Value | None:
-    """Largest |e - what the scene states| over the collisions that can be read off the samples."""
+    """Largest |e - what the scene states| over the collisions that can be read off the samples,
+    beyond what gravity leaves open."""
     read = view.restitutions
     if not len(read.values):
         return _unread(read)
@@ -88,7 +89,8 @@ def collision_delay_max_dt(view: View) -> Value | None:
 
 
 def _read(value: float, read: Restitutions) -> Value:
-    return Value(value, note=f"{len(read.values)} collisions read{_unread_ones(read)}")
+    spread = f", e known to {read.spread.max():.1g}" if read.spread.any() else ""
+    return Value(value, note=f"{len(read.values)} collisions read{spread}{_unread_ones(read)}")
 
 
 def _unread(read: Restitutions) -> Value | None:

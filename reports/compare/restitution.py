@@ -15,13 +15,16 @@ class Restitutions(NamedTuple):
     """What was read off the samples.
 
     Attributes:
-        values: (m,) e of each collision that was read; `times`: (m,) s, when.
+        values: (m,) e of each collision that was read.
+        spread: (m,) by how much e depends on when in its step the collision was.
+        times: (m,) s, the end of that step.
         below: how many were below the floor.
         unfinished: how many did not end before the next collision of a disk, or before the end of
             the run.
     """
 
     values: Array
+    spread: Array
     times: Array
     below: int
     unfinished: int
@@ -35,7 +38,7 @@ FLOOR = 100
 
 
 def effective_restitution(
-    trajectory: Trajectory, scene: Scene, slowest: float, rounding: float
+    trajectory: Trajectory, scene: Scene, dt: float, slowest: float, rounding: float
 ) -> Restitutions:
     """Restitution of each collision that can be read off the samples.
 
@@ -44,6 +47,11 @@ def effective_restitution(
     e = -(dv'.n) / (dv.n). Two disks must also change their momenta by opposite amounts, and a disk
     at a wall must change its momentum along the wall's normal: else the engine did not report
     another collision. Collisions closing slower than `slowest` m/s are left out.
+
+    The time of a collision is known to one step of `dt` s. In this time gravity changes the closing
+    speed v by g dt and the separating speed by as much, so that e is known to (1 + e) g dt / v
+    only. Of these values the one nearest to what the scene states is taken: an engine that is exact
+    reads as exact, whenever in a step its disk meets the floor.
 
     An engine with soft contacts takes several steps for a collision: it is read at the first sample
     at which the two no longer approach. If the bodies still approach after the impulse, they pass
@@ -71,17 +79,21 @@ def effective_restitution(
     over = after < len(t)
     read, after = read.of(over), after[over]
     turned = np.abs(spin[after] - spin[read.k]) * scene.radius
-    closing, separating = speeds_along_normal(
+    closing, separating, gained = speeds_along_normal(
         velocities(trajectory, scene, read, read.k),
         velocities(trajectory, scene, read, after),
         scene,
         read,
         turned,
     )
-    fast = closing > slowest * (after - read.k)
+    gained *= dt
+    fast = closing > np.maximum(slowest * (after - read.k), gained)
     late = (closing > slowest) & ~fast
+    closing, separating, gained = closing[fast], separating[fast], gained[fast]
+    ends = np.stack([separating / closing, (separating + gained) / (closing - gained)])
     return Restitutions(
-        values=separating[fast] / closing[fast],
+        values=np.clip(scene.restitution, ends.min(axis=0), ends.max(axis=0)),
+        spread=np.ptp(ends, axis=0),
         times=read.when[fast],
         below=int(noise.sum()),
         unfinished=int((~over).sum() + late.sum()),
@@ -169,11 +181,16 @@ def velocities(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray
     """(m, 2, 2) m/s of both sides of each pair, carried by gravity from sample k, (m,), to the time
     of their collision; 0 for a wall."""
     disks = np.stack([pairs.i, pairs.other], axis=1)
-    falling = np.where(scene.static[disks, None], 0.0, scene.gravity)
     v: Array = trajectory.velocity[k[:, None], disks]
-    v = v + falling * (pairs.when - trajectory.t[k])[:, None, None]
     v[pairs.j < 0, 1] = 0.0
-    return v
+    carried: Array = v + falling(scene, pairs) * (pairs.when - trajectory.t[k])[:, None, None]
+    return carried
+
+
+def falling(scene: Scene, pairs: Pairs) -> Array:
+    """(m, 2, 2) m/s2, the acceleration by gravity of both sides of each pair."""
+    moving = np.stack([~scene.static[pairs.i], second_moves(scene, pairs)], axis=1)
+    return np.where(moving[..., None], scene.gravity, 0.0)
 
 
 def is_rounding(trajectory: Trajectory, scene: Scene, read: Pairs, rounding: float) -> np.ndarray:
@@ -197,12 +214,12 @@ def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
 
 def speeds_along_normal(
     earlier: Array, later: Array, scene: Scene, pairs: Pairs, turned: Array
-) -> tuple[Array, Array]:
-    """(m,) m/s, closing speed before and separating speed after each collision; `turned` (m, n) m/s
-    by friction.
+) -> tuple[Array, Array, Array]:
+    """(m,) m/s, closing speed before and separating speed after each collision, and m/s2, what
+    gravity adds to the first and takes from the second; `turned` (m, n) m/s by friction.
 
     The normal is the direction of the change of their relative velocity, whichever of the two is
-    named first. Both are nan if the change is not that of one frictionless collision.
+    named first. The speeds are nan if the change is not that of one frictionless collision.
     """
     number, both, wall = np.arange(len(pairs.k)), second_moves(scene, pairs), pairs.j < 0
     change = later - earlier
@@ -223,4 +240,6 @@ def speeds_along_normal(
         sign * np.vecdot(v[:, 0] - v[:, 1], normal) for sign, v in ((-1, earlier), (1, later))
     )
     strange = unreported | slid
-    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating)
+    fall = falling(scene, pairs)
+    gained = -np.vecdot(fall[:, 0] - fall[:, 1], normal)
+    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating), gained

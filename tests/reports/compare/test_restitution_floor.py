@@ -42,7 +42,7 @@ def test_the_floor_is_the_rounding_of_the_velocities(rounding: float, speed: flo
     is."""
     floor = FLOOR * rounding * 2 * speed  # before and after
     for factor, counts in ((10, (1, 0)), (0.1, (0, 1))):
-        found = effective_restitution(*sliding(factor * floor, speed), 0.0, rounding)
+        found = effective_restitution(*sliding(factor * floor, speed), 1.0, 0.0, rounding)
 
         assert (len(found.values), found.below) == counts
         # The normal is that of the change, with a sliver of the rounding of nothing else: e as it
@@ -65,7 +65,7 @@ def test_a_heavy_disk_that_hardly_notices_is_read():
     played = Trajectory(
         t, np.zeros((4, 2, 2)), velocity, still, still, Collisions.of([(1.5, 0, 1, 2.0)])
     )
-    found = effective_restitution(played, scene, 0.0, FLOAT32)
+    found = effective_restitution(played, scene, 1.0, 0.0, FLOAT32)
 
     assert found.below == 0
     # 2e-7, by which the heavy one is faster than at rest

@@ -47,7 +47,7 @@ def met(
     )
     collisions = Collisions.of([(2 * STEP, 0, 1, 1.0), *((*other, 1.0) for other in others)])
     return effective_restitution(
-        Trajectory(t, position, velocity, still, still, collisions), scene, 0.0, FLOAT64
+        Trajectory(t, position, velocity, still, still, collisions), scene, STEP, 0.0, FLOAT64
     )
 
 
@@ -80,7 +80,7 @@ def test_a_law_that_lets_two_pass_more_slowly_is_read_with_a_negative_e():
 
 def test_a_collision_that_is_cut_off_is_counted_and_not_read():
     """By the end of the run, or by another collision of one of the two."""
-    assert met(-0.6, -0.1)[2:] == (0, 1)
+    assert met(-0.6, -0.1)[3:] == (0, 1)
     assert len(met(-0.6, -0.1).values) == 0
     other = met(-0.6, -0.1, 0.5, 0.8, others=((4 * STEP, 1, -1),))
     assert (len(other.values), other.unfinished) == (0, 1)
