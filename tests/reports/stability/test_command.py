@@ -178,7 +178,7 @@ def test_bad_input_is_one_clear_sentence(words: list[str], says: str):
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-@pytest.fixture(params=[1280, 400])
+@pytest.fixture(scope="module", params=[1280, 400])
 def page(request: pytest.FixtureRequest, browser: Browser, results: Path):
     """The page in a browser without a network, and what its console said."""
     uri, size = (results / "stability.html").as_uri(), {"width": request.param, "height": 900}
