@@ -47,7 +47,7 @@ MINUTES = {"uv run crosscheck speed"}  # and the tests themselves
 MARKS = {
     " advise ": pytest.mark.long,
     " stability my_scene.toml ": pytest.mark.long,
-    " run my_scene.toml ": pytest.mark.long,  # every engine; the gate plays a scene file through one
+    " run my_scene.toml ": pytest.mark.long,  # the gate plays a file through one engine
     " --engine ball.js ": pytest.mark.long,  # the gate plays this file without the command
     " speed free_fall slow_collision ": pytest.mark.long,
     " stability ": pytest.mark.slow,

@@ -91,7 +91,7 @@ def test_tables_are_made_again_from_the_journal(small_run: Path):
     assert {name: (small_run / name).read_bytes() for name in names} == before
 
 
-@pytest.mark.long  # of the same fact, without processes of their own, tests/reports/run/test_diff.py
+@pytest.mark.long  # a variant of one in tests/reports/run/test_diff.py, in its own processes
 def test_the_same_command_gives_the_same_numbers_whatever_the_workers(
     small_run: Path, tmp_path: Path
 ):
