@@ -6,6 +6,7 @@ It has no step size and no tolerance: contact times are roots, flights are parab
 
 from __future__ import annotations
 
+from collections import defaultdict
 from fractions import Fraction
 from typing import Any
 
@@ -51,6 +52,7 @@ SLOWEST = 0.9999  # up to this restitution the bounces of a disk are played unti
 # a factor above rounding: cells are wider than the largest disk, so that contacts are always in
 # neighbouring cells
 WIDER = 1 + 1e-9
+Line = tuple[Fraction | None, Fraction]  # a key of `line_of`
 
 
 class EventEngine:
@@ -322,22 +324,30 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
 
 
 def surfaces(walls: Array) -> NDArray[np.int64]:
-    """(w,) the number of the surface that each wall belongs to, as in `Walls`; exact, in
-    rationals."""
-    number, low, high = np.arange(len(walls)), walls.min(axis=1), walls.max(axis=1)
-    for w, one in enumerate(walls):
-        # most walls lie elsewhere: only the others are compared in rationals
-        near = (low[:w] <= high[w]).all(axis=1) & (low[w] <= high[:w]).all(axis=1)
-        for k in np.flatnonzero(near & (number[:w] != number[w])):
-            if number[k] != number[w] and joined(one, walls[k]):
-                number[number == number[w]] = number[k]
+    """(w,) the surface that each wall belongs to, as in `Walls`, named after one of its walls;
+    exact, in rationals."""
+    lines = defaultdict[Line, list[tuple[float, float, int]]](list)
+    for w, wall in enumerate(walls.tolist()):
+        line, axis = line_of(wall)
+        low, high = sorted(end[axis] for end in wall)
+        lines[line].append((low, high, w))
+    number = np.arange(len(walls))
+    for along in lines.values():
+        reach, first = -np.inf, -1
+        for low, high, w in sorted(along):
+            first = w if low > reach else first
+            number[w], reach = first, max(reach, high)
     return number
 
 
-def joined(one: Array, other: Array) -> bool:
-    """Whether two walls (2, 2), whose extents in x and in y overlap or touch, lie in line."""
-    (px, py), (qx, qy), *ends = [[Fraction(x) for x in end.tolist()] for end in (*one, *other)]
-    return all((qx - px) * (y - py) == (qy - py) * (x - px) for x, y in ends)
+def line_of(wall: list[list[float]]) -> tuple[Line, int]:
+    """A key for the line of a wall, the same for all walls on it: slope and intercept in rationals,
+    of x over y if it is upright; and the axis along which it extends."""
+    (px, py), (qx, qy) = [[Fraction(x) for x in end] for end in wall]
+    if px == qx:
+        return (None, px), 1
+    slope = (qy - py) / (qx - px)
+    return (slope, py - slope * px), 0
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:

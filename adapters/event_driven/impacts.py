@@ -34,6 +34,7 @@ from adapters.event_driven.rest import (
     rests,
     second_wall,
     slow,
+    touched_part,
 )
 from adapters.event_driven.search import ROUNDING, image
 
@@ -156,6 +157,8 @@ def collide_with_wall(arena: Arena, i: int, w: int, part: int) -> int:
     slow.
     """
     a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
+    if part > 0:
+        w, part = touched_part(walls, arena.grid, a, w, part)
     changed = a.last != -1 - w
     impulse = collide_wall(walls, a, w, part, arena.rules.restitution)
     rubs = arena.rules.friction > 0.0
