@@ -245,23 +245,29 @@ def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]
     e, v, g, disk = scene.restitution, leg[10], leg[11], int(leg[0])
     least = min(LEAST, LEAST_SHARE * scenario.sample_interval)
     count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
-    wall = wall_of_bounces(scene, leg)
     for k in range(1, count):
         t = leg[1] + 2 * v / g * float(powers(e, k))
         if t >= stop:
             return
-        before = v * e ** (k - 1)
-        beside = np.hypot(*(leg[4:6] + leg[6:8] * (t - leg[1])))
+        place, sliding = flight(t - leg[1], *leg[2:8].reshape(3, 2))
+        before, beside = v * e ** (k - 1), np.hypot(*sliding)
         kick = scene.mass[disk] * (1 + e) * before
-        yield [t, disk, -1 - wall, kick, before / np.hypot(before, beside)]
+        yield [
+            t,
+            disk,
+            -1 - wall_of_bounces(scene, leg, place),
+            kick,
+            before / np.hypot(before, beside),
+        ]
 
 
-def wall_of_bounces(scene: Scene, leg: Array) -> int:
-    """The wall on which the disk of a leg bounces: the nearest one parallel to the leg."""
+def wall_of_bounces(scene: Scene, leg: Array, place: Array) -> int:
+    """The wall on which the disk of a leg bounces at `place` (2,) m: the nearest one parallel to
+    the leg."""
     start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
     length = np.hypot(*span.T)
-    share = np.clip(((leg[2:4] - start) * span).sum(axis=1) / length**2, 0, 1)
-    apart = np.hypot(*(leg[2:4] - start - share[:, None] * span).T) - scene.radius[int(leg[0])]
+    share = np.clip(((place - start) * span).sum(axis=1) / length**2, 0, 1)
+    apart = np.hypot(*(place - start - share[:, None] * span).T) - scene.radius[int(leg[0])]
     return int(np.argmin(np.abs(apart) + np.abs((span * leg[8:10]).sum(axis=1)) / length))
 
 

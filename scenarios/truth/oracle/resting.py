@@ -28,6 +28,9 @@ SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disk
 # by bounce, within the limits of work: it would be a list of any length.
 SMALL, MOST_BOUNCES = 1e-9, 100_000
 FAR = 1e-12  # relative to the largest coordinate, added to those lengths
+# relative to the largest coordinate: how far the four ends of two walls in line are off the line by
+# their own rounding and that of the check, a few units in the last place
+ROUNDED = 2.0**-50
 
 
 def settle(
@@ -238,9 +241,48 @@ def next_in_line(finder: ContactFinder, contact: Contact, side: int) -> Contact 
     beyond = {k: high for k, (low, high) in spans.items() if low <= tip < high}
     if not beyond:
         return None
-    k = max(beyond, key=lambda k: beyond[k])
+    return _moved_to(finder, contact, max(beyond, key=lambda k: beyond[k]))
+
+
+def below(finder: ContactFinder, contact: Contact, now: Number) -> Contact:
+    """The contact of a disk with the wall of a surface on which its foot lies: while it bounced it
+    may have passed the end of the wall that it met first."""
+    bodies, surface = finder.bodies, finder.surface[contact.j]
+    if len(surface) == 1:
+        return contact
+    x, y, _, _ = bodies.state_at(contact.i, now)
+    for k in (contact.j, *surface):
+        foot, sign = bodies.foot(k, x, y), finder.k.sign
+        if sign(foot) >= 0 and sign(bodies.walls[k].length - foot) >= 0:
+            return _moved_to(finder, contact, k)
+    raise AssertionError("a surface has no gaps")
+
+
+def _moved_to(finder: ContactFinder, contact: Contact, k: int) -> Contact:
+    """The contact on the same side of wall k, which lies in line."""
+    walls, w = finder.scene.walls, contact.j
     same = (walls[k, 1] - walls[k, 0]) @ (walls[w, 1] - walls[w, 0]) > 0
     return contact._replace(j=k, side=contact.side if same else -contact.side)
+
+
+def nearly_in_line(finder: ContactFinder, i: int, now: float) -> str:
+    """What to do about two walls that disk i touches, if they are in line but for the rounding of
+    their ends; "" if there are none.
+
+    With such an angle, of some 1e-16, between them they are no single surface: a slow disk turns
+    about the joint, or bounces off it.
+    """
+    bodies, walls = finder.bodies, finder.scene.walls
+    count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, finder.codes)
+    contacts = [finder.contact(i, code) for code in finder.codes[:count].tolist()]
+    touched = [c.j for c in contacts if c.kind == "wall"]
+    for a, b in ((a, b) for a in touched for b in touched if b not in finder.surface[a]):
+        (start, end), rounding = walls[a], ROUNDED * np.abs(walls[[a, b]]).max()
+        (tx, ty), away = (end - start) / np.hypot(*(end - start)), walls[b] - start
+        if (np.abs(tx * away[:, 1] - ty * away[:, 0]) <= rounding).all():
+            a, b = sorted((a, b))
+            return f"; walls {a} and {b} are in line but for rounding: write them as one wall"
+    return ""
 
 
 def _pressed(bodies: Bodies, contact: Contact) -> bool:
