@@ -151,17 +151,7 @@ class Box2DEngine:
             least = chosen["length_unit"] * scene.radius.min()
             self.length = float(1.0 / max(least, chosen["step_unit"] * fastest(scene) * dt))
         self.speed = self.time * self.length
-        must_fit(
-            position=scene.position * self.length,
-            velocity=scene.velocity * self.speed,
-            radius=scene.radius * self.length,
-            mass=scene.mass,
-            inertia=scene.inertia * self.length**2,
-            angle=scene.angle,
-            angular_velocity=scene.angular_velocity * self.time,
-            walls=scene.walls * self.length,
-            gravity=scene.gravity * self.speed * self.time,
-        )
+        must_fit(scene, self.length, self.time)
         self.speed_cap = Box2D.b2_maxTranslation / self.length / dt
         self.spin_cap = Box2D.b2_maxRotation / dt
         self.listener = Listener(self)

@@ -137,17 +137,7 @@ class Box2DV3:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world; the length unit is global to the process, so each profile sets its
         own."""
-        must_fit(
-            position=scene.position,
-            velocity=scene.velocity,
-            radius=scene.radius,
-            mass=scene.mass,
-            inertia=scene.inertia,
-            angle=scene.angle,
-            angular_velocity=scene.angular_velocity,
-            walls=scene.walls,
-            gravity=scene.gravity,
-        )
+        must_fit(scene)
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = self._friction()
         self.log: list[ContactImpulse] = []
