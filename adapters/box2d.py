@@ -11,6 +11,7 @@ import numpy as np
 
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.friction import of_shapes
 from adapters.library_versions import BOX2D, version
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
@@ -142,7 +143,7 @@ class Box2DEngine:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.friction = self._friction()
+        self.friction = of_shapes(scene, self.matched, self.asked_friction)
         chosen = self.chosen
         # s per engine unit of time, engine units of length per m
         self.time, self.length = 1.0, 1.0
@@ -172,14 +173,6 @@ class Box2DEngine:
         ]
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.walls = [self._wall(w) for w in range(len(scene.walls))]
-
-    def _friction(self) -> float | None:
-        """The friction of every shape (that of a pair is the root of the product); None: the
-        engine's default, as a user without friction in mind leaves it."""
-        if self.asked_friction is not None:
-            return self.asked_friction
-        stated = self.matched or self.scene.friction > 0
-        return float(self.scene.friction) if stated else None
 
     def _surface(self) -> dict[str, float]:
         friction = {} if self.friction is None else {"friction": self.friction}

@@ -35,9 +35,8 @@ def outward(walls: Walls, a: Any, w: int) -> tuple[float, float]:
 @kernel
 def normal_component(walls: Walls, a: Any, w: int, x: float, y: float) -> float:
     """The component of a vector (x, y) along the normal of wall `w`, towards a disk."""
-    ux, uy = walls.segment[w, 2], walls.segment[w, 3]
-    above = (a.y - walls.segment[w, 1]) * ux - (a.x - walls.segment[w, 0]) * uy > 0.0
-    return y * ux - x * uy if above else x * uy - y * ux
+    nx, ny = outward(walls, a, w)
+    return nx * x + ny * y
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -145,19 +146,8 @@ def near_miss() -> Scenario:
     )
 
 
-PAIRS = (
-    partial(head_on_equal, 0.0),
-    partial(head_on_equal, 0.5),
-    partial(head_on_equal, 0.9),
-    partial(head_on_equal, 1.0),
-    partial(head_on_unequal, 0.0),
-    partial(head_on_unequal, 0.5),
-    partial(head_on_unequal, 0.9),
-    partial(head_on_unequal, 1.0),
-    partial(oblique, 0.0),
-    partial(oblique, 0.5),
-    partial(oblique, 0.9),
-    partial(oblique, 1.0),
+PAIRS: tuple[Callable[..., Scenario], ...] = (
+    *(partial(build, e) for build in (head_on_equal, head_on_unequal, oblique) for e in TAG),
     mass_ratios,
     slow_collision,
     near_miss,

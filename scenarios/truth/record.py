@@ -11,6 +11,7 @@ import numpy as np
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
 from scenarios.truth.horizon import DIVERGED
+from scenarios.truth.oracle.bodies import nearest
 from scenarios.truth.oracle.path import Event, Path
 from scenarios.truth.order import float64_horizon
 
@@ -264,11 +265,9 @@ def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]
 def wall_of_bounces(scene: Scene, leg: Array, place: Array) -> int:
     """The wall on which the disk of a leg bounces at `place` (2,) m: the nearest one parallel to
     the leg."""
-    start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
-    length = np.hypot(*span.T)
-    share = np.clip(((place - start) * span).sum(axis=1) / length**2, 0, 1)
-    apart = np.hypot(*(place - start - share[:, None] * span).T) - scene.radius[int(leg[0])]
-    return int(np.argmin(np.abs(apart) + np.abs((span * leg[8:10]).sum(axis=1)) / length))
+    span, (_, distance) = scene.walls[:, 1] - scene.walls[:, 0], nearest(place[None], scene.walls)
+    slope = np.abs((span * leg[8:10]).sum(axis=1)) / np.hypot(*span.T)
+    return int(np.argmin(np.abs(distance[0] - scene.radius[int(leg[0])]) + slope))
 
 
 def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iterator[str]:
@@ -281,13 +280,9 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
         for part in zip(*(along(leg[None], np.array([end]), scene.restitution) for leg in last))
     )
     x, v, mass = x[:, 0], v[:, 0], scene.mass[ours]
-    start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
-    share = ((x[:, None] - start) * span).sum(axis=-1) / (span**2).sum(axis=1)
-    apart = np.hypot(
-        *np.moveaxis(x[:, None] - start - np.clip(share, 0, 1)[..., None] * span, -1, 0)
-    )
-    touched = apart - scene.radius[ours][:, None] < TOUCH
-    near = span[touched.any(axis=0)]
+    share, distance = nearest(x, scene.walls)
+    touched = distance - scene.radius[ours][:, None] < TOUCH
+    near = (scene.walls[:, 1] - scene.walls[:, 0])[touched.any(axis=0)]
     names, they, their, touch = "disks " + ", ".join(map(str, ours)), "them", "their", "they touch"
     if len(ours) == 1:
         names, they, their, touch = f"disk {ours[0]}", "it", "its", "it touches"

@@ -160,9 +160,7 @@ class ContactFinder:
         if after is None:
             return None
         x, y = x + (u + leg.ax * after / 2) * after, y + (v + leg.ay * after / 2) * after
-        foot = bodies.foot(contact.j, x, y)
-        past_end = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
-        return None if past_end else after
+        return after if bodies.foot_on(contact.j, x, y) else None
 
     def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
         """Whether the foot of a point (x, y) lies on the wall, and its velocity (u, v) does not
@@ -249,16 +247,11 @@ class ContactFinder:
             if contact.kind == "body":
                 touch, reach = self.touch(contact, now), bodies.radius[i] + bodies.radius[contact.j]
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
-                past_end = False
+                within = True
             else:
-                gap, foot = (
-                    self.k.sign(bodies.height(contact, x, y) - bodies.radius[i]),
-                    bodies.foot(contact.j, x, y),
-                )
-                past_end = (
-                    self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
-                )
-            found += [(contact, gap)] if gap <= 0 and not past_end else []
+                gap = self.k.sign(bodies.height(contact, x, y) - bodies.radius[i])
+                within = bodies.foot_on(contact.j, x, y)
+            found += [(contact, gap)] if gap <= 0 and within else []
         return found
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:

@@ -17,7 +17,16 @@ import numpy as np
 
 from scenarios.model import Array, Thrust
 from scenarios.no_truth import NoTruth
-from scenarios.truth.oracle.bodies import FALLING, STATIC, Bodies, Hop, Leg, rational, square_to
+from scenarios.truth.oracle.bodies import (
+    FALLING,
+    STATIC,
+    Bodies,
+    Hop,
+    Leg,
+    nearest,
+    rational,
+    square_to,
+)
 from scenarios.truth.oracle.contact_finder import ContactFinder, key, line_span
 from scenarios.truth.oracle.filter import moved, touching
 from scenarios.truth.oracle.numbers import Number
@@ -119,13 +128,9 @@ def untouched(
     ):
         return False
     known = {*finder.surface[w], *(c.j for c in bodies.held[i] if c.kind == "wall")}
-    walls = np.array([wall for k, wall in enumerate(scene.walls) if k not in known]).reshape(
-        -1, 2, 2
-    )
-    span = walls[:, 1] - walls[:, 0]
-    share = np.clip((([x, y] - walls[:, 0]) * span).sum(axis=1) / (span**2).sum(axis=1), 0, 1)
-    away = np.hypot(*(walls[:, 0] + share[:, None] * span - [x, y]).T) - bodies.radii[i]
-    return bool((away > own * SAFE + slack).all())
+    rest = [k for k in range(len(scene.walls)) if k not in known]
+    _, distance = nearest(np.array([[x, y]]), scene.walls[rest])
+    return bool((distance - bodies.radii[i] > own * SAFE + slack).all())
 
 
 def room(finder: ContactFinder, contact: Contact, leg: Leg) -> float:
@@ -251,11 +256,9 @@ def below(finder: ContactFinder, contact: Contact, now: Number) -> Contact:
     if len(surface) == 1:
         return contact
     x, y, _, _ = bodies.state_at(contact.i, now)
-    for k in (contact.j, *surface):
-        foot, sign = bodies.foot(k, x, y), finder.k.sign
-        if sign(foot) >= 0 and sign(bodies.walls[k].length - foot) >= 0:
-            return _moved_to(finder, contact, k)
-    raise AssertionError("a surface has no gaps")
+    return _moved_to(
+        finder, contact, next(k for k in (contact.j, *surface) if bodies.foot_on(k, x, y))
+    )
 
 
 def _moved_to(finder: ContactFinder, contact: Contact, k: int) -> Contact:
