@@ -182,7 +182,7 @@ def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
         f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t ="
         f" {held:.9g} s on"
     )
-    return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
+    return path.cut(held, reason)
 
 
 def last_time(holds: Callable[[float], bool], end: float) -> float:

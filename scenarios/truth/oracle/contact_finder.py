@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.truth.oracle.bodies import STATIC, Bodies, rational
+from scenarios.truth.oracle.bodies import Bodies, rational
 from scenarios.truth.oracle.contacts import Pressed, crossing, falling_meeting, meeting
 from scenarios.truth.oracle.filter import soonest, touching
 from scenarios.truth.oracle.numbers import Number
@@ -144,11 +144,7 @@ class ContactFinder:
     def _time_to_wall(self, contact: Contact, now: Number) -> Number | None:
         bodies, i, leg = self.bodies, contact.i, self.bodies.legs[contact.i]
         x, y, u, v = bodies.state_at(i, now)
-        fall = (
-            self.k.exact(0.0)
-            if bodies.kind[i] == STATIC
-            else bodies.outward(contact, leg.ax, leg.ay)
-        )
+        fall = bodies.outward(contact, leg.ax, leg.ay)
         leans = contact in bodies.leaning[i] and leg.t is now
         gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
         try:
@@ -178,11 +174,7 @@ class ContactFinder:
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
-        acceleration = (
-            self.k.exact(0.0)
-            if bodies.kind[contact.i] == STATIC
-            else wall.tx * leg.ax + wall.ty * leg.ay
-        )
+        acceleration = wall.tx * leg.ax + wall.ty * leg.ay
         left = wall.length - foot if contact.side > 0 else foot
         return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
 
@@ -201,9 +193,7 @@ class ContactFinder:
         assert self.scene.wrap is not None
         edge = self.k.exact(float(self.scene.wrap[1 if side > 0 else 0, axis]))
         state, leg = self.bodies.state_at(i, now), self.bodies.legs[i]
-        acceleration = (
-            self.k.exact(0.0) if self.bodies.kind[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
-        )
+        acceleration = -side * (leg.ax, leg.ay)[axis]
         gap, speed = side * (edge - state[axis]), -side * state[2 + axis]
         # A centre at rest on an edge is not beyond it.
         if self.k.sign(gap) == 0 and self.k.sign(speed) == 0:
