@@ -210,28 +210,28 @@ class ContactFinder:
         wall = bodies.walls[contact.j]
         return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
 
+    def touching(self, i: int, now: float) -> list[Contact]:
+        """The contacts of disk i that may have no gap at `now` s, by float64."""
+        bodies = self.bodies
+        count = touching(
+            bodies.table, bodies.radii, bodies.asleep, self.scene.walls, i, now, self.codes
+        )
+        return [self.contact(i, code) for code in self.codes[:count].tolist()]
+
     def alone(self, contact: Contact, now: float) -> bool:
         """Whether the disks of a contact certainly touch nothing else."""
-        bodies, walls = self.bodies, self.scene.walls
-        for i in contact.disks:
-            count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, self.codes)
-            others = {key(self.contact(i, code)) for code in self.codes[:count].tolist()} - {
-                key(contact)
-            }
-            if others or bodies.held[i]:
-                return False
-        return True
+        return not any(
+            self.bodies.held[i] or {key(other) for other in self.touching(i, now)} - {key(contact)}
+            for i in contact.disks
+        )
 
     def near(self, i: int, now: Number, sure: Sequence[Contact] = ()) -> list[tuple[Contact, int]]:
         """The contacts of disk i that touch (0) or overlap (-1) now, except those in `sure`, which
         are known to touch."""
         bodies, found = self.bodies, list[tuple[Contact, int]]()
         x, y, _, _ = bodies.state_at(i, now)
-        walls, known = self.scene.walls, {key(contact) for contact in sure}
-        count = touching(
-            bodies.table, bodies.radii, bodies.asleep, walls, i, float(now), self.codes
-        )
-        for contact in [self.contact(i, code) for code in self.codes[:count].tolist()]:
+        known = {key(contact) for contact in sure}
+        for contact in self.touching(i, float(now)):
             if key(contact) in known:
                 continue
             if contact.kind == "body":

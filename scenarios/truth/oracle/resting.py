@@ -28,7 +28,7 @@ from scenarios.truth.oracle.bodies import (
     square_to,
 )
 from scenarios.truth.oracle.contact_finder import ContactFinder, key, line_span
-from scenarios.truth.oracle.filter import moved, touching
+from scenarios.truth.oracle.filter import moved
 from scenarios.truth.oracle.numbers import Number
 from scenarios.truth.oracle.ties import Contact
 
@@ -275,10 +275,8 @@ def nearly_in_line(finder: ContactFinder, i: int, now: float) -> str:
     With such an angle, of some 1e-16, between them they are no single surface: a slow disk turns
     about the joint, or bounces off it.
     """
-    bodies, walls = finder.bodies, finder.scene.walls
-    count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, finder.codes)
-    contacts = [finder.contact(i, code) for code in finder.codes[:count].tolist()]
-    touched = [c.j for c in contacts if c.kind == "wall"]
+    walls = finder.scene.walls
+    touched = [c.j for c in finder.touching(i, now) if c.kind == "wall"]
     for a, b in ((a, b) for a in touched for b in touched if b not in finder.surface[a]):
         (start, end), rounding = walls[a], ROUNDED * np.abs(walls[[a, b]]).max()
         (tx, ty), away = (end - start) / np.hypot(*(end - start)), walls[b] - start
@@ -318,10 +316,7 @@ def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
     bodies, scene = finder.bodies, finder.scene
     faults, found = [], dict[tuple[Any, ...], tuple[Contact, Fraction]]()
     for i in np.flatnonzero(~scene.static).tolist():
-        count = touching(
-            bodies.table, bodies.radii, bodies.asleep, scene.walls, i, 0.0, finder.codes
-        )
-        for contact in [finder.contact(i, code) for code in finder.codes[:count].tolist()]:
+        for contact in finder.touching(i, 0.0):
             gap, approach, overlap = at_start(bodies, contact)
             if gap < 0 and key(contact) not in found:
                 name = bodies.name(contact)
