@@ -283,7 +283,7 @@ class Box2DEngine:
             "continuous collision": (self.continuous if matched else None, world.continuousPhysics),
             "continuous collision between disks": (
                 self.bullet if matched else None,
-                self._bullets(),
+                any(body.bullet for body in self.bodies),
             ),
             "sub-stepping": (chosen["sub_stepping"] if matched else None, world.subStepping),
             "warm starting": (chosen["warm_starting"] if matched else None, world.warmStarting),
@@ -294,10 +294,6 @@ class Box2DEngine:
     def _skin(self) -> float | str:
         """m, the skin of the first wall."""
         return self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
-
-    def _bullets(self) -> bool:
-        """Whether the moving disks are bullets."""
-        return any(body.bullet for body in self.bodies)
 
     def versions(self) -> dict[str, str]:
         """The package; it carries its own copy of Box2D 2.3."""

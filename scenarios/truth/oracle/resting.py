@@ -105,9 +105,7 @@ def untouched(
     bodies, scene, i, w = finder.bodies, finder.scene, contact.i, contact.j
     left, table = stop - float(leg.t), bodies.table
     x, y, vx, vy, ax, ay = (float(value) for value in leg[1:7])
-    assert leg.hop is not None
-    rise = float(leg.hop.speed) ** 2 / 2 / float(leg.hop.fall)
-    own = (np.hypot(vx, vy) + np.hypot(ax, ay) * left / 2) * left + rise
+    own = (np.hypot(vx, vy) + np.hypot(ax, ay) * left / 2) * left + hop_height(leg)
     states = np.array([moved(row, float(leg.t)) for row in table])
     heights = np.array([hop_height(each) for each in bodies.legs])
     energy = spin_energy(bodies, leg.t)
