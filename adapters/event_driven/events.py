@@ -52,6 +52,9 @@ SLOWEST = 0.9999  # up to this restitution the bounces of a disk are played unti
 # a factor above rounding: cells are wider than the largest disk, so that contacts are always in
 # neighbouring cells
 WIDER = 1 + 1e-9
+# relative to the largest coordinate, a few units in the last place: how far rounding moves the ends
+# of two walls off their line; and the largest angle, rad, between two walls of one surface
+ROUNDED, STRAIGHT = 2.0**-50, 1e-12
 Line = tuple[Fraction | None, Fraction]  # a key of `line_of`
 
 
@@ -324,8 +327,11 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
 
 
 def surfaces(walls: Array) -> NDArray[np.int64]:
-    """(w,) the surface that each wall belongs to, as in `Walls`, named after one of its walls;
-    exact, in rationals."""
+    """(w,) the surface that each wall belongs to, as in `Walls`, named after one of its walls.
+
+    In line is exact, in rationals; of walls that share an end, also if only rounding keeps them
+    from it: else a resting disk would turn about the joint, or fall through it.
+    """
     lines = defaultdict[Line, list[tuple[float, float, int]]](list)
     for w, wall in enumerate(walls.tolist()):
         line, axis = line_of(wall)
@@ -337,7 +343,28 @@ def surfaces(walls: Array) -> NDArray[np.int64]:
         for low, high, w in sorted(along):
             first = w if low > reach else first
             number[w], reach = first, max(reach, high)
+    ending = defaultdict[tuple[float, ...], list[int]](list)
+    for w, wall in enumerate(walls.tolist()):
+        for end in wall:
+            ending[tuple(end)].append(w)
+    span = walls[:, 1] - walls[:, 0]
+    heading = np.arctan2(span[:, 1], span[:, 0]) % np.pi
+    for there in ending.values():
+        around = sorted(there, key=lambda w: heading[w])  # of many, neighbours alone are in line
+        for a, b in zip(around, [*around[1:], around[0]]):
+            if number[a] != number[b] and nearly_in_line(walls[a], walls[b]):
+                number[number == number[b]] = number[a]
     return number
+
+
+def nearly_in_line(one: Array, other: Array) -> bool:
+    """Whether two walls (2, 2) that share an end are in line but for the rounding of their ends, at
+    an angle that a disk cannot tell."""
+    (ax, ay), (bx, by) = (wall[1] - wall[0] for wall in (one, other))
+    across, lengths = abs(ax * by - ay * bx), (np.hypot(ax, ay), np.hypot(bx, by))
+    if across > STRAIGHT * lengths[0] * lengths[1]:
+        return False
+    return bool(across <= ROUNDED * np.abs([one, other]).max() * sum(lengths))
 
 
 def line_of(wall: list[list[float]]) -> tuple[Line, int]:

@@ -3,6 +3,8 @@ off again."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -366,6 +368,50 @@ def test_at_restitution_zero_a_disk_slides_past_both_ends_of_a_wall():
 
         assert len(engine.collisions) == 1
         assert v[0] == pytest.approx(speed * u, abs=1e-14)
+
+
+def test_a_turned_floor_of_two_walls_is_a_floor():
+    """Rounding moves their joint off the line by an ulp: a disk that rests, bounces or slides over
+    it moves as on one wall, and does not fall through."""
+    for seed in range(60):
+        draw = np.random.default_rng([11, seed])
+        angle, joint = draw.uniform(0, 2 * np.pi), draw.uniform(-0.5, 0.8)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        walls = np.array([[[-4, 0], [joint, 0]], [[joint, 0], [4, 0]]]) @ turn.T + 0.7
+        two = Scene(
+            position=[turn @ [-1, 0.25 + draw.uniform(0.01, 0.1)] + 0.7],
+            velocity=[turn @ [draw.choice([0.5, 1.0, 2.0, 4.0]), 0]],
+            radius=[0.25],
+            mass=[1.0],
+            restitution=draw.choice([0.0, 0.5, 0.9]),
+            friction=draw.choice([0.0, 0.3]),
+            walls=walls,
+            gravity=turn @ [0, -G],
+        )
+        one = replace(two, walls=[[walls[0, 0], walls[1, 1]]])
+        # some hundred bounces round some 1e-15 each
+        for part, whole in zip(after(two, 1.0), after(one, 1.0)):
+            assert part == pytest.approx(whole, abs=1e-12)
+
+
+def test_walls_at_an_angle_share_no_surface_however_short_they_are():
+    """A kink of 1e-9 is none of rounding; nor is a corner with a side of 1e-15 m."""
+    for kink, length in ((1e-9, 1.0), (1e-5, 1e-6), (1.0, 1e-15)):
+        way = length * np.array([np.cos(kink), np.sin(kink)])
+        walls = np.array([[[-1.0, 0.5], [0.0, 0.5]], [[0.0, 0.5], [0.0, 0.5] + way]])
+        assert len({*events.surfaces(walls)}) == 2
+
+
+def test_a_fan_of_many_walls_is_sorted_not_compared_in_pairs(monkeypatch: pytest.MonkeyPatch):
+    """A thousand walls that share an end."""
+    asked, real = [], events.nearly_in_line
+    monkeypatch.setattr(
+        events, "nearly_in_line", lambda *pair: bool(asked.append(pair)) or real(*pair)
+    )
+    angle = np.linspace(0, 3, 1000)
+    walls = np.stack([np.zeros((1000, 2)), np.stack([np.cos(angle), np.sin(angle)], -1)], 1)
+
+    assert len({*events.surfaces(walls)}) == 1000 == len(asked)
 
 
 def test_the_line_of_each_wall_is_found_once(monkeypatch: pytest.MonkeyPatch):
