@@ -11,6 +11,7 @@ import numpy as np
 
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.friction import of_shapes
 from adapters.library_versions import BOX2D, version
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
@@ -142,7 +143,7 @@ class Box2DEngine:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world in the profile's units."""
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.friction = self._friction()
+        self.friction = of_shapes(scene, self.matched, self.asked_friction)
         chosen = self.chosen
         # s per engine unit of time, engine units of length per m
         self.time, self.length = 1.0, 1.0
@@ -151,17 +152,7 @@ class Box2DEngine:
             least = chosen["length_unit"] * scene.radius.min()
             self.length = float(1.0 / max(least, chosen["step_unit"] * fastest(scene) * dt))
         self.speed = self.time * self.length
-        must_fit(
-            position=scene.position * self.length,
-            velocity=scene.velocity * self.speed,
-            radius=scene.radius * self.length,
-            mass=scene.mass,
-            inertia=scene.inertia * self.length**2,
-            angle=scene.angle,
-            angular_velocity=scene.angular_velocity * self.time,
-            walls=scene.walls * self.length,
-            gravity=scene.gravity * self.speed * self.time,
-        )
+        must_fit(scene, self.length, self.time)
         self.speed_cap = Box2D.b2_maxTranslation / self.length / dt
         self.spin_cap = Box2D.b2_maxRotation / dt
         self.listener = Listener(self)
@@ -182,14 +173,6 @@ class Box2DEngine:
         ]
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.walls = [self._wall(w) for w in range(len(scene.walls))]
-
-    def _friction(self) -> float | None:
-        """The friction of every shape (that of a pair is the root of the product); None: the
-        engine's default, as a user without friction in mind leaves it."""
-        if self.asked_friction is not None:
-            return self.asked_friction
-        stated = self.matched or self.scene.friction > 0
-        return float(self.scene.friction) if stated else None
 
     def _surface(self) -> dict[str, float]:
         friction = {} if self.friction is None else {"friction": self.friction}
@@ -300,7 +283,7 @@ class Box2DEngine:
             "continuous collision": (self.continuous if matched else None, world.continuousPhysics),
             "continuous collision between disks": (
                 self.bullet if matched else None,
-                self._bullets(),
+                any(body.bullet for body in self.bodies),
             ),
             "sub-stepping": (chosen["sub_stepping"] if matched else None, world.subStepping),
             "warm starting": (chosen["warm_starting"] if matched else None, world.warmStarting),
@@ -311,10 +294,6 @@ class Box2DEngine:
     def _skin(self) -> float | str:
         """m, the skin of the first wall."""
         return self.walls[0].fixtures[0].shape.radius / self.length if self.walls else "no wall"
-
-    def _bullets(self) -> bool:
-        """Whether the moving disks are bullets."""
-        return any(body.bullet for body in self.bodies)
 
     def versions(self) -> dict[str, str]:
         """The package; it carries its own copy of Box2D 2.3."""

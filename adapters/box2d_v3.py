@@ -15,6 +15,7 @@ import pyb2d3
 
 from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
+from adapters.friction import of_shapes
 from adapters.library_versions import version
 from adapters.matched import Searched
 from scenarios.model import Array, Scene, State
@@ -137,19 +138,9 @@ class Box2DV3:
     def load(self, scene: Scene, dt: float) -> None:
         """Build a new world; the length unit is global to the process, so each profile sets its
         own."""
-        must_fit(
-            position=scene.position,
-            velocity=scene.velocity,
-            radius=scene.radius,
-            mass=scene.mass,
-            inertia=scene.inertia,
-            angle=scene.angle,
-            angular_velocity=scene.angular_velocity,
-            walls=scene.walls,
-            gravity=scene.gravity,
-        )
+        must_fit(scene)
         self.scene, self.dt, self.steps = scene, dt, 0
-        self.friction = self._friction()
+        self.friction = of_shapes(scene, self.matched, self.asked_friction)
         self.log: list[ContactImpulse] = []
         self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
         pyb2d3.set_length_units_per_meter(self.unit)
@@ -183,14 +174,6 @@ class Box2DV3:
             name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen
         }
         return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
-
-    def _friction(self) -> float | None:
-        """The friction of every shape (that of a pair is the root of the product); None: the
-        engine's default, as a user without friction in mind leaves it."""
-        if self.asked_friction is not None:
-            return self.asked_friction
-        stated = self.matched or self.scene.friction > 0
-        return float(self.scene.friction) if stated else None
 
     def _shape(self) -> Any:
         friction = {} if self.friction is None else {"friction": self.friction}

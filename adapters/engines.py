@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,81 +18,22 @@ from adapters.matched import Searched
 from scenarios.model import Scene
 
 
-def _exercise(**settings: Any) -> Engine:
-    from adapters.reference import Reference
-    from reference_impl import exercise
-
-    return Reference(exercise, **settings)
-
-
-def _neighbours(**settings: Any) -> Engine:
-    from adapters.reference import Reference
-    from reference_impl import neighbours
-
-    return Reference(neighbours, **settings)
+def _made(place: str, *arguments: Any, **settings: Any) -> Engine:
+    """An engine of the class "module.Class", imported only now, so that a missing library is a
+    refusal of this engine alone."""
+    module, _, name = place.rpartition(".")
+    engine: Engine = getattr(import_module(module), name)(*arguments, **settings)
+    return engine
 
 
-def _lesson() -> Engine:
-    from adapters.reference import Reference
-    from reference_impl import lesson
-
-    return Reference(lesson)
+def _reference(variant: str, **settings: Any) -> Engine:
+    solver = import_module(f"reference_impl.{variant}")
+    return _made("adapters.reference.Reference", solver, **settings)
 
 
-def _coulomb() -> Engine:
-    from adapters.reference import Reference
-    from reference_impl import coulomb
-
-    return Reference(coulomb)
-
-
-def _ordered() -> Engine:
-    from adapters.reference import Reference
-    from reference_impl import ordered
-
-    return Reference(ordered)
-
-
-def _pymunk(profile: str, **settings: Any) -> Engine:
-    from adapters.pymunk import Pymunk
-
-    return Pymunk(profile, **settings)
-
-
-def _pymunk_searched() -> Searched:
-    from adapters.pymunk import SEARCHED
-
-    return SEARCHED
-
-
-def _box2d(profile: str, **settings: Any) -> Engine:
-    from adapters.box2d import Box2DEngine
-
-    return Box2DEngine(profile, **settings)
-
-
-def _box2d_searched() -> Searched:
-    from adapters.box2d import SEARCHED
-
-    return SEARCHED
-
-
-def _box2d_v3(profile: str, **settings: Any) -> Engine:
-    from adapters.box2d_v3 import Box2DV3
-
-    return Box2DV3(profile, **settings)
-
-
-def _box2d_v3_searched() -> Searched:
-    from adapters.box2d_v3 import SEARCHED
-
-    return SEARCHED
-
-
-def _event_driven() -> Engine:
-    from adapters.event_driven.engine import EventDriven
-
-    return EventDriven()
+def _searched(module: str) -> Searched:
+    searched: Searched = import_module(module).SEARCHED
+    return searched
 
 
 def _javascript_searched(name: str) -> Searched:
@@ -101,9 +43,8 @@ def _javascript_searched(name: str) -> Searched:
 
 
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
-    from adapters.javascript.engine import JavaScriptEngine
-
-    return JavaScriptEngine(name, FETCHED[f"{name}:{profile}"].package, profile, **settings)
+    package = FETCHED[f"{name}:{profile}"].package
+    return _made("adapters.javascript.engine.JavaScriptEngine", name, package, profile, **settings)
 
 
 def _what_moves_is_a_bullet(engine: Any) -> None:
@@ -119,7 +60,7 @@ _Pymunk = partial(
     outside=True,
     distributions=("pymunk",),
     mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
-    searched=_pymunk_searched,
+    searched=partial(_searched, "adapters.pymunk"),
     work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
 )
 _Box2D = partial(
@@ -127,7 +68,7 @@ _Box2D = partial(
     outside=True,
     distributions=(BOX2D,),
     mark=Mark("#00876c", "#5be0b5", "square"),
-    searched=_box2d_searched,
+    searched=partial(_searched, "adapters.box2d"),
     work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
 )
 _Box2DV3 = partial(
@@ -135,7 +76,7 @@ _Box2DV3 = partial(
     outside=True,
     distributions=("pyb2d3",),
     mark=Mark("#b84fb0", "#c46bd8", "diamond"),
-    searched=_box2d_v3_searched,
+    searched=partial(_searched, "adapters.box2d_v3"),
     work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
 )
 _Planck = partial(
@@ -164,14 +105,14 @@ _BULLETS = "continuous collision, moving disks are bullets"
 
 ENGINES: dict[str, EngineRow] = {
     "reference:exercise": _Reference(
-        _exercise,
+        partial(_reference, "exercise"),
         "hand-written, exercise 11: symplectic Euler; 171 lines, tests every pair",
         1.0,
         FLOAT64,
         options={"kept in float32": {"precision": np.float32}},
     ),
     "reference:neighbours": _Reference(
-        _neighbours,
+        partial(_reference, "neighbours"),
         "same bits as reference:exercise in less time: 636 lines, no pair tested that is far",
         1.0,
         FLOAT64,
@@ -180,14 +121,14 @@ ENGINES: dict[str, EngineRow] = {
         bits_of="reference:exercise",
     ),
     "reference:lesson": _Reference(
-        _lesson,
+        partial(_reference, "lesson"),
         "hand-written, the lesson: explicit Euler; 127 lines, tests every pair",
         0.0,
         FLOAT64,
         dash=(2, 3),
     ),
     "reference:coulomb": _Reference(
-        _coulomb,
+        partial(_reference, "coulomb"),
         "hand-written, the exercise with friction; 79 lines, tests every pair",
         1.0,
         FLOAT64,
@@ -197,7 +138,7 @@ ENGINES: dict[str, EngineRow] = {
         adds_friction=True,
     ),
     "reference:ordered": _Reference(
-        _ordered,
+        partial(_reference, "ordered"),
         "hand-written: exact flight, time-of-impact ordering, friction; 541 lines, no projection",
         0.5,
         FLOAT64,
@@ -206,14 +147,14 @@ ENGINES: dict[str, EngineRow] = {
         orders_collisions=True,
     ),
     "pymunk:shipped": _Pymunk(
-        partial(_pymunk, "shipped"),
+        partial(_made, "adapters.pymunk.Pymunk", "shipped"),
         "pymunk 7.3 (float64), own defaults: elasticity e on every shape",
         0.0,
         FLOAT64,
         dash=SHIPPED,
     ),
     "pymunk:matched": _Pymunk(
-        partial(_pymunk, "matched"),
+        partial(_made, "adapters.pymunk.Pymunk", "matched"),
         "pymunk, matched: elasticity sqrt(e), small slop",
         0.0,
         FLOAT64,
@@ -232,14 +173,14 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "box2d:shipped": _Box2D(
-        partial(_box2d, "shipped"),
+        partial(_made, "adapters.box2d.Box2DEngine", "shipped"),
         "box2d-py 2.3.8 (float32), own defaults: friction, sleep, threshold 1 m/s",
         1.0,
         FLOAT32,
         dash=SHIPPED,
     ),
     "box2d:matched": _Box2D(
-        partial(_box2d, "matched"),
+        partial(_made, "adapters.box2d.Box2DEngine", "matched"),
         "box2d-py, matched: units that lift its thresholds; CCD; no sleep; friction as stated",
         1.0,
         FLOAT32,
@@ -260,14 +201,14 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "box2d_v3:shipped": _Box2DV3(
-        partial(_box2d_v3, "shipped"),
+        partial(_made, "adapters.box2d_v3.Box2DV3", "shipped"),
         "Box2D 3.1 (pyb2d3, float32), own defaults: friction, sleep, threshold 1 m/s",
         0.625,
         FLOAT32,
         dash=SHIPPED,
     ),
     "box2d_v3:matched": _Box2DV3(
-        partial(_box2d_v3, "matched"),
+        partial(_made, "adapters.box2d_v3.Box2DV3", "matched"),
         "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, friction as stated",
         0.625,
         FLOAT32,
@@ -285,7 +226,7 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "event_driven:float64": EngineRow(
-        _event_driven,
+        partial(_made, "adapters.event_driven.engine.EventDriven"),
         "event-driven, without steps: parabolas and contact times, in float64",
         0.5,
         FLOAT64,

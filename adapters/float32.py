@@ -8,17 +8,28 @@ from adapters.engine import Unsupported
 from scenarios.model import Array, Scene
 
 
-def must_fit(**quantities: Array) -> None:
-    """Raise `Unsupported` if a number, in the engine's units, overflows in float32, or a size or
-    mass underflows."""
+def must_fit(scene: Scene, length: float = 1.0, time: float = 1.0) -> None:
+    """Raise `Unsupported` if a number of the scene, in the engine's units, overflows in float32, or
+    a size or mass underflows.
+
+    length, time: units of length in a metre, seconds in a unit of time.
+    """
+    quantities = {
+        "position": scene.position * length,
+        "velocity": scene.velocity * (time * length),
+        "radius": scene.radius * length,
+        "mass": scene.mass,
+        "inertia": scene.inertia * length**2,
+        "angle": scene.angle,
+        "angular_velocity": scene.angular_velocity * time,
+        "walls": scene.walls * length,
+        "gravity": scene.gravity * (time * length) * time,
+    }
     largest, smallest = float(np.finfo(np.float32).max), float(np.finfo(np.float32).tiny)
     for name, given in quantities.items():
         values = np.abs(given)
-        too_small = (
-            values < smallest
-            if name in ("radius", "mass", "inertia")
-            else np.zeros_like(values, bool)
-        )
+        sized = name in ("radius", "mass", "inertia")
+        too_small = (values < smallest) & sized
         for bad in values[too_small | (np.isfinite(values) & (values > largest))]:
             raise Unsupported(f"{name} {bad:g} does not fit into float32")
 

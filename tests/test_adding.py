@@ -93,12 +93,8 @@ ADDED: dict[str, list[Added]] = {
         Added("adapters/toy.py", TOY),
         Added(
             "adapters/engines.py",
-            "def _toy():\n    from adapters.toy import Toy\n\n    return Toy()\n\n\n",
-            "# The fields that all profiles of an engine share",
-        ),
-        Added(
-            "adapters/engines.py",
-            '    "toy:plain": EngineRow(_toy, "flies through everything", 0.5, FLOAT64,'
+            '    "toy:plain": EngineRow(partial(_made, "adapters.toy.Toy"),'
+            ' "flies through everything", 0.5, FLOAT64,'
             ' outside=True, distributions=("typer",),\n'
             '                     options={"as it is": {}},\n'
             '                     variants={"as_it_is": Variant({}, "nothing")}),\n',

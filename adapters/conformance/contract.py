@@ -9,6 +9,7 @@ numbers that are none is a faulty solver.
 from __future__ import annotations
 
 from contextlib import closing
+from functools import partial
 
 import numpy as np
 
@@ -287,78 +288,46 @@ def static_stays(row: EngineRow) -> ProbeReading:
     )
 
 
+_OfAdapter = partial(Probe, failure="breaks")
+_HandedOn = partial(Probe, failure="breaks", handed_on=True)
 CONTRACT: dict[str, Probe] = {
-    "order_and_shapes": Probe(
-        "Does read give float64 arrays in the scene's order?", order_and_shapes, "breaks"
+    "order_and_shapes": _OfAdapter(
+        "Does read give float64 arrays in the scene's order?", order_and_shapes
     ),
-    "read_copies": Probe("Does read give copies?", read_copies, "breaks"),
-    "load_forgets": Probe(
-        "Where does a used engine differ from a fresh one after load?", load_forgets, "breaks"
+    "read_copies": _OfAdapter("Does read give copies?", read_copies),
+    "load_forgets": _OfAdapter(
+        "Where does a used engine differ from a fresh one after load?", load_forgets
     ),
-    "worlds_are_separate": Probe(
-        "Where does a second engine disturb the first?", worlds_are_separate, "breaks"
+    "worlds_are_separate": _OfAdapter(
+        "Where does a second engine disturb the first?", worlds_are_separate
     ),
-    "counts_are_steps": Probe(
-        "Where does step(3) differ from three steps?", counts_are_steps, "breaks"
+    "counts_are_steps": _OfAdapter("Where does step(3) differ from three steps?", counts_are_steps),
+    "steps_obey_dt": _HandedOn(
+        "How fast is a disk of 1.5 m/s by its path, at two dt? (m/s)", steps_obey_dt
     ),
-    "steps_obey_dt": Probe(
-        "How fast is a disk of 1.5 m/s by its path, at two dt? (m/s)",
-        steps_obey_dt,
-        "breaks",
-        handed_on=True,
+    "stays_finite": _HandedOn(
+        "Is every number finite for 20 steps of a plain scene?", stays_finite
     ),
-    "stays_finite": Probe(
-        "Is every number finite for 20 steps of a plain scene?",
-        stays_finite,
-        "breaks",
-        handed_on=True,
-    ),
-    "force_lasts_one_step": Probe(
+    "force_lasts_one_step": _HandedOn(
         "How much faster is a disk 3 steps after a force than after its first step?",
         force_lasts_one_step,
-        "breaks",
-        handed_on=True,
     ),
-    "mass_by_force": Probe(
-        "What mass does a force see? (kg)", mass_by_force, "breaks", handed_on=True
+    "mass_by_force": _HandedOn("What mass does a force see? (kg)", mass_by_force),
+    "inertia_by_torque": _HandedOn("What inertia does a torque see? (kg m2)", inertia_by_torque),
+    "same_instant": _HandedOn("How fast is a disk after 1 s under 9.81 m/s2? (m/s)", same_instant),
+    "collisions_are_reported": _HandedOn(
+        "Which collisions are reported when disks 1 and 2 meet once?", collisions_are_reported
     ),
-    "inertia_by_torque": Probe(
-        "What inertia does a torque see? (kg m2)", inertia_by_torque, "breaks", handed_on=True
+    "walls_are_reported": _HandedOn(
+        "Which collisions are reported when disk 1 meets wall 1 once?", walls_are_reported
     ),
-    "same_instant": Probe(
-        "How fast is a disk after 1 s under 9.81 m/s2? (m/s)",
-        same_instant,
-        "breaks",
-        handed_on=True,
+    "collisions_name_their_step": _HandedOn(
+        "In which step is a collision reported?", collisions_name_their_step
     ),
-    "collisions_are_reported": Probe(
-        "Which collisions are reported when disks 1 and 2 meet once?",
-        collisions_are_reported,
-        "breaks",
-        handed_on=True,
+    "impulse_is_reported": _HandedOn(
+        "Which impulse is reported for a collision? (N s)", impulse_is_reported
     ),
-    "walls_are_reported": Probe(
-        "Which collisions are reported when disk 1 meets wall 1 once?",
-        walls_are_reported,
-        "breaks",
-        handed_on=True,
-    ),
-    "collisions_name_their_step": Probe(
-        "In which step is a collision reported?",
-        collisions_name_their_step,
-        "breaks",
-        handed_on=True,
-    ),
-    "impulse_is_reported": Probe(
-        "Which impulse is reported for a collision? (N s)",
-        impulse_is_reported,
-        "breaks",
-        handed_on=True,
-    ),
-    "static_stays": Probe(
-        "Does a static disk that is struck and under a force stay?",
-        static_stays,
-        "breaks",
-        handed_on=True,
+    "static_stays": _HandedOn(
+        "Does a static disk that is struck and under a force stay?", static_stays
     ),
 }

@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.conformance import physics
-from adapters.conformance.probe import DT, head_on, loaded, scene_of
+from adapters.conformance.probe import DT, collided, head_on, loaded, scene_of
 from adapters.engine import Unsupported
 from adapters.engine_row import FLOAT32, EngineRow
 from adapters.engines import ENGINES, FETCHED
@@ -80,10 +80,7 @@ def elastic_energy(row: EngineRow) -> float:
 def lever(row: EngineRow) -> float:
     """The lever arm by which friction turns a disk in a bounce, in radii."""
     scene = replace(head_on(2.0, spin=40.0), friction=physics.FRICTION)
-    with loaded(row, scene) as engine:
-        before = engine.read()
-        engine.step(24)
-        after = engine.read()
+    before, after = collided(row, scene)
     taken = scene.mass[1] * float((after.velocity - before.velocity)[1, 1])
     turned = scene.inertia[1] * float((after.angular_velocity - before.angular_velocity)[1])
     return abs(turned / taken) / float(scene.radius[1]) if taken else float("nan")
@@ -100,11 +97,7 @@ def scaled(row: EngineRow, scale: float) -> float:
         radius=scale * scene.radius,
         inertia=scale**2 * scene.inertia,
     )
-    with loaded(row, small) as engine:
-        before = engine.read().velocity
-        engine.step(24)
-        after = engine.read().velocity
-    return float((after[2] - after[1])[0] / (before[1] - before[2])[0])
+    return physics.pair_restitution(row, small)
 
 
 def reading(probe: str) -> Callable[[EngineRow], float]:

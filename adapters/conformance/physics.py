@@ -13,6 +13,7 @@ from adapters.conformance.probe import (
     DT,
     Probe,
     ProbeReading,
+    collided,
     head_on,
     largest,
     loaded,
@@ -22,6 +23,7 @@ from adapters.conformance.probe import (
 )
 from adapters.engine_row import EngineRow
 from adapters.friction import Frictionless
+from scenarios.model import Scene
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
 FRICTION = 0.2  # that the scenes of the probes of friction state
@@ -96,10 +98,7 @@ def pair_momentum(row: EngineRow) -> ProbeReading:
         mass=[1.0, 7.0],
         angular_velocity=[3.0, -2.0],
     )
-    with loaded(row, *without_spin_and_gravity(scene)) as engine:
-        before = engine.read().velocity
-        engine.step(24)
-        after = engine.read().velocity
+    before, after = (state.velocity for state in collided(row, *without_spin_and_gravity(scene)))
     if np.abs(after - before).max() < 0.1:
         return ProbeReading("no collision", 0.0)
     change = largest(scene.mass @ (after - before)) / float(scene.mass @ np.hypot(*before.T))
@@ -107,14 +106,14 @@ def pair_momentum(row: EngineRow) -> ProbeReading:
 
 
 def restitution(row: EngineRow, closing: float) -> ProbeReading:
-    """Separation over approach speed of two equal disks that meet head-on, e = 0.5."""
-    with loaded(row, head_on(closing)) as engine:
-        before = engine.read().velocity
-        engine.step(24)
-        after = engine.read().velocity
-    return ProbeReading(
-        float((after[2] - after[1])[0] / (before[1] - before[2])[0]), 0.5, ROUNDINGS * row.rounding
-    )
+    """The restitution of two equal disks that meet head-on, e = 0.5."""
+    return ProbeReading(pair_restitution(row, head_on(closing)), 0.5, ROUNDINGS * row.rounding)
+
+
+def pair_restitution(row: EngineRow, scene: Scene) -> float:
+    """Separation over approach speed of the two disks of `head_on`."""
+    before, after = (state.velocity for state in collided(row, scene))
+    return float((after[2] - after[1])[0] / (before[1] - before[2])[0])
 
 
 def wall_restitution(row: EngineRow) -> ProbeReading:
@@ -134,15 +133,17 @@ def wall_restitution(row: EngineRow) -> ProbeReading:
 
 
 def friction(row: EngineRow) -> ProbeReading:
-    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin
-    fast: the effective coefficient of friction while they slide. Frictionless, the sideways part is
-    0 and is not even rounded.
-    """
-    with loaded(row, head_on(2.0, spin=40.0)) as engine:
-        before = engine.read().velocity[1]
-        engine.step(24)
-        taken = engine.read().velocity[1] - before
-    return ProbeReading(float(abs(taken[1] / taken[0])) if taken[0] else np.nan, 0.0, row.rounding)
+    """The friction of a collision where none is stated: the sideways part is 0, and not even
+    rounded."""
+    return ProbeReading(sideways(row, head_on(2.0, spin=40.0)), 0.0, row.rounding)
+
+
+def sideways(row: EngineRow, scene: Scene) -> float:
+    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin so
+    fast that they slide all through it: the effective coefficient of friction."""
+    before, after = collided(row, scene)
+    taken = (after.velocity - before.velocity)[1]
+    return float(abs(taken[1] / taken[0])) if taken[0] else np.nan
 
 
 def where_modelled(read: Callable[..., ProbeReading]) -> Callable[..., ProbeReading]:
@@ -160,15 +161,9 @@ def where_modelled(read: Callable[..., ProbeReading]) -> Callable[..., ProbeRead
 
 @where_modelled
 def friction_in_bounce(row: EngineRow, restitution: float) -> ProbeReading:
-    """Sideways over normal momentum taken up by a disk in a head-on collision of two that spin so
-    fast that they slide all through it."""
+    """The friction of a collision where some is stated."""
     scene = replace(head_on(2.0, spin=40.0), restitution=restitution, friction=FRICTION)
-    with loaded(row, scene) as engine:
-        before = engine.read().velocity[1]
-        engine.step(24)
-        taken = engine.read().velocity[1] - before
-    ratio = float(abs(taken[1] / taken[0])) if taken[0] else np.nan
-    return ProbeReading(ratio, FRICTION, ROUNDINGS * row.rounding)
+    return ProbeReading(sideways(row, scene), FRICTION, ROUNDINGS * row.rounding)
 
 
 @where_modelled
@@ -194,54 +189,44 @@ def friction_at_rest(row: EngineRow) -> ProbeReading:
     return ProbeReading((early - late) / (gravity * steps * DT), FRICTION, bound)
 
 
+_Physics = partial(Probe, failure="departs")
 PHYSICS: dict[str, Probe] = {
-    "free_flight": Probe(
-        "How far is a thrown disk from the parabola after 1 s? (m)", free_flight, "departs"
+    "free_flight": _Physics(
+        "How far is a thrown disk from the parabola after 1 s? (m)", free_flight
     ),
-    "slow_flight": Probe(
-        "How fast is a free disk of 3.9 mm/s after 2 s? (m/s)", slow_flight, "departs"
+    "slow_flight": _Physics("How fast is a free disk of 3.9 mm/s after 2 s? (m/s)", slow_flight),
+    "fast_flight": _Physics("How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight),
+    "fast_spin": _Physics(
+        "How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin
     ),
-    "fast_flight": Probe(
-        "How fast is a free disk of 512 m/s after 4 steps? (m/s)", fast_flight, "departs"
+    "spins_freely": _Physics(
+        "What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely
     ),
-    "fast_spin": Probe(
-        "How fast does a free disk of 300 rad/s spin after 4 steps? (rad/s)", fast_spin, "departs"
-    ),
-    "spins_freely": Probe(
-        "What angle has a free disk after 1 s at 20 rad/s? (rad)", spins_freely, "departs"
-    ),
-    "pair_momentum": Probe(
-        "How much momentum does a collision of two disks make? (of sum m v)",
-        pair_momentum,
-        "departs",
+    "pair_momentum": _Physics(
+        "How much momentum does a collision of two disks make? (of sum m v)", pair_momentum
     ),
     **{
-        f"restitution_{speed:g}": Probe(
+        f"restitution_{speed:g}": _Physics(
             f"What is e of a pair that closes at {speed:g} m/s, where 0.5 is stated?",
             partial(restitution, closing=speed),
-            "departs",
         )
         for speed in SPEEDS
     },
-    "restitution_wall": Probe(
-        "What is e of a wall collision at 2 m/s, where 0.5 is stated?", wall_restitution, "departs"
+    "restitution_wall": _Physics(
+        "What is e of a wall collision at 2 m/s, where 0.5 is stated?", wall_restitution
     ),
-    "friction": Probe(
-        "What coefficient of friction acts between two disks, where none is stated?",
-        friction,
-        "departs",
+    "friction": _Physics(
+        "What coefficient of friction acts between two disks, where none is stated?", friction
     ),
     **{
-        f"friction_{e:g}": Probe(
+        f"friction_{e:g}": _Physics(
             f"What friction acts in a bounce with e = {e:g}, where {FRICTION} is stated?",
             partial(friction_in_bounce, restitution=e),
-            "departs",
         )
         for e in (0.0, 0.5, 1.0)
     },
-    "friction_at_rest": Probe(
+    "friction_at_rest": _Physics(
         f"What friction brakes a disk that slides on a floor, where {FRICTION} is stated?",
         friction_at_rest,
-        "departs",
     ),
 }

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from adapters.engine import SILENT, Engine, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.first_collisions import first_collisions
-from scenarios.model import Array, Scene, frozen
+from scenarios.model import Array, Scene, State, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states
 DT = 1 / 256  # s; a power of two, so that multiples of it are exact
@@ -64,6 +64,14 @@ def loaded(row: EngineRow, *scenes: Scene, dt: float = DT) -> Iterator[Engine]:
     with closing(row.make()) as engine:
         load_first(engine, scenes, dt)
         yield engine
+
+
+def collided(row: EngineRow, *scenes: Scene) -> tuple[State, State]:
+    """The states before and after 24 steps of a scene, as `loaded`, whose disks meet in them."""
+    with loaded(row, *scenes) as engine:
+        before = engine.read()
+        engine.step(24)
+        return before, engine.read()
 
 
 def load_first(engine: Engine, scenes: Sequence[Scene], dt: float) -> Scene:

@@ -6,6 +6,7 @@ It has no step size and no tolerance: contact times are roots, flights are parab
 
 from __future__ import annotations
 
+from collections import defaultdict
 from fractions import Fraction
 from typing import Any
 
@@ -51,6 +52,10 @@ SLOWEST = 0.9999  # up to this restitution the bounces of a disk are played unti
 # a factor above rounding: cells are wider than the largest disk, so that contacts are always in
 # neighbouring cells
 WIDER = 1 + 1e-9
+# relative to the largest coordinate, a few units in the last place: how far rounding moves the ends
+# of two walls off their line; and the largest angle, rad, between two walls of one surface
+ROUNDED, STRAIGHT = 2.0**-50, 1e-12
+Line = tuple[Fraction | None, Fraction]  # a key of `line_of`
 
 
 class EventEngine:
@@ -322,22 +327,54 @@ def walls_of(scene: Scene, grid: Grid, low: Array) -> Walls:
 
 
 def surfaces(walls: Array) -> NDArray[np.int64]:
-    """(w,) the number of the surface that each wall belongs to, as in `Walls`; exact, in
-    rationals."""
-    number, low, high = np.arange(len(walls)), walls.min(axis=1), walls.max(axis=1)
-    for w, one in enumerate(walls):
-        # most walls lie elsewhere: only the others are compared in rationals
-        near = (low[:w] <= high[w]).all(axis=1) & (low[w] <= high[:w]).all(axis=1)
-        for k in np.flatnonzero(near & (number[:w] != number[w])):
-            if number[k] != number[w] and joined(one, walls[k]):
-                number[number == number[w]] = number[k]
+    """(w,) the surface that each wall belongs to, as in `Walls`, named after one of its walls.
+
+    In line is exact, in rationals; of walls that share an end, also if only rounding keeps them
+    from it: else a resting disk would turn about the joint, or fall through it.
+    """
+    lines = defaultdict[Line, list[tuple[float, float, int]]](list)
+    for w, wall in enumerate(walls.tolist()):
+        line, axis = line_of(wall)
+        low, high = sorted(end[axis] for end in wall)
+        lines[line].append((low, high, w))
+    number = np.arange(len(walls))
+    for along in lines.values():
+        reach, first = -np.inf, -1
+        for low, high, w in sorted(along):
+            first = w if low > reach else first
+            number[w], reach = first, max(reach, high)
+    ending = defaultdict[tuple[float, ...], list[int]](list)
+    for w, wall in enumerate(walls.tolist()):
+        for end in wall:
+            ending[tuple(end)].append(w)
+    span = walls[:, 1] - walls[:, 0]
+    heading = np.arctan2(span[:, 1], span[:, 0]) % np.pi
+    for there in ending.values():
+        around = sorted(there, key=lambda w: heading[w])  # of many, neighbours alone are in line
+        for a, b in zip(around, [*around[1:], around[0]]):
+            if number[a] != number[b] and nearly_in_line(walls[a], walls[b]):
+                number[number == number[b]] = number[a]
     return number
 
 
-def joined(one: Array, other: Array) -> bool:
-    """Whether two walls (2, 2), whose extents in x and in y overlap or touch, lie in line."""
-    (px, py), (qx, qy), *ends = [[Fraction(x) for x in end.tolist()] for end in (*one, *other)]
-    return all((qx - px) * (y - py) == (qy - py) * (x - px) for x, y in ends)
+def nearly_in_line(one: Array, other: Array) -> bool:
+    """Whether two walls (2, 2) that share an end are in line but for the rounding of their ends, at
+    an angle that a disk cannot tell."""
+    (ax, ay), (bx, by) = (wall[1] - wall[0] for wall in (one, other))
+    across, lengths = abs(ax * by - ay * bx), (np.hypot(ax, ay), np.hypot(bx, by))
+    if across > STRAIGHT * lengths[0] * lengths[1]:
+        return False
+    return bool(across <= ROUNDED * np.abs([one, other]).max() * sum(lengths))
+
+
+def line_of(wall: list[list[float]]) -> tuple[Line, int]:
+    """A key for the line of a wall, the same for all walls on it: slope and intercept in rationals,
+    of x over y if it is upright; and the axis along which it extends."""
+    (px, py), (qx, qy) = [[Fraction(x) for x in end] for end in wall]
+    if px == qx:
+        return (None, px), 1
+    slope = (qy - py) / (qx - px)
+    return (slope, py - slope * px), 0
 
 
 def grid_of(scene: Scene, torus: Array | None, cell: float) -> tuple[Grid, Array]:

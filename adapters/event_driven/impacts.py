@@ -34,6 +34,7 @@ from adapters.event_driven.rest import (
     rests,
     second_wall,
     slow,
+    touched_part,
 )
 from adapters.event_driven.search import ROUNDING, image
 
@@ -156,6 +157,8 @@ def collide_with_wall(arena: Arena, i: int, w: int, part: int) -> int:
     slow.
     """
     a, walls, run = arena.disks[i], arena.walls, arena.runs[i]
+    if part > 0:
+        w, part = touched_part(walls, arena.grid, a, w, part)
     changed = a.last != -1 - w
     impulse = collide_wall(walls, a, w, part, arena.rules.restitution)
     rubs = arena.rules.friction > 0.0
@@ -175,14 +178,13 @@ def collide_with_wall(arena: Arena, i: int, w: int, part: int) -> int:
     if part == 0 and not rubs and (accumulates or trapped or (mixed and slow(a))):
         corner = second_wall(walls, arena.grid, a, w)
     may_rest = part == 0 and mixed and (walls_only or not trapped)
-    if may_rest and rests(walls, a, w, corner, accumulates, trapped):
-        if impulse == 0.0:  # a contact that begins without a collision
-            log_collision(arena, a.t, i, -1 - w, 0.0)
-        if rubs:
-            update_wall_friction(arena, i)
-        return GOES_ON
+    at_rest = may_rest and rests(walls, a, w, corner, accumulates, trapped)
     if rubs:
         update_wall_friction(arena, i)
+    if at_rest:
+        if impulse == 0.0:  # a contact that begins without a collision
+            log_collision(arena, a.t, i, -1 - w, 0.0)
+        return GOES_ON
     if trapped:
         set_end(arena, run.start, i, -1 - w)
     to_and_fro = False

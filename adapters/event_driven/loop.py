@@ -58,6 +58,7 @@ from adapters.event_driven.rest import (
     check_rest,
     next_in_line,
     normal_component,
+    rest_on,
     take_off,
     update_support,
 )
@@ -190,7 +191,10 @@ def leave(arena: Arena, i: int) -> int:
     a, w = arena.disks[i], int(arena.disks[i].wall)
     following = next_in_line(arena.walls, arena.grid, a)
     if following >= 0:
-        a.wall, a.count = following, a.count + 1
+        rest_on(arena.walls, a, following)
+        if arena.rules.friction > 0.0:
+            update_wall_friction(arena, i)
+        a.count += 1
         return GOES_ON
     speed2, press = (
         a.vx * a.vx + a.vy * a.vy,

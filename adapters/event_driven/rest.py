@@ -35,9 +35,8 @@ def outward(walls: Walls, a: Any, w: int) -> tuple[float, float]:
 @kernel
 def normal_component(walls: Walls, a: Any, w: int, x: float, y: float) -> float:
     """The component of a vector (x, y) along the normal of wall `w`, towards a disk."""
-    ux, uy = walls.segment[w, 2], walls.segment[w, 3]
-    above = (a.y - walls.segment[w, 1]) * ux - (a.x - walls.segment[w, 0]) * uy > 0.0
-    return y * ux - x * uy if above else x * uy - y * ux
+    nx, ny = outward(walls, a, w)
+    return nx * x + ny * y
 
 
 @kernel
@@ -135,18 +134,53 @@ def slow(a: Any) -> bool:
 
 
 @kernel
+def on_face(walls: Walls, a: Any, w: int) -> bool:
+    """Whether a disk touches the face of wall `w`: its foot lies on the wall, and its gap is below
+    the rounding error."""
+    ux, uy = walls.segment[w, 2], walls.segment[w, 3]
+    dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
+    beside = 0.0 <= dx * ux + dy * uy <= walls.segment[w, 4]
+    return beside and abs(dy * ux - dx * uy) - a.radius <= position_error(a)
+
+
+@kernel
 def second_wall(walls: Walls, g: Grid, a: Any, w: int) -> int:
     """Another wall whose face the disk touches and that makes a corner with wall `w`; -1: none."""
     c = a.cx * g.shape[1] + a.cy
     for at in range(walls.first[c], walls.first[c + 1]):
         k = walls.of[at]
         (nx, ny), (mx, my) = outward(walls, a, w), outward(walls, a, k)
-        dx, dy = a.x - walls.segment[k, 0], a.y - walls.segment[k, 1]
-        beside = 0.0 <= dx * walls.segment[k, 2] + dy * walls.segment[k, 3] <= walls.segment[k, 4]
-        corner = abs(nx * my - ny * mx) > ROUNDING
-        if k != w and beside and corner and dx * mx + dy * my - a.radius <= position_error(a):
+        if k != w and abs(nx * my - ny * mx) > ROUNDING and on_face(walls, a, k):
             return k
     return -1
+
+
+@kernel
+def touched_part(walls: Walls, g: Grid, a: Any, w: int, part: int) -> tuple[int, int]:
+    """What a disk that meets an end of wall `w` (part 1 its start, 2 its end) touches there, a wall
+    and its part: the face of a wall through this end, if the foot of the disk lies on that wall; or
+    the nearer end of `w`.
+
+    It meets that first; but for a foot within 1e-8 radii of the end both times are the same in
+    float64, and the normal of the end would be wrong by so much.
+    """
+    ux, uy, length = walls.segment[w, 2], walls.segment[w, 3], walls.segment[w, 4]
+    dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
+    nearer = 1 if 2.0 * (dx * ux + dy * uy) < length else 2
+    along = 0.0 if nearer == 1 else length
+    x, y = walls.segment[w, 0] + along * ux, walls.segment[w, 1] + along * uy
+    if (a.x - x) * a.vx + (a.y - y) * a.vy < 0.0:
+        part = nearer
+    rounding = ROUNDING * (abs(a.vx) + abs(a.vy))
+    c = a.cx * g.shape[1] + a.cy
+    for at in range(walls.first[c], walls.first[c + 1]):
+        k = walls.of[at]
+        ux, uy = walls.segment[k, 2], walls.segment[k, 3]
+        height = (y - walls.segment[k, 1]) * ux - (x - walls.segment[k, 0]) * uy
+        approaches = normal_component(walls, a, k, a.vx, a.vy) < -rounding
+        if abs(height) <= position_error(a) and approaches and on_face(walls, a, k):
+            return k, 0
+    return w, part
 
 
 @kernel

@@ -99,17 +99,21 @@ def wall_time(walls: Walls, a: Any, w: int, part: int, until: float) -> float:
     ux, uy, length = walls.segment[w, 2], walls.segment[w, 3], walls.segment[w, 4]
     dx, dy = a.x - walls.segment[w, 0], a.y - walls.segment[w, 1]
     noise = a.noise if a.last == -1 - w else 0.0
+    height, speed, acceleration = dy * ux - dx * uy, a.vy * ux - a.vx * uy, a.ay * ux - a.ax * uy
+    rounding = ROUNDING * (abs(dx) + abs(dy) + a.radius)
     if part > 0:
+        # After a collision at e = 0 it moves along the face, and so past the ends.
+        if abs(speed) < noise and abs(abs(height) - a.radius) < rounding:
+            return inf
         if part == 2:
             dx, dy = dx - length * ux, dy - length * uy
         return meeting(dx, dy, a.vx, a.vy, a.ax, a.ay, a.radius, noise, until)
     first = inf
-    height, speed, acceleration = dy * ux - dx * uy, a.vy * ux - a.vx * uy, a.ay * ux - a.ax * uy
     for side in (1.0, -1.0):
         gap, v, p = side * height - a.radius, side * speed, side * acceleration
         if noise > 0.0 and side * height > 0.0:
             # beyond the end of the wall it may be far below its line
-            if abs(gap) < ROUNDING * (abs(dx) + abs(dy) + a.radius):
+            if abs(gap) < rounding:
                 gap = 0.0
             if abs(v) < noise:
                 v = 0.0

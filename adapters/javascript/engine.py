@@ -77,12 +77,7 @@ class JavaScriptEngine:
         """Build a new world; raises `Unsupported` if a number of the scene overflows in float32,
         where the engine computes in it."""
         if self.float32:
-            fields = ("position", "velocity", "radius", "mass", "inertia", "angle", "walls")
-            must_fit(
-                **{name: getattr(scene, name) for name in fields},
-                angular_velocity=scene.angular_velocity,
-                gravity=scene.gravity,
-            )
+            must_fit(scene)
         self.scene, self.forces = scene, dict[int, Array]()
         self.log: list[ContactImpulse] = []
         self.steps, self.expected = 0, (0, 0)

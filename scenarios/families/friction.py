@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from scenarios.families.placing import box, lay_out, scatter
+from scenarios.families.placing import box, lay_out, scatter, tag
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.closed_forms import Collision, answer
 from scenarios.truth.exact import with_oracle
@@ -21,8 +21,6 @@ IMPACT = (
     " Allia, Phys. Fluids 6, 1108, 1994)"
 )
 ROLL = "sliding at mu g, then rolling (any textbook of mechanics)"
-TAG = {0.0: "e0", 0.5: "e05", 1.0: "e1"}
-MU_TAG = {0.1: "mu01", 0.5: "mu05"}
 
 
 def friction_bounce(restitution: float, friction: float) -> Scenario:
@@ -33,7 +31,7 @@ def friction_bounce(restitution: float, friction: float) -> Scenario:
     # disk.
     edge = 3 * mu * (1 + e) * fall
     return bounce_on_floor(
-        f"friction_bounce_{TAG[e]}_{MU_TAG[mu]}",
+        f"friction_bounce_{tag('e', e)}_{tag('mu', mu)}",
         f"Does a bounce at e = {e:g} and friction {mu:g} turn and brake disks, slipping and"
         " sticking, as Coulomb's law says?",
         along=np.array([0.0, 1.0, edge / 2, 5.0, 5.0, 6.0]),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scenarios.families.placing import lay_out
+from scenarios.families.placing import lay_out, tag
 from scenarios.model import Array, Scenario, Trajectory
 from scenarios.truth.closed_forms import Collision, Motion, answer, pair
 
@@ -15,7 +16,7 @@ SOURCE = (
     "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz,"
     " Mechanics, 17)"
 )
-TAG = {0.0: "e0", 0.5: "e05", 0.9: "e09", 1.0: "e1"}
+RESTITUTIONS = (0.0, 0.5, 0.9, 1.0)
 
 
 def _pairs(
@@ -56,7 +57,7 @@ def _pairs(
 def head_on_equal(restitution: float) -> Scenario:
     """Two equal disks, both moving, on one line."""
     return _pairs(
-        f"head_on_equal_{TAG[restitution]}",
+        f"head_on_equal_{tag('e', restitution)}",
         f"Do two equal disks separate after a head-on collision as e = {restitution:g} says?",
         position=[[-1.7, 0], [1.9, 0]],
         velocity=[[1.1, 0], [-0.7, 0]],
@@ -69,7 +70,7 @@ def head_on_equal(restitution: float) -> Scenario:
 def head_on_unequal(restitution: float) -> Scenario:
     """A light disk and one of seven times its mass, both moving, on one line."""
     return _pairs(
-        f"head_on_unequal_{TAG[restitution]}",
+        f"head_on_unequal_{tag('e', restitution)}",
         f"Do a light and a heavy disk share momentum in a head-on collision as e = {restitution:g}"
         " says?",
         position=[[-1.11, 0], [1.87, 0]],
@@ -84,7 +85,7 @@ def oblique(restitution: float) -> Scenario:
     """Two spinning disks that meet off centre: without friction the collision leaves the spin
     alone."""
     return _pairs(
-        f"oblique_{TAG[restitution]}",
+        f"oblique_{tag('e', restitution)}",
         f"Do two disks that meet off centre separate at the angles of e = {restitution:g}, their"
         " spin untouched?",
         position=[[-1.8, -0.1], [1.7, 0.2]],
@@ -145,19 +146,12 @@ def near_miss() -> Scenario:
     )
 
 
-PAIRS = (
-    partial(head_on_equal, 0.0),
-    partial(head_on_equal, 0.5),
-    partial(head_on_equal, 0.9),
-    partial(head_on_equal, 1.0),
-    partial(head_on_unequal, 0.0),
-    partial(head_on_unequal, 0.5),
-    partial(head_on_unequal, 0.9),
-    partial(head_on_unequal, 1.0),
-    partial(oblique, 0.0),
-    partial(oblique, 0.5),
-    partial(oblique, 0.9),
-    partial(oblique, 1.0),
+PAIRS: tuple[Callable[..., Scenario], ...] = (
+    *(
+        partial(build, e)
+        for build in (head_on_equal, head_on_unequal, oblique)
+        for e in RESTITUTIONS
+    ),
     mass_ratios,
     slow_collision,
     near_miss,

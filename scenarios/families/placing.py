@@ -16,6 +16,11 @@ def lay_out(**fields: Any) -> Scene:
     return Scene(**fields)
 
 
+def tag(letter: str, value: float) -> str:
+    """A number in the name of a scenario: "e09" for e = 0.9."""
+    return f"{letter}{value:g}".replace(".", "")
+
+
 def box(low: ArrayLike, high: ArrayLike) -> Array:
     """(4, 2, 2) m, the walls of a box from its low to its high corner: left, bottom, right, top."""
     (left, bottom), (right, top) = np.asarray(low, float), np.asarray(high, float)

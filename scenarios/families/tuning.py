@@ -13,7 +13,7 @@ import numpy as np
 
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import answer, at_rest, bouncing, flight
+from scenarios.truth.closed_forms import answer, at_rest, bouncing, flight, stacked
 from scenarios.truth.exact import with_oracle
 
 SAMPLE_INTERVAL = 1 / 60  # s
@@ -315,9 +315,8 @@ def column(rng: np.random.Generator, r: float, v: float) -> Scenario:
         walls=[[[-FAR * r, 0], [FAR * r, 0]]],
         restitution=0.0,
     )
-    contacts = [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(n - 1))]
     asked = posed("Does a column of disks stay as it is?", scene, 2.0)
-    return replace(asked, truth=lambda t: at_rest(scene, t, contacts))
+    return replace(asked, truth=lambda t: at_rest(scene, t, stacked(scene)))
 
 
 def sliding(_rng: np.random.Generator, r: float, v: float) -> Scenario:
@@ -336,7 +335,7 @@ def sliding(_rng: np.random.Generator, r: float, v: float) -> Scenario:
 
     def truth(t: Array) -> Trajectory:
         motion = flight(t[:, None, None], scene.position, scene.velocity, 0.6 * g * down)
-        return answer(scene, t, motion, [(0.0, 0, -1, 0.0)])
+        return answer(scene, t, motion, stacked(scene))
 
     return replace(
         posed("Does a disk slide down a smooth incline as it should?", scene, 1.0), truth=truth

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.families.placing import box, lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.model import Array, Scenario, Trajectory
 from scenarios.truth.closed_forms import (
-    Collision,
     answer,
     at_rest,
     bouncing,
     flight,
     offset_growth,
+    stacked,
     to_and_fro,
 )
 
@@ -209,7 +209,7 @@ def rest_on_floor() -> Scenario:
         scene=scene,
         duration=5.0,
         sample_interval=1 / 60,
-        truth=lambda t: at_rest(scene, t, _touching(scene)),
+        truth=lambda t: at_rest(scene, t, stacked(scene)),
     )
 
 
@@ -229,7 +229,7 @@ def slide_on_incline() -> Scenario:
 
     def truth(t: Array) -> Trajectory:
         motion = flight(t[:, None, None], scene.position, scene.velocity, 0.6 * G * down)
-        return answer(scene, t, motion, _touching(scene))
+        return answer(scene, t, motion, stacked(scene))
 
     return Scenario(
         name="slide_on_incline",
@@ -261,14 +261,8 @@ def column_of_ten() -> Scenario:
         scene=scene,
         duration=5.0,
         sample_interval=1 / 60,
-        truth=lambda t: at_rest(scene, t, _touching(scene)),
+        truth=lambda t: at_rest(scene, t, stacked(scene)),
     )
-
-
-def _touching(scene: Scene) -> list[Collision]:
-    """The contacts of disks stacked on wall 0: they act from t = 0 with a force, so with no
-    impulse."""
-    return [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(scene.n - 1))]
 
 
 WALLS = (

@@ -61,6 +61,12 @@ def at_rest(scene: Scene, t: Array, collisions: Iterable[Collision] = ()) -> Tra
     return answer(scene, t, (position, np.zeros_like(position)), collisions)
 
 
+def stacked(scene: Scene) -> list[Collision]:
+    """The contacts of disks stacked on wall 0: they act from t = 0 with a force, so with no
+    impulse."""
+    return [(0.0, 0, -1, 0.0), *((0.0, i, i + 1, 0.0) for i in range(scene.n - 1))]
+
+
 def flight(
     t: Array, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike = 0.0
 ) -> Motion:

@@ -166,14 +166,7 @@ def farthest(
     ]
     (end, error), path, bits = max(found, key=lambda one: one[0][0])
     if end < path.end or not path.reason:
-        path = replace(
-            path,
-            end=end,
-            reason=f"{clock.reason} at t = {end:.9g} s",
-            disks=[],
-            outcomes=[],
-            named=[],
-        )
+        path = path.cut(end, f"{clock.reason} at t = {end:.9g} s")
     return record_of(scenario, path, error, bits, "certified")
 
 
@@ -234,10 +227,10 @@ def two_precisions(
         diverged, error = difference(coarse, fine, until, kind(2 * bits), accuracy_of(scenario))
         end = min(coarse.end, fine.end, until)
         if clock.expired and coarse.end < fine.end:
-            fine = replace(fine, end=end, reason=coarse.reason, disks=[], outcomes=[], named=[])
+            fine = fine.cut(end, coarse.reason)
         if diverged < end:
             reason = f"numbers of {2 * bits} bits have used up their digits at t = {diverged:.9g} s"
-            fine = replace(fine, end=diverged, reason=reason, disks=[], outcomes=[])
+            fine = fine.cut(diverged, reason)
         attempts.append((fine, error, 2 * bits))
         if diverged >= end or 2 * bits >= MOST_BITS or clock.expired:
             break

@@ -67,10 +67,11 @@ class CollisionOrder:
 
     Attributes:
         end: s, of the path.
-        legs: (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time. begun: how many of
-            them have begun. now: (n, 8) the latest of those of each disk.
-        span, way: (w, 2) m and 1/m, each wall from its start to its end, and over its length
-            squared.
+        legs: (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time.
+        begun: how many of the legs have begun.
+        now: (n, 8) the latest leg of each disk that has begun.
+        span: (w, 2) m, each wall from its start to its end.
+        way: (w, 2) 1/m, `span` over its length squared.
     """
 
     def __init__(self, scenario: Scenario, path: Path, tangents: TangentVectors) -> None:

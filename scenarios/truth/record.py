@@ -11,6 +11,7 @@ import numpy as np
 from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
 from scenarios.truth.horizon import DIVERGED
+from scenarios.truth.oracle.bodies import nearest
 from scenarios.truth.oracle.path import Event, Path
 from scenarios.truth.order import float64_horizon
 
@@ -22,6 +23,10 @@ ROUNDINGS = 4 * EPS
 LEAST, LEAST_SHARE = 1e-4, 1e-2
 TOUCH = 1e-6  # m; a disk closer to a wall than this at the end may touch it
 NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
+# The columns of `TruthRecord.legs`; `NORMAL`, `SPEED` and `FALL` are of the bounces, `TURN` is
+# angle, spin and its rate.
+DISK, T, PLACE, VELOCITY, ACCELERATION = 0, 1, slice(2, 4), slice(4, 6), slice(6, 8)
+NORMAL, SPEED, FALL, TURN = slice(8, 10), 10, 11, slice(12, 15)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +74,11 @@ class TruthRecord:
         turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         angle, spin = turning.angle.copy(), turning.angular_velocity.copy()
         for i in range(scene.n):
-            legs = self.legs[self.legs[:, 0] == i]
-            leg = legs[np.maximum(np.searchsorted(legs[:, 1], t, side="right") - 1, 0)]
+            legs = self.legs[self.legs[:, DISK] == i]
+            leg = legs[np.maximum(np.searchsorted(legs[:, T], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
             if scene.friction:
-                angle[:, i], spin[:, i] = flight(t - leg[:, 1], *leg[:, 12:15].T)
+                angle[:, i], spin[:, i] = flight(t - leg[:, T], *leg[:, TURN].T)
         # A disk that rests on a wall from the start has a contact without impulse at t = 0. One
         # that comes to rest later is not listed: its contact began with a collision.
         collisions: list[Collision] = [
@@ -106,12 +111,12 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
     Bounce k begins s_k = 2 v (1 - e^k) / (g (1 - e)) after the first one at the speed v e^k; from 2
     v / (g (1 - e)) on there is none (any textbook of mechanics, under "bouncing ball").
     """
-    since, normal, speed = (t - leg[:, 1])[:, None], leg[:, 8:10], leg[:, 10:11]
-    v, a = leg[:, 4:6], leg[:, 6:8]
-    position, velocity = leg[:, 2:4] + (v + a * since / 2) * since, v + a * since
+    since, normal, speed = (t - leg[:, T])[:, None], leg[:, NORMAL], leg[:, SPEED, None]
+    v, a = leg[:, VELOCITY], leg[:, ACCELERATION]
+    position, velocity = leg[:, PLACE] + (v + a * since / 2) * since, v + a * since
     hops = speed[:, 0] > 0
     if hops.any():
-        e, s, u, g = restitution, since[hops], speed[hops], leg[hops, 11:12]
+        e, s, u, g = restitution, since[hops], speed[hops], leg[hops, FALL, None]
         done = np.minimum(s * g * (1 - e) / (2 * u), 1.0)  # of the time until it rests
         with np.errstate(divide="ignore"):
             k = np.floor(np.log1p(-done) / np.log(e))
@@ -158,7 +163,7 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         bits=bits,
         method=method,
         reason=path.reason,
-        float64_horizon=until,
+        float64_horizon=float(until),
         outcomes=frozen(np.array(outcomes).reshape(-1, 4)),
         orders=frozen(np.array(orders).reshape(-1, 3)),
         remains=tuple(remains(scenario.scene, legs, path.disks, end)) if path.disks else (),
@@ -181,7 +186,7 @@ def within_float64(scenario: Scenario, path: Path, error: float) -> Path:
         f"the rounding of float64 is more than {DIVERGED:g} of the smallest radius from t ="
         f" {held:.9g} s on"
     )
-    return replace(path, end=held, reason=reason, disks=[], outcomes=[], named=[])
+    return path.cut(held, reason)
 
 
 def last_time(holds: Callable[[float], bool], end: float) -> float:
@@ -213,16 +218,16 @@ def legs_of(path: Path, end: float) -> Array:
 def reach(legs: Array, until: float) -> float:
     """m, the length to which the rounding of float64 is relative up to `until` s: the largest
     coordinate plus the distance at the largest speed."""
-    begun = legs[:, 1] <= until
-    follows = np.append(legs[1:, 0] == legs[:-1, 0], False)
-    stop = np.minimum(np.where(follows, np.append(legs[1:, 1], until), until), until)
+    begun = legs[:, T] <= until
+    follows = np.append(legs[1:, DISK] == legs[:-1, DISK], False)
+    stop = np.minimum(np.where(follows, np.append(legs[1:, T], until), until), until)
     s, (x, v, a) = (
-        np.maximum(stop - legs[:, 1], 0.0)[:, None],
-        (legs[:, 2:4], legs[:, 4:6], legs[:, 6:8]),
+        np.maximum(stop - legs[:, T], 0.0)[:, None],
+        (legs[:, PLACE], legs[:, VELOCITY], legs[:, ACCELERATION]),
     )
     # the last term bounds the apex between the two ends
     far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8
-    speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, 10:11]
+    speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, SPEED, None]
     return float(far[begun].max() + until * speed[begun].max())
 
 
@@ -233,55 +238,55 @@ def _row(event: Event) -> list[float]:
 
 def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
     """The legs with bounces, each with the time, s, at which it ends."""
-    for k in np.flatnonzero(legs[:, 10] > 0):
-        follows = k + 1 < len(legs) and legs[k + 1, 0] == legs[k, 0]
-        yield legs[k], min(end, legs[k + 1, 1] if follows else np.inf)
+    for k in np.flatnonzero(legs[:, SPEED] > 0):
+        follows = k + 1 < len(legs) and legs[k + 1, DISK] == legs[k, DISK]
+        yield legs[k], min(end, legs[k + 1, T] if follows else np.inf)
 
 
 def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]]:
     """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last `LEAST` s,
     or `LEAST_SHARE` sample intervals, or more."""
     scene = scenario.scene
-    e, v, g, disk = scene.restitution, leg[10], leg[11], int(leg[0])
+    e, v, g, disk = scene.restitution, leg[SPEED], leg[FALL], int(leg[DISK])
     least = min(LEAST, LEAST_SHARE * scenario.sample_interval)
     count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
-    wall = wall_of_bounces(scene, leg)
     for k in range(1, count):
-        t = leg[1] + 2 * v / g * float(powers(e, k))
+        t = leg[T] + 2 * v / g * float(powers(e, k))
         if t >= stop:
             return
-        before = v * e ** (k - 1)
-        beside = np.hypot(*(leg[4:6] + leg[6:8] * (t - leg[1])))
+        place, sliding = flight(t - leg[T], leg[PLACE], leg[VELOCITY], leg[ACCELERATION])
+        before, beside = v * e ** (k - 1), np.hypot(*sliding)
         kick = scene.mass[disk] * (1 + e) * before
-        yield [t, disk, -1 - wall, kick, before / np.hypot(before, beside)]
+        yield [
+            t,
+            disk,
+            -1 - wall_of_bounces(scene, leg, place),
+            kick,
+            before / np.hypot(before, beside),
+        ]
 
 
-def wall_of_bounces(scene: Scene, leg: Array) -> int:
-    """The wall on which the disk of a leg bounces: the nearest one parallel to the leg."""
-    start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
-    length = np.hypot(*span.T)
-    share = np.clip(((leg[2:4] - start) * span).sum(axis=1) / length**2, 0, 1)
-    apart = np.hypot(*(leg[2:4] - start - share[:, None] * span).T) - scene.radius[int(leg[0])]
-    return int(np.argmin(np.abs(apart) + np.abs((span * leg[8:10]).sum(axis=1)) / length))
+def wall_of_bounces(scene: Scene, leg: Array, place: Array) -> int:
+    """The wall on which the disk of a leg bounces at `place` (2,) m: the nearest one parallel to
+    the leg."""
+    span, (_, distance) = scene.walls[:, 1] - scene.walls[:, 0], nearest(place[None], scene.walls)
+    slope = np.abs((span * leg[NORMAL]).sum(axis=1)) / np.hypot(*span.T)
+    return int(np.argmin(np.abs(distance[0] - scene.radius[int(leg[DISK])]) + slope))
 
 
 def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iterator[str]:
     """Sentences on what holds for these disks after the end: their momentum along the walls they
     touch, if all these are parallel, is conserved, and their energy does not grow."""
     ours = [i for i in sorted(set(disks)) if i < scene.n and not scene.static[i]]
-    last = [legs[(legs[:, 0] == i) & (legs[:, 1] <= end)][-1] for i in ours]
+    last = [legs[(legs[:, DISK] == i) & (legs[:, T] <= end)][-1] for i in ours]
     x, v = (
         np.array(part)
         for part in zip(*(along(leg[None], np.array([end]), scene.restitution) for leg in last))
     )
     x, v, mass = x[:, 0], v[:, 0], scene.mass[ours]
-    start, span = scene.walls[:, 0], scene.walls[:, 1] - scene.walls[:, 0]
-    share = ((x[:, None] - start) * span).sum(axis=-1) / (span**2).sum(axis=1)
-    apart = np.hypot(
-        *np.moveaxis(x[:, None] - start - np.clip(share, 0, 1)[..., None] * span, -1, 0)
-    )
-    touched = apart - scene.radius[ours][:, None] < TOUCH
-    near = span[touched.any(axis=0)]
+    share, distance = nearest(x, scene.walls)
+    touched = distance - scene.radius[ours][:, None] < TOUCH
+    near = (scene.walls[:, 1] - scene.walls[:, 0])[touched.any(axis=0)]
     names, they, their, touch = "disks " + ", ".join(map(str, ours)), "them", "their", "they touch"
     if len(ours) == 1:
         names, they, their, touch = f"disk {ours[0]}", "it", "its", "it touches"
@@ -312,6 +317,6 @@ def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iter
         )
     energy = (mass * (v**2).sum(axis=1)).sum() / 2
     if scene.friction:
-        spin = np.array([leg[13] + leg[14] * (end - leg[1]) for leg in last])
+        spin = np.array([flight(end - leg[T], *leg[TURN])[1] for leg in last])
         energy += (np.where(spin, scene.inertia[ours] * spin**2, 0.0)).sum() / 2
     yield f"{names}: {their} kinetic energy, {energy:.6g} J, can only fall{exception}"

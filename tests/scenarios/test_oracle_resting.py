@@ -306,6 +306,58 @@ def test_a_floor_of_pieces_is_a_floor(length: float, both: bool):
         np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_disk_that_passes_a_joint_in_its_bounces_rests_on_the_wall_beyond(turned: bool):
+    """At 4 m/s its bounces die out beyond the joint: it flies off the end of the floor as off that
+    of one piece, and each collision is with the wall below it."""
+    second = [[4, 0], [0, 0]] if turned else [[0, 0], [4, 0]]
+    scene = lay_out(
+        position=[[-1, 0.3125]],
+        velocity=[[4, 0]],
+        radius=[0.25],
+        mass=[1],
+        gravity=[0, -9.81],
+        restitution=0.5,
+        walls=[[[-4, 0], [4, 0]]],
+    )
+    whole, apart = (
+        asked(replace(scene, walls=walls), 2.0)
+        for walls in (scene.walls, [[[-4, 0], [0, 0]], second])
+    )
+    expected, found = states(whole, computed(whole)), states(apart, computed(apart))
+
+    assert len(found) == len(whole.times)
+    np.testing.assert_allclose(found.position, expected.position, rtol=0, atol=1e-14)
+    assert found.position[-1, 0, 1] < -1
+    places = -1 + 4 * found.collisions.t
+    assert (found.collisions.j == np.where(places < 0, -1, -2)).all()
+    assert {*found.collisions.j.tolist()} == {-1, -2}
+
+
+@pytest.mark.parametrize(
+    ("up", "words"), [(1, "slides off the end of wall 0"), (-1, "disk 0 on wall 1 accumulate")]
+)
+def test_a_truth_that_ends_at_a_joint_says_that_the_walls_are_not_in_line(up: int, words: str):
+    """A joint one unit in the last place off the line, as in a scene that was turned: a slow disk
+    turns about it, or bounces off the next wall; one wall instead of the two has an answer."""
+    joint = float(np.nextafter(0.7, up * np.inf))
+    scene = lay_out(
+        position=[[-1, 1]],
+        velocity=[[1, 0]],
+        radius=[0.25],
+        mass=[1],
+        gravity=[0, -9.81],
+        restitution=0.5,
+        walls=[[[-4, 0.7], [0.25, joint]], [[0.25, joint], [4, 0.7]]],
+    )
+    reason = computed(asked(scene, 2.0)).reason
+    one = replace(scene, walls=[[[-4, 0.7], [4, 0.7]]])
+
+    assert words in reason
+    assert reason.endswith("; walls 0 and 1 are in line but for rounding: write them as one wall")
+    assert computed(asked(one, 2.0)).reason == ""
+
+
 def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
     """Held by two walls, or balanced straight above a disk that cannot move."""
     wedge = lay_out(

@@ -333,6 +333,11 @@ class Bodies:
         px, py, tx, ty, _ = self.walls[wall]
         return tx * (x - px) + ty * (y - py)
 
+    def foot_on(self, wall: int, x: Number, y: Number) -> bool:
+        """Whether the foot of (x, y) lies on the wall, or on an end of it."""
+        foot, sign = self.foot(wall, x, y), self.k.sign
+        return sign(foot) >= 0 and sign(self.walls[wall].length - foot) >= 0
+
     def outward(self, contact: Contact, x: Number, y: Number) -> Number:
         """The part of a vector (x, y) away from the wall, on the contact's side."""
         _, _, tx, ty, _ = self.walls[contact.j]
@@ -369,6 +374,16 @@ def shape_of(row: Sequence[float]) -> int:
 def rational(vector: Array) -> tuple[Fraction, Fraction]:
     """The float64 numbers of a vector (2,) as exact fractions."""
     return Fraction(float(vector[0])), Fraction(float(vector[1]))
+
+
+def nearest(points: Array, walls: Array) -> tuple[Array, Array]:
+    """(p, w) each: where on each of the walls (w, 2, 2) the foot of each of the points (p, 2) lies,
+    from 0 at its start to 1 at its end, or beyond; and the distance, m, of the two."""
+    start, span = walls[:, 0], walls[:, 1] - walls[:, 0]
+    away = points[:, None] - start
+    share = (away * span).sum(axis=-1) / (span**2).sum(axis=-1)
+    dx, dy = np.moveaxis(away - np.clip(share, 0, 1)[..., None] * span, -1, 0)
+    return share, np.hypot(dx, dy)
 
 
 def square_to(wall: Array, tip: Array, foot: Array | None = None) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.truth.oracle.bodies import STATIC, Bodies, rational
+from scenarios.truth.oracle.bodies import Bodies, rational
 from scenarios.truth.oracle.contacts import Pressed, crossing, falling_meeting, meeting
 from scenarios.truth.oracle.filter import soonest, touching
 from scenarios.truth.oracle.numbers import Number
@@ -144,11 +144,7 @@ class ContactFinder:
     def _time_to_wall(self, contact: Contact, now: Number) -> Number | None:
         bodies, i, leg = self.bodies, contact.i, self.bodies.legs[contact.i]
         x, y, u, v = bodies.state_at(i, now)
-        fall = (
-            self.k.exact(0.0)
-            if bodies.kind[i] == STATIC
-            else bodies.outward(contact, leg.ax, leg.ay)
-        )
+        fall = bodies.outward(contact, leg.ax, leg.ay)
         leans = contact in bodies.leaning[i] and leg.t is now
         gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
         try:
@@ -160,9 +156,7 @@ class ContactFinder:
         if after is None:
             return None
         x, y = x + (u + leg.ax * after / 2) * after, y + (v + leg.ay * after / 2) * after
-        foot = bodies.foot(contact.j, x, y)
-        past_end = self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
-        return None if past_end else after
+        return after if bodies.foot_on(contact.j, x, y) else None
 
     def _above(self, wall: int, x: Number, y: Number, u: Number, v: Number) -> bool:
         """Whether the foot of a point (x, y) lies on the wall, and its velocity (u, v) does not
@@ -180,11 +174,7 @@ class ContactFinder:
         bodies, leg, wall = self.bodies, self.bodies.legs[contact.i], self.bodies.walls[contact.j]
         x, y, u, v = bodies.state_at(contact.i, now)
         foot, speed = bodies.foot(contact.j, x, y), wall.tx * u + wall.ty * v
-        acceleration = (
-            self.k.exact(0.0)
-            if bodies.kind[contact.i] == STATIC
-            else wall.tx * leg.ax + wall.ty * leg.ay
-        )
+        acceleration = wall.tx * leg.ax + wall.ty * leg.ay
         left = wall.length - foot if contact.side > 0 else foot
         return crossing(self.k, left, -contact.side * speed, -contact.side * acceleration)
 
@@ -203,9 +193,7 @@ class ContactFinder:
         assert self.scene.wrap is not None
         edge = self.k.exact(float(self.scene.wrap[1 if side > 0 else 0, axis]))
         state, leg = self.bodies.state_at(i, now), self.bodies.legs[i]
-        acceleration = (
-            self.k.exact(0.0) if self.bodies.kind[i] == STATIC else -side * (leg.ax, leg.ay)[axis]
-        )
+        acceleration = -side * (leg.ax, leg.ay)[axis]
         gap, speed = side * (edge - state[axis]), -side * state[2 + axis]
         # A centre at rest on an edge is not beyond it.
         if self.k.sign(gap) == 0 and self.k.sign(speed) == 0:
@@ -222,43 +210,38 @@ class ContactFinder:
         wall = bodies.walls[contact.j]
         return Touch(contact, contact.side * wall.ty, -contact.side * wall.tx)
 
+    def touching(self, i: int, now: float) -> list[Contact]:
+        """The contacts of disk i that may have no gap at `now` s, by float64."""
+        bodies = self.bodies
+        count = touching(
+            bodies.table, bodies.radii, bodies.asleep, self.scene.walls, i, now, self.codes
+        )
+        return [self.contact(i, code) for code in self.codes[:count].tolist()]
+
     def alone(self, contact: Contact, now: float) -> bool:
         """Whether the disks of a contact certainly touch nothing else."""
-        bodies, walls = self.bodies, self.scene.walls
-        for i in contact.disks:
-            count = touching(bodies.table, bodies.radii, bodies.asleep, walls, i, now, self.codes)
-            others = {key(self.contact(i, code)) for code in self.codes[:count].tolist()} - {
-                key(contact)
-            }
-            if others or bodies.held[i]:
-                return False
-        return True
+        return not any(
+            self.bodies.held[i] or {key(other) for other in self.touching(i, now)} - {key(contact)}
+            for i in contact.disks
+        )
 
     def near(self, i: int, now: Number, sure: Sequence[Contact] = ()) -> list[tuple[Contact, int]]:
         """The contacts of disk i that touch (0) or overlap (-1) now, except those in `sure`, which
         are known to touch."""
         bodies, found = self.bodies, list[tuple[Contact, int]]()
         x, y, _, _ = bodies.state_at(i, now)
-        walls, known = self.scene.walls, {key(contact) for contact in sure}
-        count = touching(
-            bodies.table, bodies.radii, bodies.asleep, walls, i, float(now), self.codes
-        )
-        for contact in [self.contact(i, code) for code in self.codes[:count].tolist()]:
+        known = {key(contact) for contact in sure}
+        for contact in self.touching(i, float(now)):
             if key(contact) in known:
                 continue
             if contact.kind == "body":
                 touch, reach = self.touch(contact, now), bodies.radius[i] + bodies.radius[contact.j]
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
-                past_end = False
+                within = True
             else:
-                gap, foot = (
-                    self.k.sign(bodies.height(contact, x, y) - bodies.radius[i]),
-                    bodies.foot(contact.j, x, y),
-                )
-                past_end = (
-                    self.k.sign(foot) < 0 or self.k.sign(bodies.walls[contact.j].length - foot) < 0
-                )
-            found += [(contact, gap)] if gap <= 0 and not past_end else []
+                gap = self.k.sign(bodies.height(contact, x, y) - bodies.radius[i])
+                within = bodies.foot_on(contact.j, x, y)
+            found += [(contact, gap)] if gap <= 0 and within else []
         return found
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:

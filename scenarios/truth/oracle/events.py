@@ -18,7 +18,14 @@ from scenarios.truth.oracle.contact_finder import ContactFinder, key
 from scenarios.truth.oracle.contacts import Pressed
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import Event, MotionEnds, Path, RecentCollisions, Record, ambiguous
-from scenarios.truth.oracle.resting import lie_down, next_in_line, press, settle
+from scenarios.truth.oracle.resting import (
+    below,
+    lie_down,
+    nearly_in_line,
+    next_in_line,
+    press,
+    settle,
+)
 from scenarios.truth.oracle.ties import Collision, Contact, TieOutcome, Touch, Velocities
 from scenarios.truth.oracle.work import WorkLimit
 
@@ -60,7 +67,8 @@ class Motion:
             while self.advance():
                 self.work.step(float(self.now), self.k.bits)
         except MotionEnds as end:
-            self.path.end, self.path.reason = end.t, str(end)
+            advice = [nearly_in_line(self.finder, i, float(self.now)) for i in end.disks[:1]]
+            self.path.end, self.path.reason = end.t, "".join([str(end), *advice])
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
             self.path.named = [
                 [self.bodies.pair(collision.contact) for collision in one.collisions]
@@ -317,7 +325,7 @@ class Motion:
     def stop(self, contact: Contact) -> None:
         """Let a disk rest on a wall on which its bounces have died out."""
         bodies, i = self.bodies, contact.i
-        wall = contact._replace(kind="wall")
+        wall = below(self.finder, contact._replace(kind="wall"), self.now)
         bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now), True)
         self.rest(wall)
         self.follow_up({i})

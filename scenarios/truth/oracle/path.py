@@ -75,6 +75,10 @@ class Path:
     outcomes: list[TieOutcome] = field(default_factory=list)
     named: list[list[tuple[int, int]]] = field(default_factory=list)
 
+    def cut(self, end: float, reason: str) -> Path:
+        """The motion up to an earlier end, for another reason."""
+        return Path(self.legs, self.events, end, reason)
+
 
 class RecentCollisions:
     """The latest collisions of each disk of a scene.
