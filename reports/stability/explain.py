@@ -79,12 +79,10 @@ def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Lim
     tests = []
     if reason.predicts is not None and brackets(limit, reason.predicts):
         tests.append(f"predicts {reason.predicts:.4g}")
-    if (
-        reason.variant != limit.engine
-        and (other := by_name.get((limit.case, reason.variant)))
-        and farther(other, limit)
-    ):
-        tests.append(f"{reason.variant} gets farther")
+    variant = reason.variant_of(limit.engine)
+    other = by_name.get((limit.case, variant))
+    if other and farther(other, limit):
+        tests.append(f"{variant} gets farther")
     if limit.failing is not None and limit.failing.broken == "refused":
         tests.append(SAYS_SO)
     return tests
