@@ -20,7 +20,6 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.closed_forms import answer, flight, pair
 
-FAMILY = "One collision"
 RADIUS, DT = 0.25, 1 / 64
 LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it
 # runs at a value, each with the collision elsewhere in its step: a run is a millisecond
@@ -138,10 +137,8 @@ def with_restitution(x: float, run: int) -> Scenario:
 COLLISIONS = (
     Case(
         "tunnelling_head_on",
-        FAMILY,
         "How far may a disk fly in a step without missing a disk head-on?",
         "v dt / R",
-        "1",
         FAST,
         at_speed,
         COLLISIONS_MISSED,
@@ -150,11 +147,9 @@ COLLISIONS = (
     ),
     Case(
         "tunnelling_offset",
-        FAMILY,
         "How far may a disk fly in a step without missing a disk off centre, by 0.7 of the sum of"
         " the radii?",
         "v dt / R",
-        "1",
         FAST,
         partial(at_speed, offset=0.7),
         COLLISIONS_MISSED,
@@ -163,10 +158,8 @@ COLLISIONS = (
     ),
     Case(
         "tunnelling_thin_wall",
-        FAMILY,
         "How far may a disk fly in a step without missing a wall?",
         "v dt / R",
-        "1",
         FAST,
         wall_at_speed,
         COLLISIONS_MISSED,
@@ -175,10 +168,8 @@ COLLISIONS = (
     ),
     Case(
         "tunnelling_thick_wall",
-        FAMILY,
         "How far may a disk fly in a step without missing a static disk of ten radii?",
         "v dt / R",
-        "1",
         FAST,
         thick_wall,
         COLLISIONS_MISSED,
@@ -187,10 +178,8 @@ COLLISIONS = (
     ),
     Case(
         "grazing",
-        FAMILY,
         "How near to grazing may a collision at v dt / R = 0.2 be and still be found?",
         "1 - b / 2R",
-        "1",
         (0.5, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4),
         grazing,
         COLLISIONS_MISSED,
@@ -199,10 +188,8 @@ COLLISIONS = (
     ),
     Case(
         "near_miss",
-        FAMILY,
         "How near may a disk pass at v dt / R = 0.2 without a collision?",
         "b / 2R - 1",
-        "1",
         (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5),
         near_miss,
         COLLISIONS_SPURIOUS,
@@ -210,21 +197,18 @@ COLLISIONS = (
     ),
     Case(
         "slow_collision",
-        FAMILY,
         "How slow may a collision at e = 1 be and still be elastic?",
         "closing speed",
-        "m/s",
         (8.0, 4.0, 2.0, 1.41, 0.7, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3),
         slow,
         RESTITUTION_OFF,
+        unit="m/s",
         runs=PHASES,
     ),
     Case(
         "restitution",
-        FAMILY,
         "Is a collision at 4 m/s played with the e that the scene states?",
         "1 - e",
-        "1",
         (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0),
         lambda x, run: with_restitution(1 - x, run),
         RESTITUTION_OFF,
@@ -232,10 +216,8 @@ COLLISIONS = (
     ),
     Case(
         "mass_ratio",
-        FAMILY,
         "How unequal may two masses be that meet at e = 1?",
         "m2 / m1",
-        "1",
         (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8),
         unequal,
         VELOCITY_OFF,

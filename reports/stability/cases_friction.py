@@ -22,7 +22,6 @@ from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.truth.closed_forms import at_rest
 from scenarios.truth.sliding import bounce, slide, spinning_pair
 
-FAMILY = "Friction"
 RADIUS, SOLID, G = 0.25, 2.0, 10.0  # SOLID: m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped
 # A step displacement of 0.05 radii: an engine that takes its lever arm to the middle of the overlap
@@ -173,10 +172,8 @@ def in_corner(x: float, _run: int) -> Scenario:
 FRICTION = (
     Case(
         "friction_in_bounce",
-        FAMILY,
         "Up to which e does friction in a bounce follow Coulomb's law?",
         "e",
-        "1",
         (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0),
         cone,
         FRICTION_OFF,
@@ -185,10 +182,8 @@ FRICTION = (
     ),
     Case(
         "strong_friction",
-        FAMILY,
         "How large may friction be where the rim sticks in a bounce?",
         "friction",
-        "1",
         (0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8),
         strong,
         FRICTION_OFF,
@@ -197,22 +192,19 @@ FRICTION = (
     ),
     Case(
         "spin_in_bounce",
-        FAMILY,
         "How fast may a disk spin that falls onto a floor with friction?",
         "w dt",
-        "rad",
         (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
         whirling,
         FRICTION_OFF,
+        unit="rad",
         runs=PHASES,
         also=WITH_FRICTION_ONLY,
     ),
     Case(
         "friction_mass_ratio",
-        FAMILY,
         "How unequal may two masses be that exchange spin?",
         "m2 / m1",
-        "1",
         (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8),
         spinning_into,
         FRICTION_OFF,
@@ -221,10 +213,8 @@ FRICTION = (
     ),
     Case(
         "slide_to_roll",
-        FAMILY,
         "How far may a disk slide in a step and still come to roll at 2/3 of its speed?",
         "v dt / R",
-        "1",
         (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
         sliding,
         ROLLING_OFF,
@@ -233,10 +223,8 @@ FRICTION = (
     ),
     Case(
         "critical_slope",
-        FAMILY,
         "How near to the steepest slope for rolling does a disk still roll?",
         "1 - tan(angle) / 3 mu",
-        "1",
         (0.9, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5),
         nearly_slipping,
         SLIPS,
@@ -244,10 +232,8 @@ FRICTION = (
     ),
     Case(
         "creep_at_rest",
-        FAMILY,
         "For how many steps does a disk stay at rest in a corner?",
         "steps",
-        "1",
         (100.0, 1e3, 1e4, 1e5),
         in_corner,
         CREEPS,

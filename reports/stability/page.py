@@ -18,6 +18,7 @@ from reports.page.documents import CHARTED, render
 from reports.page.links import neighbours
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
+from reports.stability.cases import FAMILY_OF
 from reports.stability.failures import kept_failure, near
 from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
 from reports.stability.maps import MAPS
@@ -115,7 +116,8 @@ def families_of(sections: Sequence[CaseSection]) -> dict[str, list[CaseSection]]
     """The headings with their sections, both in the order of first appearance."""
     found: dict[str, list[CaseSection]] = {}
     for section in sections:
-        found.setdefault(section.case.family, []).append(section)
+        family = FAMILY_OF.get(section.case.name, "A scene of your own")
+        found.setdefault(family, []).append(section)
     return found
 
 

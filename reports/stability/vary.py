@@ -18,8 +18,6 @@ from scenarios.files.scene_file import read_scene_file
 from scenarios.model import Array, Collisions, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.exact import with_oracle
 
-FAMILY = "A scene of your own"
-
 
 def at_speed(one: Scenario, x: float) -> Scenario:
     """All initial velocities and spins times x."""
@@ -184,12 +182,11 @@ def case_of_file(path: str, what: str) -> Case:
     meant = VARIES[what]
     return Case(
         f"{path}:{what}",
-        FAMILY,
         f"{one.name}: {one.asks}",
         meant.parameter,
-        meant.unit,
         meant.values or dense_ladder(one),
         partial(varied, path, what),
         USABLE,
+        meant.unit,
         also=WITH_FRICTION_ONLY if one.scene.friction else (),
     )
