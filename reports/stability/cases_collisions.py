@@ -64,8 +64,9 @@ def flyby(
     return stepped("flyby", asks, scene, dt, truth)
 
 
-def wall_collision(speed: float, run: int) -> Scenario:
-    """A disk flies at a wall, a segment without thickness through the origin."""
+def wall_at_speed(x: float, run: int) -> Scenario:
+    """A disk flies at a wall, a segment without thickness through the origin; x = v dt / R."""
+    speed = x * RADIUS / DT
     start = -RADIUS - speed * DT * (LEAD + phase(run))
     scene = lay_out(
         position=[[start, 0]],
@@ -87,11 +88,16 @@ def wall_collision(speed: float, run: int) -> Scenario:
 
 
 def stepped(
-    name: str, asks: str, scene: Scene, dt: float, truth: Callable[[Array], Trajectory]
+    name: str,
+    asks: str,
+    scene: Scene,
+    dt: float,
+    truth: Callable[[Array], Trajectory],
+    source: str = SOURCE,
 ) -> Scenario:
     """A scenario of a few steps, sampled at each of them."""
     steps = LEAD + 1 + AFTER
-    return Scenario(name, asks, SOURCE, scene, steps * dt, dt, (1,), truth=truth)
+    return Scenario(name, asks, source, scene, steps * dt, dt, (1,), truth=truth)
 
 
 def at_speed(x: float, run: int, offset: float = 0.0) -> Scenario:
@@ -104,11 +110,6 @@ def thick_wall(x: float, run: int) -> Scenario:
     return flyby(x * RADIUS / DT, run, mass=np.inf, radius=10 * RADIUS)
 
 
-def wall_at_speed(x: float, run: int) -> Scenario:
-    """x = v dt / R."""
-    return wall_collision(x * RADIUS / DT, run)
-
-
 def grazing(x: float, run: int) -> Scenario:
     """x = 1 - b / 2R, at v dt / R = 0.2."""
     return flyby(0.2 * RADIUS / DT, run, offset=1 - x)
@@ -119,19 +120,14 @@ def near_miss(x: float, run: int) -> Scenario:
     return flyby(0.2 * RADIUS / DT, run, offset=1 + x)
 
 
-def slow(x: float, run: int) -> Scenario:
-    """x = the closing speed in m/s, e = 1."""
-    return flyby(x, run)
-
-
 def unequal(x: float, run: int) -> Scenario:
     """A disk of mass 1 strikes a disk of mass x at rest, at v dt / R = 0.1."""
     return flyby(0.1 * RADIUS / DT, run, mass=x)
 
 
 def with_restitution(x: float, run: int) -> Scenario:
-    """A head-on collision at e = x and 4 m/s."""
-    return flyby(4.0, run, e=x)
+    """A head-on collision at e = 1 - x and 4 m/s."""
+    return flyby(4.0, run, e=1 - x)
 
 
 COLLISIONS = (
@@ -200,7 +196,7 @@ COLLISIONS = (
         "How slow may a collision at e = 1 be and still be elastic?",
         "closing speed",
         (8.0, 4.0, 2.0, 1.41, 0.7, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3),
-        slow,
+        flyby,
         RESTITUTION_OFF,
         unit="m/s",
         runs=PHASES,
@@ -210,7 +206,7 @@ COLLISIONS = (
         "Is a collision at 4 m/s played with the e that the scene states?",
         "1 - e",
         (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0),
-        lambda x, run: with_restitution(1 - x, run),
+        with_restitution,
         RESTITUTION_OFF,
         runs=PHASES,
     ),

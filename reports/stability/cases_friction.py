@@ -7,18 +7,18 @@ no collision here is followed by another, so that no rounding grows and the hori
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import ceil, hypot
 
 import numpy as np
 
+from reports.stability.cases_collisions import AFTER, LEAD, stepped
 from reports.stability.limits import Case
 from reports.stability.phases import phase
 from reports.stability.predicates_friction import CREEPS, FRICTION_OFF, ROLLING_OFF, SLIPS
 from reports.stability.variants import WITH_FRICTION_ONLY
 from scenarios.families.friction import IMPACT, ROLL, start_of, turning_answer
 from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.model import Array, Scenario, Trajectory
 from scenarios.truth.closed_forms import at_rest
 from scenarios.truth.sliding import bounce, slide, spinning_pair
 
@@ -27,7 +27,6 @@ FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shi
 # A step displacement of 0.05 radii: an engine that takes its lever arm to the middle of the overlap
 # is off by half of that at most.
 DT = 0.05 * RADIUS / FALL
-LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it
 PHASES = 8  # runs at a value, each with the collision elsewhere in its step
 FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
 REST_DT = 1 / 64
@@ -55,7 +54,8 @@ def rough_bounce(
         collision = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped("rough-bounce", "Does friction brake and turn the disk?", scene, truth)
+    asks = "Does friction brake and turn the disk?"
+    return stepped("rough-bounce", asks, scene, DT, truth, IMPACT)
 
 
 def spinning_into(x: float, run: int) -> Scenario:
@@ -77,12 +77,7 @@ def spinning_into(x: float, run: int) -> Scenario:
             scene, t, legs.at(t), [(float(legs.start[1]), 0, 1, float(impulse[0]))]
         )
 
-    return stepped("spinning-into", "Do they exchange spin and speed?", scene, truth)
-
-
-def stepped(name: str, asks: str, scene: Scene, truth: Callable[[Array], Trajectory]) -> Scenario:
-    """A scenario of a few steps, sampled at each of them."""
-    return Scenario(name, asks, IMPACT, scene, (LEAD + 1 + AFTER) * DT, DT, (1,), truth=truth)
+    return stepped("spinning-into", "Do they exchange spin and speed?", scene, DT, truth, IMPACT)
 
 
 def on_floor(

@@ -13,7 +13,6 @@ from typing import NoReturn
 import pandas as pd
 
 from adapters.engines import ENGINES, FETCHED, OWN, row_of
-from reports.page.style import number
 from reports.run.arguments import checked_engines, opening, unknown
 from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
 from reports.run.journal import Journal
@@ -22,6 +21,7 @@ from reports.run.runner import affordable
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
+from reports.stability.overview import in_words
 from reports.stability.page import write_page
 from reports.stability.results import (
     StabilityPlan,
@@ -195,10 +195,7 @@ def finish(results: StabilityResults, out: Path) -> NoReturn:
     """Print a table and where the page is; exit 1 if a task ended without a result."""
     print_limits(Console(), results.limits)
     Console().print(f"\n{(out / PAGE).resolve()}", style="bold", highlight=False, soft_wrap=True)
-    lost = [f"{one.case} on {one.engine}" for one in results.limits if one.status != "ok"]
-    lost += [f"{one.name} on {one.engine}" for one in results.maps if one.status != "ok"]
-    lost += [f"{one.name} on {one.engine}" for one in results.laws if one.status != "ok"]
-    if lost:
+    if lost := results.lost:
         say(f"no result: {', '.join(lost)}")
     sys.exit(FAILED if lost else DONE)
 
@@ -233,8 +230,3 @@ def label_of(name: str) -> str:
     unit = "" if case.unit == "1" else f", {case.unit}"
     shown = name if name in CASES else Path(name.rpartition(":")[0]).name
     return f"{shown}: {case.parameter}{unit}"
-
-
-def in_words(limit: Limit) -> str:
-    """The limit in a few characters."""
-    return limit.word or limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")

@@ -208,27 +208,31 @@ class StabilityResults(NamedTuple):
     laws: list[LawOf]
     header: dict[str, Any]
 
+    @property
+    def lost(self) -> list[str]:
+        """The tasks that ended without a result, as "NAME on ENGINE"."""
+        others: list[MapOf | LawOf] = [*self.maps, *self.laws]
+        return [f"{one.case} on {one.engine}" for one in self.limits if one.status != "ok"] + [
+            f"{one.name} on {one.engine}" for one in others if one.status != "ok"
+        ]
+
 
 def read(folder: Path) -> StabilityResults:
     """The stability report in a folder, in reading order; raises `ValueError` if its journal
     cannot be used."""
     headers, results = journalled(folder)
-    limits = [one for one in results.values() if isinstance(one, Limit)]
-    maps = [one for one in results.values() if isinstance(one, MapOf)]
-    laws = [one for one in results.values() if isinstance(one, LawOf)]
-    order = {name: k for k, name in enumerate(CASES)}
+    order = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
     engines = list(
         dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case, ENGINES))
     )
-    limits.sort(
-        key=lambda limit: (
-            order.get(limit.case, len(order)),
-            limit.case,
-            engines.index(limit.engine),
-        )
-    )
-    maps.sort(key=lambda one: (list(MAPS).index(one.name), engines.index(one.engine)))
-    laws.sort(key=lambda one: (list(TOUCHING).index(one.name), engines.index(one.engine)))
+
+    def place(task: Task) -> tuple[int, str, int]:
+        return order.get(task.name, len(order)), task.name, engines.index(task.engine)
+
+    ordered = [results[task] for task in sorted(results, key=place)]
+    limits = [one for one in ordered if isinstance(one, Limit)]
+    maps = [one for one in ordered if isinstance(one, MapOf)]
+    laws = [one for one in ordered if isinstance(one, LawOf)]
     return StabilityResults(explained(limits), maps, laws, headers[-1])
 
 
