@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reports.compare import laws
 from reports.stability.hard_disks import Gas, gas_in_box
-from reports.stability.predicates import Predicate, Reading, first_above, truth_of
+from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
 from scenarios.model import Array, Scenario, Trajectory
 
 BLOCKS = 10
@@ -24,11 +24,8 @@ RANGES = 5  # of speed, with equal numbers of disks
 def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     energy = laws.energy(played, scenario.scene)
     off = np.abs(energy / energy[0] - 1)
-    factor = energy[-1] / energy[0]
-    at = first_above(played.t, off, ENERGY_DRIFTS.bound)
-    return Reading(
-        float(off.max()), at, f"the energy is {factor:.4g} times that at the start", disk=-1
-    )
+    event = f"the energy is {energy[-1] / energy[0]:.4g} times that at the start"
+    return largest(played.t, off, ENERGY_DRIFTS.bound, event, disk=-1)
 
 
 def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
@@ -36,13 +33,8 @@ def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     momentum = (mass * velocity).sum(axis=1)
     whole = np.linalg.norm(mass * velocity[0], axis=1).sum()
     off = np.linalg.norm(momentum - momentum[0], axis=1) / whole
-    at = first_above(played.t, off, MOMENTUM_DRIFTS.bound)
-    return Reading(
-        float(off.max()),
-        at,
-        f"the momentum has changed by {off.max():.3g} of the sum of all momenta",
-        disk=-1,
-    )
+    event = f"the momentum has changed by {off.max():.3g} of the sum of all momenta"
+    return largest(played.t, off, MOMENTUM_DRIFTS.bound, event, disk=-1)
 
 
 def _gas_diverges(scenario: Scenario, played: Trajectory) -> Reading:
@@ -52,12 +44,8 @@ def _gas_diverges(scenario: Scenario, played: Trajectory) -> Reading:
     )
     off = drift.max(axis=1)
     worst = int(np.argmax(drift[-1]))
-    return Reading(
-        float(off.max()),
-        first_above(played.t, off, GAS_DIVERGES.bound),
-        f"disk {worst} is at another position",
-        disk=worst,
-    )
+    event = f"disk {worst} is at another position"
+    return largest(played.t, off, GAS_DIVERGES.bound, event, disk=worst)
 
 
 def in_blocks(series: Array) -> Array:

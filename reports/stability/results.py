@@ -113,16 +113,12 @@ class Task:
         """In the worker: do it, with the rows that the plan adds among the others; the first
         failing run at the limit is saved."""
         with taking_part(added):
-            return self.found(folder)
-
-    def found(self, folder: Path) -> Limit | MapOf | LawOf:
-        """What comes of it."""
-        if self.kind == "limit":
-            return found_limit(self, folder)
-        if self.kind == "law":
-            return law_of(self.name, self.engine)
-        started = process_time()
-        return replace(map_of(self.name, self.engine), seconds=process_time() - started)
+            if self.kind == "limit":
+                return found_limit(self, folder)
+            if self.kind == "law":
+                return law_of(self.name, self.engine)
+            started = process_time()
+            return replace(map_of(self.name, self.engine), seconds=process_time() - started)
 
 
 def case_named(name: str) -> Any:
@@ -148,8 +144,7 @@ def carry_out(
     named = [*plan.cases, *(name for name in plan.added if name not in FETCHED)]
     paths = [name.rpartition(":")[0] for name in named]
     files = {path: digest_of(path) for path in paths if path}
-    header = about(plan.command, 0)
-    header |= {"versions": plan.versions, "form": plan.form, "files": files}
+    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form, "files": files}
     journal.append({"header": header})
     with writing(folder, ["machine.json"]):
         put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
@@ -209,12 +204,9 @@ class StabilityResults(NamedTuple):
     header: dict[str, Any]
 
     @property
-    def lost(self) -> list[str]:
-        """The tasks that ended without a result, as "NAME on ENGINE"."""
-        others: list[MapOf | LawOf] = [*self.maps, *self.laws]
-        return [f"{one.case} on {one.engine}" for one in self.limits if one.status != "ok"] + [
-            f"{one.name} on {one.engine}" for one in others if one.status != "ok"
-        ]
+    def all(self) -> list[Limit | MapOf | LawOf]:
+        """The result of every task."""
+        return [*self.limits, *self.maps, *self.laws]
 
 
 def read(folder: Path) -> StabilityResults:
@@ -268,12 +260,10 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
 def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
     """As `impossible`, for a limit whose case is known; a scene file that has changed since is
     not checked."""
-    path = (
-        ""
-        if not isinstance(result, Limit) or result.case in CASES
-        else result.case.rpartition(":")[0]
-    )
-    if not isinstance(result, Limit) or (path and digest_of(path) != files[path]):
+    if not isinstance(result, Limit):
+        return ""
+    path = "" if result.case in CASES else result.case.rpartition(":")[0]
+    if path and digest_of(path) != files[path]:
         return ""
     return impossible(result, case_named(result.case))
 
@@ -317,10 +307,8 @@ def table(limits: Sequence[Limit]) -> pd.DataFrame:
 
 def row_of(limit: Limit) -> dict[str, Any]:
     """The limit as a row of limits.csv."""
-    case, failing = (
-        case_named(limit.case),
-        limit.failing or (limit.trials[0] if limit.status != "ok" else None),
-    )
+    case = case_named(limit.case)
+    failing = limit.failing if limit.status == "ok" else limit.trials[0]
     engine, profile = limit.engine.split(":")
     return {
         "engine": engine,
