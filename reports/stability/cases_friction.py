@@ -80,9 +80,7 @@ def spinning_into(x: float, run: int) -> Scenario:
     return stepped("spinning-into", "Do they exchange spin and speed?", scene, DT, truth, IMPACT)
 
 
-def on_floor(
-    asks: str, speed: float, friction: float, slope: float, dt: float, steps: int
-) -> Scenario:
+def on_floor(asks: str, speed: float, friction: float, slope: float, steps: int) -> Scenario:
     """A disk touches a floor and has no spin; gravity leans forward by `slope`, its tangent.
 
     A leaning gravity stands for a slope: so the disk touches the floor exactly in float64.
@@ -94,7 +92,7 @@ def on_floor(
         velocity=[[speed, 0.0]],
         radius=[RADIUS],
         mass=[1.0],
-        walls=[[[-10.0, 0.0], [10.0 + speed * steps * dt, 0.0]]],
+        walls=[[[-10.0, 0.0], [10.0 + speed * steps * REST_DT, 0.0]]],
         gravity=[G * sine, -G * cosine],
         restitution=0.0,
         friction=friction,
@@ -107,7 +105,8 @@ def on_floor(
         place[..., :2] += scene.position
         return turning_answer(scene, t, (place, moves), [(0.0, 0, -1, 0.0)])
 
-    return Scenario("on-floor", asks, ROLL, scene, steps * dt, dt, (1,), truth=truth)
+    duration = steps * REST_DT
+    return Scenario("on-floor", asks, ROLL, scene, duration, REST_DT, (1,), truth=truth)
 
 
 def cone(x: float, run: int) -> Scenario:
@@ -131,12 +130,12 @@ def sliding(x: float, run: int) -> Scenario:
     friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / REST_DT
     slides = speed / (3 * friction * G)
     steps = ceil(1.5 * slides / REST_DT) + AFTER
-    return on_floor("Does it come to roll?", speed, friction, 0.0, REST_DT, steps)
+    return on_floor("Does it come to roll?", speed, friction, 0.0, steps)
 
 
 def nearly_slipping(x: float, _run: int) -> Scenario:
     """x = 1 - tan(angle) / 3 mu: up to tan(angle) = 3 mu a solid disk rolls; friction 0.25, 1 s."""
-    return on_floor("Does it roll?", 0.0, 0.25, 3 * 0.25 * (1 - x), REST_DT, 64)
+    return on_floor("Does it roll?", 0.0, 0.25, 3 * 0.25 * (1 - x), 64)
 
 
 def in_corner(x: float, _run: int) -> Scenario:

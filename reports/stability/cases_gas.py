@@ -81,9 +81,9 @@ def maxwell(rng: Generator, mass: Array, speed: float) -> Array:
     return velocity
 
 
-def dense(x: float, run: int, step: float = STEP) -> Scenario:
+def dense(x: float, run: int) -> Scenario:
     """x = packing."""
-    return gas(x, run, rows=10, columns=10, steps=200, step=step)
+    return gas(x, run, rows=10, columns=10, steps=200)
 
 
 def coarse(x: float, run: int) -> Scenario:

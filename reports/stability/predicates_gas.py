@@ -75,15 +75,8 @@ def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
 def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
     collisions = played.collisions
     ought = literature(scenario)
-    parts = _speeds(played)
-    parts.append(
-        _deviation(
-            "rate",
-            counted(played, collisions.j >= 0, np.ones(len(collisions))),
-            ought.rate,
-            "Enskog's rate of collisions",
-        )
-    )
+    met = counted(played, collisions.j >= 0, np.ones(len(collisions)))
+    parts = [*_speeds(played), _deviation("rate", met, ought.rate, "Enskog's rate of collisions")]
     if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
         exchanged = counted(played, collisions.j < 0, collisions.impulse)
         parts.append(
@@ -111,11 +104,11 @@ def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Arr
     )
 
 
-def _deviation(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) -> Reading:
+def _deviation(what: str, blocks: Array, ought: float, whose: str) -> Reading:
     """The relative error of a mean, less `ERRORS` block errors, in units of `MOST_OFF`."""
     ratio, error = float(blocks.mean()) / ought, block_error(blocks) / ought
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
-    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=disk)
+    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=-1)
 
 
 def _speeds(played: Trajectory) -> list[Reading]:

@@ -28,7 +28,7 @@ from reports.run.worker_process import Failure
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, with_replays
 from reports.stability.failures import keep_failure
-from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, engines_of
+from reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
 from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import LimitSearch
@@ -121,7 +121,7 @@ class Task:
             return replace(map_of(self.name, self.engine), seconds=process_time() - started)
 
 
-def case_named(name: str) -> Any:
+def case_named(name: str) -> Case:
     """A case of the table, or of a scene file: FILE.toml:vary."""
     return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
 
