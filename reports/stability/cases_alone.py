@@ -4,6 +4,7 @@ another place."""
 from __future__ import annotations
 
 from contextlib import closing
+from functools import partial
 from math import sqrt
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from adapters.engine import Unsupported
 from adapters.run import Run, gather
 from adapters.runaway import fault_of
+from reports.stability.cases_collisions import of_pair
 from reports.stability.limits import Case
 from reports.stability.phases import EDGE, phase, sampled
 from reports.stability.predicates import (
@@ -22,8 +24,8 @@ from reports.stability.predicates import (
 )
 from reports.stability.variants import DrivenEngine, with_variant
 from scenarios.families.placing import lay_out
-from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
-from scenarios.truth.closed_forms import Collision, answer, bouncing, flight, pair
+from scenarios.model import NO_COLLISIONS, Array, Scenario, Scene, State, Trajectory
+from scenarios.truth.closed_forms import answer, bouncing, flight
 
 RADIUS, G = 0.25, 10.0
 HEIGHT = 1.25  # m, so that the fall lasts 0.5 s and ends at 5 m/s
@@ -85,12 +87,7 @@ def scaled(x: float, _run: int) -> Scenario:
         mass=[1.0, 1.0],
         restitution=1.0,
     )
-
-    def truth(t: Array) -> Trajectory:
-        legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, 1.0)
-        collisions: list[Collision] = [(float(legs.start[1]), 0, 1, float(impulse[0]))]
-        return answer(scene, t, legs.at(t), collisions)
-
+    truth = partial(of_pair, scene)
     return Scenario(
         "scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth
     )
@@ -101,11 +98,13 @@ def far(x: float, _run: int) -> Scenario:
     scene = lay_out(
         position=[[x, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0
     )
-
-    def truth(t: Array) -> Trajectory:
-        return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
-
+    truth = partial(of_free_disk, scene)
     return Scenario("far", "Does it fly on?", "x + v t", scene, 1.0, 1 / 30, (8,), truth=truth)
+
+
+def of_free_disk(scene: Scene, t: Array) -> Trajectory:
+    """The exact answer of a disk that meets nothing, at the times t (k,) s."""
+    return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
 
 
 def spinning(x: float, _run: int) -> Scenario:
@@ -119,10 +118,7 @@ def spinning(x: float, _run: int) -> Scenario:
         restitution=1.0,
         angular_velocity=[x / dt],
     )
-
-    def truth(t: Array) -> Trajectory:
-        return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
-
+    truth = partial(of_free_disk, scene)
     return Scenario(
         "spinning", "Does it turn as it spins?", "theta + w t", scene, 0.5, dt, (1,), truth=truth
     )

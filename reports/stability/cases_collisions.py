@@ -54,14 +54,16 @@ def flyby(
         mass=[1.0, mass],
         restitution=e,
     )
-
-    def truth(t: Array) -> Trajectory:
-        legs, impulse = pair(scene.position, scene.velocity, scene.radius, scene.mass, e)
-        collisions = [(float(at), 0, 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
-        return answer(scene, t, legs.at(t), collisions)
-
     asks = "Is the collision found?" if offset < 1 else "Is there a spurious collision?"
-    return stepped("flyby", asks, scene, dt, truth)
+    return stepped("flyby", asks, scene, dt, partial(of_pair, scene))
+
+
+def of_pair(scene: Scene, t: Array) -> Trajectory:
+    """The exact answer of two disks that meet once at most, at the times t (k,) s."""
+    position, velocity, radius, mass = scene.position, scene.velocity, scene.radius, scene.mass
+    legs, impulse = pair(position, velocity, radius, mass, scene.restitution)
+    collisions = [(float(at), 0, 1, float(kick)) for at, kick in zip(legs.start[1:], impulse)]
+    return answer(scene, t, legs.at(t), collisions)
 
 
 def wall_at_speed(x: float, run: int) -> Scenario:
