@@ -124,8 +124,7 @@ class AblatedReference(Reference):
             "substeps": self.substeps,
             "alpha": self.alpha,
             "friction": self.friction,
-        } | self.on._asdict()
-        return {
-            name: (value, value)
-            for name, value in (reported | {"order": ", ".join(self.order)}).items()
+            **self.on._asdict(),
+            "order": ", ".join(self.order),
         }
+        return {name: (value, value) for name, value in reported.items()}

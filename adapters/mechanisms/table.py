@@ -119,9 +119,12 @@ def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mec
     ]
 
 
-def _pymunk(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
-    from adapters.pymunk import Pymunk
+def _without(name: str, **changed: Any) -> Callable[[], Engine]:
+    """Makes the engine of a row with these changes."""
+    return partial(row_of(name).make, **changed)
 
+
+def _pymunk(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> list[Mechanism]:
     # Its bounce reverses any speed of a contact, also a separating one
     # (cpArbiterPreStep).
     impulse = {
@@ -134,95 +137,105 @@ def _pymunk(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str)
         "correction_share": 1.0 - reported["collision_bias"] ** dt,
         "slop": reported["collision_slop"],
     }
-    return [
+    uncorrected = _without(name, collision_bias=1.0)
+    found = [
         Mechanism(IMPULSE, impulse),
-        Mechanism(
-            POSITION_CORRECTION,
-            correction,
-            (IMPULSE,),
-            partial(Pymunk, profile, collision_bias=1.0),
-        ),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
     ]
-
-
-def _pymunk_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
-    from adapters.pymunk import Pymunk
-
-    as_stated = partial(Pymunk, "shipped", elasticity=float(np.sqrt(scene.restitution)))
-    rough = partial(Pymunk, "shipped", friction=float(np.sqrt(scene.friction)))
+    if name.endswith(":matched"):
+        return found
+    as_stated = _without(name, elasticity=float(np.sqrt(scene.restitution)))
+    rough = _without(name, friction=float(np.sqrt(scene.friction)))
     mixed = [Mechanism(FRICTION, {"friction": reported["friction of a pair"]}, without=rough)]
     return [
         Mechanism(RESTITUTION, {"mixing": "the product"}, without=as_stated),
-        *_pymunk(reported, scene, dt, "shipped"),
+        *found,
         *(mixed if scene.friction else []),
     ]
 
 
-def _box2d(reported: Mapping[str, Any], _scene: Scene, dt: float, profile: str) -> list[Mechanism]:
-    from adapters.box2d import Box2DEngine
+def _box2d(reported: Mapping[str, Any], scene: Scene, dt: float, name: str) -> list[Mechanism]:
+    cap = reported["speed cap in m/s"] * dt
+    return _as_box2d(
+        name,
+        reported,
+        scene,
+        threshold=reported["restitution threshold in m/s"],
+        slop=reported["linear slop in m"],
+        cap=cap,
+        most=0.1 * cap,  # b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap
+    )
 
+
+def _planck(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
+    return _as_box2d(
+        name,
+        reported,
+        scene,
+        threshold=reported["velocityThreshold"],
+        slop=reported["linearSlop"],
+        cap=reported["maxTranslation"],
+        most=reported["maxLinearCorrection"],
+    )
+
+
+def _as_box2d(
+    name: str,
+    reported: Mapping[str, Any],
+    scene: Scene,
+    *,
+    threshold: float,
+    slop: float,
+    cap: float,
+    most: float,
+) -> list[Mechanism]:
+    """The mechanisms of Box2D 2.3, in float32 and as planck in float64; what is compiled into the
+    one is a setting of the other."""
+    without, shipped = partial(_without, name), name.endswith(":shipped")
     velocity, position = (
         int(count) for count in reported["velocity, position iterations"].split(",")
     )
-    cap = reported["speed cap in m/s"] * dt
     impulse = {"order": BOX2D, "iterations": velocity, "touching": True, "cap": cap}
-    # b2_baumgarte 0.2; b2_maxLinearCorrection 0.2 is a tenth of b2_maxTranslation, the cap.
     correction = {
-        "correction_share": 0.2 if position else 0.0,
+        "correction_share": 0.2 if position else 0.0,  # b2_baumgarte
         "correction_iterations": position,
-        "slop": reported["linear slop in m"],
-        "correction_most": 0.1 * cap,
+        "slop": slop,
+        "correction_most": most,
     }
-    without = partial(Box2DEngine, profile, position_iterations=0, elastic_position_iterations=0)
-    return [
-        Mechanism(RESTITUTION, {"threshold": reported["restitution threshold in m/s"]}),
+    uncorrected = without(position_iterations=0, elastic_position_iterations=0)
+    unswept = {"continuous": False, "bullet": False}
+    unswept |= {f"elastic_{option}": value for option, value in unswept.items()}
+    found = [
+        Mechanism(RESTITUTION, {"threshold": threshold}),
         Mechanism(IMPULSE, impulse),
-        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), without),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
+        # Friction is solved before the normal impulse
+        # (b2ContactSolver::SolveVelocityConstraints).
+        *_friction(name, reported, scene, rub_first=True),
     ]
-
-
-def _box2d_matched(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
-    from adapters.box2d import Box2DEngine
-
-    unswept = partial(
-        Box2DEngine,
-        "matched",
-        continuous=False,
-        bullet=False,
-        elastic_continuous=False,
-        elastic_bullet=False,
-    )
-    swept = [Mechanism(SWEPT, without=unswept)] if reported["continuous collision"] else []
-    rubbed = _box2d_friction(reported) if scene.friction else []
-    return [*_box2d(reported, scene, dt, "matched"), *rubbed, *swept]
-
-
-def _box2d_friction(
-    reported: Mapping[str, Any], without: Callable[[], Engine] | None = None
-) -> list[Mechanism]:
-    # Where the two touch is in the middle of the gap (b2WorldManifold::Initialize); friction is
-    # solved before the normal impulse (b2ContactSolver::SolveVelocityConstraints).
-    rubs = {"friction": reported["friction"], "lever": 0.5, "rub_first": True}
-    return [Mechanism(FRICTION, rubs, (IMPULSE,), without)]
-
-
-def _box2d_shipped(reported: Mapping[str, Any], scene: Scene, dt: float) -> list[Mechanism]:
-    from adapters.box2d import Box2DEngine
-
-    shipped = partial(Box2DEngine, "shipped")
-    return [
-        *_box2d(reported, scene, dt, "shipped"),
-        *_box2d_friction(reported, None if scene.friction else partial(shipped, friction=0.0)),
+    if shipped:
         # b2_polygonRadius, which an edge has, too: twice the slop.
-        Mechanism(SKIN, {"skin": 2 * reported["linear slop in m"]}, (IMPULSE, POSITION_CORRECTION)),
-        Mechanism(
-            SWEPT,
-            without=partial(shipped, continuous=False, elastic_continuous=False, sleeping=False),
-        ),
-    ]
+        found.append(Mechanism(SKIN, {"skin": 2 * slop}, (IMPULSE, POSITION_CORRECTION)))
+        unswept["sleeping"] = False
+    if shipped or reported["continuous collision"]:
+        found.append(Mechanism(SWEPT, without=without(**unswept)))
+    return found
 
 
-def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Mechanism]:
+def _friction(name: str, reported: Mapping[str, Any], scene: Scene, **how: bool) -> list[Mechanism]:
+    """Friction of an engine that, as shipped, has some where the scene has none. Where the two
+    touch is in the middle of the gap (b2WorldManifold::Initialize, b2CollideCircles)."""
+    if not scene.friction and name.endswith(":matched"):
+        return []
+    rubs = {"friction": reported["friction"], "lever": 0.5, **how}
+    smooth = None if scene.friction else _without(name, friction=0.0)
+    return [Mechanism(FRICTION, rubs, (IMPULSE,), smooth)]
+
+
+def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
+    from adapters.box2d_v3 import MATCHED, SHIPPED
+
+    chosen: Mapping[str, Any] = SHIPPED if name.endswith(":shipped") else MATCHED
     # b2_speculativeDistance: four slops of 0.005 units.
     impulse = {
         "order": BOX2D_V3,
@@ -232,92 +245,35 @@ def _box2d_v3(reported: Mapping[str, Any], chosen: Mapping[str, Any]) -> list[Me
         "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }
-    return [
+    found = [
         Mechanism(IMPULSE, impulse),
         Mechanism(POSITION_CORRECTION, {"correction_speed": chosen["push_speed"]}, (IMPULSE,)),
+        # What the sweep for restitution adds to the normal impulse allows no more friction
+        # (b2ApplyRestitutionTask).
+        *_friction(name, reported, scene, rub_restituted=False),
     ]
-
-
-def _box2d_v3_friction(
-    reported: Mapping[str, Any], without: Callable[[], Engine] | None = None
-) -> list[Mechanism]:
-    # Where the two touch is in the middle of the gap (b2CollideCircles); what the sweep for
-    # restitution adds to the normal impulse allows no more friction (b2ApplyRestitutionTask).
-    rubs = {"friction": reported["friction"], "lever": 0.5, "rub_restituted": False}
-    return [Mechanism(FRICTION, rubs, (IMPULSE,), without)]
-
-
-def _box2d_v3_matched(reported: Mapping[str, Any], scene: Scene, _dt: float) -> list[Mechanism]:
-    from adapters.box2d_v3 import MATCHED
-
-    rubbed = _box2d_v3_friction(reported) if scene.friction else []
-    return [*_box2d_v3(reported, MATCHED), *rubbed]
-
-
-def _box2d_v3_shipped(reported: Mapping[str, Any], scene: Scene, _dt: float) -> list[Mechanism]:
-    from adapters.box2d_v3 import SHIPPED, Box2DV3
-
-    shipped = partial(Box2DV3, "shipped")
+    if name.endswith(":matched"):
+        return found
     # At the threshold itself it bounces, where Box2D 2.3 does not.
     threshold = float(
         np.nextafter(np.float32(reported["restitution threshold in m/s"]), np.float32(0))
     )
+    bouncing = _without(name, restitution_threshold=0.0)
     return [
-        Mechanism(
-            RESTITUTION,
-            {"threshold": threshold},
-            without=partial(shipped, restitution_threshold=0.0),
-        ),
-        *_box2d_v3(reported, SHIPPED),
-        *_box2d_v3_friction(reported, None if scene.friction else partial(shipped, friction=0.0)),
-        Mechanism(SWEPT, without=partial(shipped, continuous=False, sleeping=False)),
+        Mechanism(RESTITUTION, {"threshold": threshold}, without=bouncing),
+        *found,
+        Mechanism(SWEPT, without=_without(name, continuous=False, sleeping=False)),
     ]
 
 
-def _planck(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str) -> list[Mechanism]:
-    """The mechanisms of Box2D 2.3 in float64; its compiled-in numbers are settings here."""
-    made = partial(_javascript, "planck", profile)
-    still = {"continuous": False, "bullet": False}
-    still |= {f"elastic_{name}": value for name, value in still.items()}
-    velocity, position = reported["velocity, position iterations"].split(",")
-    impulse = {
-        "order": BOX2D,
-        "iterations": int(velocity),
-        "touching": True,
-        "cap": reported["maxTranslation"],
-    }
-    correction = {
-        "correction_share": 0.2 if int(position) else 0.0,  # Settings.baumgarte
-        "correction_iterations": int(position),
-        "slop": reported["linearSlop"],
-        "correction_most": reported["maxLinearCorrection"],
-    }
-    uncorrected = made(position_iterations=0, elastic_position_iterations=0)
-    common = [
-        Mechanism(RESTITUTION, {"threshold": reported["velocityThreshold"]}),
-        Mechanism(IMPULSE, impulse),
-        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,), uncorrected),
-    ]
-    if profile == "matched":
-        rubbed = _box2d_friction(reported) if scene.friction else []
-        swept = [Mechanism(SWEPT, without=made(**still))]
-        return [*common, *rubbed, *(swept if reported["continuous collision"] else [])]
-    return [
-        *common,
-        *_box2d_friction(reported, None if scene.friction else made(friction=0.0)),
-        Mechanism(SKIN, {"skin": 2 * reported["linearSlop"]}, (IMPULSE, POSITION_CORRECTION)),
-        Mechanism(SWEPT, without=made(**still, sleeping=False)),
-    ]
-
-
-def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str) -> list[Mechanism]:
+def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
     """Soft substeps and one sweep for restitution, as in Box2D 3.1, with pairs that are not tested
     in every step.
 
     Not modelled: that each impulse is rounded to float32, which rows of collisions enlarge, and the
     order of contacts that begin in the same step.
     """
-    made, unit = partial(_javascript, "rapier2d", profile), reported["length unit in m"]
+    unit = reported["length unit in m"]
     # The stiffness of contacts is that of Box2D 3.1: contact_erp is 0.1358 at 1/240 s. Friction is
     # solved without bias alone (IntegrationParameters, friction_in_bias_pass).
     impulse = {
@@ -335,65 +291,55 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str)
     }
     # normalized_max_corrective_velocity: 3 units of length in a second
     correction = {"correction_speed": 3.0 * unit}
-    swept = made(continuous_steps=0, **({"sleeping": False} if profile == "shipped" else {}))
-    rubbed = _box2d_v3_friction(reported, None if scene.friction else made(friction=0.0))
+    awake = {"sleeping": False} if name.endswith(":shipped") else {}
     return [
         Mechanism(RESTITUTION, {"rebounds": False}, (IMPULSE,)),
         Mechanism(IMPULSE, impulse),
         Mechanism(RECYCLING, recycled, (IMPULSE,)),
         Mechanism(POSITION_CORRECTION, correction, (IMPULSE,)),
-        *(rubbed if scene.friction or profile == "shipped" else []),
-        Mechanism(SWEPT, without=swept),
+        *_friction(name, reported, scene, rub_restituted=False),
+        Mechanism(SWEPT, without=_without(name, continuous_steps=0, **awake)),
     ]
 
 
-def _matter(
-    _reported: Mapping[str, Any], scene: Scene, _dt: float, profile: str
-) -> list[Mechanism]:
+def _matter(_reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
     """The mechanisms that can be disabled in matter, one after the other; the reference has none of
     them.
 
     Its disks are polygons, so that an impulse acts at a corner and turns them; without friction
     nothing else does. The iterations of a collision after the first stop pairs that are slow.
     """
-    air = {"friction_air": 0} if profile == "shipped" else {}
-    smooth = {"friction": 0} if profile == "shipped" or scene.friction else {}
-    turning = {} if scene.friction else {"turning": False}
+    shipped = name.endswith(":shipped")
     steps = [
-        (AIR, air),
-        (FRICTION, smooth),
-        (SIDES, {"sides": MANY_SIDES, **turning}),
+        (AIR, {"friction_air": 0} if shipped else {}),
+        (FRICTION, {"friction": 0} if shipped or scene.friction else {}),
+        (SIDES, {"sides": MANY_SIDES} | ({} if scene.friction else {"turning": False})),
         (RESTITUTION, {"velocity_iterations": 1}),
         (POSITION_CORRECTION, {"position_iterations": 0}),
     ]
     found, off = list[Mechanism](), dict[str, Any]()
-    for name, options in steps:
+    for mechanism, options in steps:
         if options:
             off |= options
-            found.append(Mechanism(name, without=_javascript("matter", profile, **off)))
+            found.append(Mechanism(mechanism, without=_without(name, **off)))
     return found
-
-
-def _javascript(name: str, profile: str, **changed: Any) -> Callable[[], Engine]:
-    """Makes the engine of a row of `FETCHED` with these changes."""
-    return partial(row_of(f"{name}:{profile}").make, **changed)
 
 
 MECHANISMS: dict[str, Callable[[Mapping[str, Any], Scene, float], list[Mechanism]]] = {
     "reference:exercise": _exercise,
     "reference:lesson": _lesson,
-    "pymunk:shipped": _pymunk_shipped,
-    "pymunk:matched": partial(_pymunk, profile="matched"),
-    "box2d:shipped": _box2d_shipped,
-    "box2d:matched": _box2d_matched,
-    "box2d_v3:shipped": _box2d_v3_shipped,
-    "box2d_v3:matched": _box2d_v3_matched,
-    "planck:shipped": partial(_planck, profile="shipped"),
-    "planck:matched": partial(_planck, profile="matched"),
-    "matter:shipped": partial(_matter, profile="shipped"),
-    "matter:matched": partial(_matter, profile="matched"),
-    "rapier2d:shipped": partial(_rapier, profile="shipped"),
-    "rapier2d:matched": partial(_rapier, profile="matched"),
+    "pymunk:shipped": partial(_pymunk, name="pymunk:shipped"),
+    "pymunk:matched": partial(_pymunk, name="pymunk:matched"),
+    "box2d:shipped": partial(_box2d, name="box2d:shipped"),
+    "box2d:matched": partial(_box2d, name="box2d:matched"),
+    "box2d_v3:shipped": partial(_box2d_v3, name="box2d_v3:shipped"),
+    "box2d_v3:matched": partial(_box2d_v3, name="box2d_v3:matched"),
+    "planck:shipped": partial(_planck, name="planck:shipped"),
+    "planck:matched": partial(_planck, name="planck:matched"),
+    "matter:shipped": partial(_matter, name="matter:shipped"),
+    "matter:matched": partial(_matter, name="matter:matched"),
+    "rapier2d:shipped": partial(_rapier, name="rapier2d:shipped"),
+    "rapier2d:matched": partial(_rapier, name="rapier2d:matched"),
 }
 """The engines whose mechanisms are known, of `ENGINES` and of `FETCHED`: a function of the settings
 that the engine reports, the scene and dt in s."""

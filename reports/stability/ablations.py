@@ -132,11 +132,8 @@ class Ablations:
     @staticmethod
     def of(search: LimitSearch, limit: Limit) -> Ablations | None:
         """None if nothing failed, nothing was played, or the engine has no known mechanisms."""
-        seen, failing, (name, *changed) = (
-            search.failure(limit),
-            limit.failing,
-            search.engine.split("+"),
-        )
+        seen, failing = search.failure(limit), limit.failing
+        name, _, variant = search.engine.partition("+")
         if seen is None or failing is None or seen[1].trajectory is None or name not in MECHANISMS:
             return None
         judged, run = seen
@@ -145,13 +142,11 @@ class Ablations:
         good = [] if isnan(limit.works_at) else [scene(limit.works_at, run) for run in range(runs)]
         if bad.scene.n > MOST:
             return None
-        known = (
-            [] if changed else mechanisms_of(name, run.settings, bad.scene, bad.dt(bad.substeps[0]))
-        )
+        dt = bad.dt(bad.substeps[0])
+        known = [] if variant else mechanisms_of(name, run.settings, bad.scene, dt)
         mechanisms = [mechanism for mechanism in known if mechanism.parameters]
-        return Ablations(
-            search.case, bad, good, mechanisms, judge(search.case.predicate, judged, run)
-        )
+        reading = judge(search.case.predicate, judged, run)
+        return Ablations(search.case, bad, good, mechanisms, reading)
 
     def simple(self) -> Iterator[list[Mechanism]]:
         """No mechanism, then each one with those it acts on."""
@@ -201,13 +196,5 @@ def reason_by_ablation(limit: Limit) -> tuple[str, str, str]:
     names = limit.mechanisms.split(", ")
     rows = [words_of(name, limit.engine) for name in names]
     text, source = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
-    if limit.mechanisms == END_OF_STEP:
-        return (
-            text,
-            source,
-            "the reference with end-of-step detection and nothing else has this limit",
-        )
-    tested = (
-        f"the reference with end-of-step detection and the engine's {listed(names)} has this limit"
-    )
-    return text, source, tested
+    more = "nothing else" if limit.mechanisms == END_OF_STEP else f"the engine's {listed(names)}"
+    return text, source, f"the reference with end-of-step detection and {more} has this limit"

@@ -1,4 +1,4 @@
-"""All cases by name, in reading order."""
+"""All cases by name, and the headings they stand under, in reading order."""
 
 from __future__ import annotations
 
@@ -10,6 +10,14 @@ from reports.stability.cases_stacks import STACKS
 from reports.stability.cases_suite import SUITE
 from reports.stability.limits import Case
 
-CASES: dict[str, Case] = {
-    case.name: case for case in (*COLLISIONS, *ALONE, *FRICTION, *STACKS, *GAS, *SUITE)
+FAMILIES = {
+    "One collision": COLLISIONS,
+    "One disk, or two": ALONE,
+    "Friction": FRICTION,
+    "Stacks, piles and overlaps": STACKS,
+    "A gas at e = 1": GAS,
+    "The largest dt of the suite's scenes": SUITE,
 }
+"""Heading -> its cases."""
+CASES: dict[str, Case] = {case.name: case for cases in FAMILIES.values() for case in cases}
+FAMILY_OF = {case.name: family for family, cases in FAMILIES.items() for case in cases}

@@ -7,28 +7,26 @@ no collision here is followed by another, so that no rounding grows and the hori
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import ceil, hypot
 
 import numpy as np
 
+from reports.stability.cases_collisions import AFTER, LEAD, stepped
 from reports.stability.limits import Case
 from reports.stability.phases import phase
 from reports.stability.predicates_friction import CREEPS, FRICTION_OFF, ROLLING_OFF, SLIPS
 from reports.stability.variants import WITH_FRICTION_ONLY
 from scenarios.families.friction import IMPACT, ROLL, start_of, turning_answer
 from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from scenarios.model import Array, Scenario, Trajectory
 from scenarios.truth.closed_forms import at_rest
 from scenarios.truth.sliding import bounce, slide, spinning_pair
 
-FAMILY = "Friction"
 RADIUS, SOLID, G = 0.25, 2.0, 10.0  # SOLID: m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped
 # A step displacement of 0.05 radii: an engine that takes its lever arm to the middle of the overlap
 # is off by half of that at most.
 DT = 0.05 * RADIUS / FALL
-LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it
 PHASES = 8  # runs at a value, each with the collision elsewhere in its step
 FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
 REST_DT = 1 / 64
@@ -56,7 +54,8 @@ def rough_bounce(
         collision = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped("rough-bounce", "Does friction brake and turn the disk?", scene, truth)
+    asks = "Does friction brake and turn the disk?"
+    return stepped("rough-bounce", asks, scene, DT, truth, IMPACT)
 
 
 def spinning_into(x: float, run: int) -> Scenario:
@@ -78,17 +77,10 @@ def spinning_into(x: float, run: int) -> Scenario:
             scene, t, legs.at(t), [(float(legs.start[1]), 0, 1, float(impulse[0]))]
         )
 
-    return stepped("spinning-into", "Do they exchange spin and speed?", scene, truth)
+    return stepped("spinning-into", "Do they exchange spin and speed?", scene, DT, truth, IMPACT)
 
 
-def stepped(name: str, asks: str, scene: Scene, truth: Callable[[Array], Trajectory]) -> Scenario:
-    """A scenario of a few steps, sampled at each of them."""
-    return Scenario(name, asks, IMPACT, scene, (LEAD + 1 + AFTER) * DT, DT, (1,), truth=truth)
-
-
-def on_floor(
-    asks: str, speed: float, friction: float, slope: float, dt: float, steps: int
-) -> Scenario:
+def on_floor(asks: str, speed: float, friction: float, slope: float, steps: int) -> Scenario:
     """A disk touches a floor and has no spin; gravity leans forward by `slope`, its tangent.
 
     A leaning gravity stands for a slope: so the disk touches the floor exactly in float64.
@@ -100,7 +92,7 @@ def on_floor(
         velocity=[[speed, 0.0]],
         radius=[RADIUS],
         mass=[1.0],
-        walls=[[[-10.0, 0.0], [10.0 + speed * steps * dt, 0.0]]],
+        walls=[[[-10.0, 0.0], [10.0 + speed * steps * REST_DT, 0.0]]],
         gravity=[G * sine, -G * cosine],
         restitution=0.0,
         friction=friction,
@@ -113,7 +105,8 @@ def on_floor(
         place[..., :2] += scene.position
         return turning_answer(scene, t, (place, moves), [(0.0, 0, -1, 0.0)])
 
-    return Scenario("on-floor", asks, ROLL, scene, steps * dt, dt, (1,), truth=truth)
+    duration = steps * REST_DT
+    return Scenario("on-floor", asks, ROLL, scene, duration, REST_DT, (1,), truth=truth)
 
 
 def cone(x: float, run: int) -> Scenario:
@@ -137,12 +130,12 @@ def sliding(x: float, run: int) -> Scenario:
     friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / REST_DT
     slides = speed / (3 * friction * G)
     steps = ceil(1.5 * slides / REST_DT) + AFTER
-    return on_floor("Does it come to roll?", speed, friction, 0.0, REST_DT, steps)
+    return on_floor("Does it come to roll?", speed, friction, 0.0, steps)
 
 
 def nearly_slipping(x: float, _run: int) -> Scenario:
     """x = 1 - tan(angle) / 3 mu: up to tan(angle) = 3 mu a solid disk rolls; friction 0.25, 1 s."""
-    return on_floor("Does it roll?", 0.0, 0.25, 3 * 0.25 * (1 - x), REST_DT, 64)
+    return on_floor("Does it roll?", 0.0, 0.25, 3 * 0.25 * (1 - x), 64)
 
 
 def in_corner(x: float, _run: int) -> Scenario:
@@ -173,10 +166,8 @@ def in_corner(x: float, _run: int) -> Scenario:
 FRICTION = (
     Case(
         "friction_in_bounce",
-        FAMILY,
         "Up to which e does friction in a bounce follow Coulomb's law?",
         "e",
-        "1",
         (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0),
         cone,
         FRICTION_OFF,
@@ -185,10 +176,8 @@ FRICTION = (
     ),
     Case(
         "strong_friction",
-        FAMILY,
         "How large may friction be where the rim sticks in a bounce?",
         "friction",
-        "1",
         (0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8),
         strong,
         FRICTION_OFF,
@@ -197,22 +186,19 @@ FRICTION = (
     ),
     Case(
         "spin_in_bounce",
-        FAMILY,
         "How fast may a disk spin that falls onto a floor with friction?",
         "w dt",
-        "rad",
         (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
         whirling,
         FRICTION_OFF,
+        unit="rad",
         runs=PHASES,
         also=WITH_FRICTION_ONLY,
     ),
     Case(
         "friction_mass_ratio",
-        FAMILY,
         "How unequal may two masses be that exchange spin?",
         "m2 / m1",
-        "1",
         (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8),
         spinning_into,
         FRICTION_OFF,
@@ -221,10 +207,8 @@ FRICTION = (
     ),
     Case(
         "slide_to_roll",
-        FAMILY,
         "How far may a disk slide in a step and still come to roll at 2/3 of its speed?",
         "v dt / R",
-        "1",
         (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
         sliding,
         ROLLING_OFF,
@@ -233,10 +217,8 @@ FRICTION = (
     ),
     Case(
         "critical_slope",
-        FAMILY,
         "How near to the steepest slope for rolling does a disk still roll?",
         "1 - tan(angle) / 3 mu",
-        "1",
         (0.9, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5),
         nearly_slipping,
         SLIPS,
@@ -244,10 +226,8 @@ FRICTION = (
     ),
     Case(
         "creep_at_rest",
-        FAMILY,
         "For how many steps does a disk stay at rest in a corner?",
         "steps",
-        "1",
         (100.0, 1e3, 1e4, 1e5),
         in_corner,
         CREEPS,

@@ -15,7 +15,6 @@ from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario
 from scenarios.truth.closed_forms import at_rest
 
-FAMILY = "Stacks, piles and overlaps"
 RADIUS, G, DT = 0.25, 10.0, 1 / 64
 FLOOR = [[[-4, 0], [4, 0]]]
 
@@ -149,15 +148,13 @@ def pile(x: float, run: int) -> Scenario:
 
 SEEDS = 16  # runs at a value
 INELASTIC = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05)
-OVERLAPS = ("overlap", "radii", (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99), overlapping)
+OVERLAPS = ("overlap", (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99), overlapping)
 
 STACKS = (
     Case(
         "column",
-        FAMILY,
         "How many disks can stand on each other between two walls?",
         "disks",
-        "1",
         (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0),
         column_of,
         STANDS,
@@ -166,34 +163,30 @@ STACKS = (
     ),
     Case(
         "heavy_on_light",
-        FAMILY,
         "How heavy a disk can a disk of mass 1 carry?",
         "m2 / m1",
-        "1",
         (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e6, 1e8),
         heavy_on_light,
         STANDS,
     ),
     Case(
         "overlap_energy",
-        FAMILY,
         "From how deep an overlap on does an engine eject two disks at rest?",
         *OVERLAPS,
         EJECTED,
+        unit="radii",
     ),
     Case(
         "overlap_recovery",
-        FAMILY,
         "From how deep an overlap are two disks separated within a second?",
         *OVERLAPS,
         STILL_OVERLAP,
+        unit="radii",
     ),
     Case(
         "overfull_box",
-        FAMILY,
         "How full may a box be before it bursts?",
         "area fraction",
-        "1",
         (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5, 2.0),
         overfull,
         BURSTS,
@@ -201,10 +194,8 @@ STACKS = (
     ),
     Case(
         "ball_comes_to_rest",
-        FAMILY,
         "Up to which e does a ball come to rest when it should?",
         "1 - e",
-        "1",
         INELASTIC,
         dropped,
         NOT_AT_REST,
@@ -212,10 +203,8 @@ STACKS = (
     ),
     Case(
         "pile_comes_to_rest",
-        FAMILY,
         "Up to which e does a pile of twelve disks come to rest?",
         "1 - e",
-        "1",
         INELASTIC,
         pile,
         NOT_AT_REST,

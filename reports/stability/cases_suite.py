@@ -10,7 +10,6 @@ from reports.stability.predicates_usable import USABLE
 from scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from scenarios.model import Scenario
 
-FAMILY = "The largest dt of the suite's scenes"
 MOST_SAMPLES = 300  # samples at most
 
 
@@ -54,13 +53,12 @@ SEEDS = 4  # runs at a value of a random scene
 SUITE = tuple(
     Case(
         f"dt_{name}",
-        FAMILY,
         build().asks,
         "dt",
-        "s",
         dense_ladder(build()),
         partial(at_dt, name),
         USABLE,
+        unit="s",
         runs=SEEDS if name in RANDOM else 1,
         ratio=1.2,
         refines=False,

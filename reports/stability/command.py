@@ -13,7 +13,6 @@ from typing import NoReturn
 import pandas as pd
 
 from adapters.engines import ENGINES, FETCHED, OWN, row_of
-from reports.page.style import number
 from reports.run.arguments import checked_engines, opening, unknown
 from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
 from reports.run.journal import Journal
@@ -22,6 +21,7 @@ from reports.run.runner import affordable
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
+from reports.stability.overview import in_words
 from reports.stability.page import write_page
 from reports.stability.results import (
     StabilityPlan,
@@ -83,10 +83,8 @@ def find_limits(
     chosen = checked_engines(engines)
     added = {name: row_of(name) for name in chosen if name not in ENGINES}
     if files := [name.removesuffix(OWN) for name, row in added.items() if row.exercise]:
-        how = (
-            "it does not test a solver of the exercise: crosscheck check judges it,"
-            " crosscheck run plays it"
-        )
+        how = "it does not test a solver of the exercise: crosscheck check judges it,"
+        how += " crosscheck run plays it"
         refuse([f"--engine {file}: {how}" for file in files])
     plan = StabilityPlan(
         cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
@@ -148,10 +146,6 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
     prints one line for each fault and exits 2."""
     faults = [not_varied(what) for what in vary if what not in VARIES]
     cases: list[str] = []
-    maps, touching = (
-        [name for name in names if name in MAPS],
-        [name for name in names if name in TOUCHING],
-    )
     for name in names:
         if name.endswith(".toml"):
             try:
@@ -169,11 +163,11 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> tuple[list[str], list[
         faults.append(f"--vary {vary[0]}: varies a scene file, and none is named; name FILE.toml")
     if faults:
         refuse([fault.replace("see: crosscheck list", SEE) for fault in faults])
-    return (
-        (list(dict.fromkeys(cases)), maps, touching)
-        if names
-        else (list(CASES), list(MAPS), list(TOUCHING))
-    )
+    if not names:
+        return list(CASES), list(MAPS), list(TOUCHING)
+    maps = [name for name in names if name in MAPS]
+    touching = [name for name in names if name in TOUCHING]
+    return list(dict.fromkeys(cases)), maps, touching
 
 
 def not_varied(what: str) -> str:
@@ -195,9 +189,11 @@ def finish(results: StabilityResults, out: Path) -> NoReturn:
     """Print a table and where the page is; exit 1 if a task ended without a result."""
     print_limits(Console(), results.limits)
     Console().print(f"\n{(out / PAGE).resolve()}", style="bold", highlight=False, soft_wrap=True)
-    lost = [f"{one.case} on {one.engine}" for one in results.limits if one.status != "ok"]
-    lost += [f"{one.name} on {one.engine}" for one in results.maps if one.status != "ok"]
-    lost += [f"{one.name} on {one.engine}" for one in results.laws if one.status != "ok"]
+    lost = [
+        f"{one.case if isinstance(one, Limit) else one.name} on {one.engine}"
+        for one in results.all
+        if one.status != "ok"
+    ]
     if lost:
         say(f"no result: {', '.join(lost)}")
     sys.exit(FAILED if lost else DONE)
@@ -233,8 +229,3 @@ def label_of(name: str) -> str:
     unit = "" if case.unit == "1" else f", {case.unit}"
     shown = name if name in CASES else Path(name.rpartition(":")[0]).name
     return f"{shown}: {case.parameter}{unit}"
-
-
-def in_words(limit: Limit) -> str:
-    """The limit in a few characters."""
-    return limit.word or limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")

@@ -56,22 +56,27 @@ def with_reason(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Limit
     """
     if limit.status != "ok":
         return limit
+    text, source, tested = explanation(limit, by_name)
+    return replace(limit, reason=text, source=source, tested=tested)
+
+
+def explanation(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> tuple[str, str, str]:
+    """The reason, its source, and how it was tested, or ""."""
     reason = reason_of(limit)
     if reason is None:
         varies = CASES[limit.case].varies if limit.case in CASES else limit.case.rpartition(":")[2]
-        text, source, tested = reason_by_intervention(limit, varies)
-        return replace(limit, reason=text, source=source, tested=tested)
-    tests = tests_of(limit, reason, by_name)
+        return reason_by_intervention(limit, varies)
+    text, source, tests = reason.text, reason.source, tests_of(limit, reason, by_name)
     if limit.mechanisms:
-        text, source, shown = reason_by_ablation(limit)
+        cause, its_source, shown = reason_by_ablation(limit)
         if reason.mechanism in limit.mechanisms.split(", "):
             tests.append(shown)
         elif reason.mechanism == END_OF_STEP:  # which every ablation has
-            text, source = f"{reason.text}; {text}", f"{reason.source}; {source}"
-            return replace(limit, reason=text, source=source, tested="; ".join([*tests, shown]))
+            text, source = f"{text}; {cause}", f"{source}; {its_source}"
+            tests.append(shown)
         elif not tests:
-            return replace(limit, reason=text, source=source, tested=shown)
-    return replace(limit, reason=reason.text, source=reason.source, tested="; ".join(tests))
+            return cause, its_source, shown
+    return text, source, "; ".join(tests)
 
 
 def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Limit]) -> list[str]:
@@ -79,12 +84,10 @@ def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Lim
     tests = []
     if reason.predicts is not None and brackets(limit, reason.predicts):
         tests.append(f"predicts {reason.predicts:.4g}")
-    if (
-        reason.variant != limit.engine
-        and (other := by_name.get((limit.case, reason.variant)))
-        and farther(other, limit)
-    ):
-        tests.append(f"{reason.variant} gets farther")
+    variant = reason.variant_of(limit.engine)
+    other = by_name.get((limit.case, variant))
+    if other and farther(other, limit):
+        tests.append(f"{variant} gets farther")
     if limit.failing is not None and limit.failing.broken == "refused":
         tests.append(SAYS_SO)
     return tests

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fnmatch import fnmatch
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.predicates import judge
 from reports.stability.search import LimitSearch
 from reports.stability.variants import play_as
-from reports.stability.vary import at_offset, at_scale, at_tempo
+from reports.stability.vary import similar
 from scenarios.model import Scenario
 
 FINER = 8
@@ -31,29 +32,9 @@ def finer(one: Scenario) -> Scenario:
     return replace(one, substeps=(one.substeps[0] * FINER,))
 
 
-def faster(one: Scenario) -> Scenario:
-    """The same motion, 32 times as fast."""
-    return at_tempo(one, UNITS)
-
-
-def slower(one: Scenario) -> Scenario:
-    """The same motion, 32 times as slow."""
-    return at_tempo(one, 1 / UNITS)
-
-
-def larger(one: Scenario) -> Scenario:
-    """The same motion, 32 times as large and 32 times as slow, so that speeds stay."""
-    return at_tempo(at_scale(one, UNITS), 1 / UNITS)
-
-
-def smaller(one: Scenario) -> Scenario:
-    """The same motion, 32 times as small and 32 times as fast, so that speeds stay."""
-    return at_tempo(at_scale(one, 1 / UNITS), UNITS)
-
-
 def at_home(one: Scenario) -> Scenario:
     """The same scene, moved along x so that its middle is at the origin."""
-    return at_offset(one, -float(np.mean(one.scene.position[:, 0])))
+    return similar(one, shift=-float(np.mean(one.scene.position[:, 0])))
 
 
 def unchanged(one: Scenario) -> Scenario:
@@ -99,28 +80,28 @@ INTERVENTIONS = {
         "too slow for a time scale of the engine (threshold of restitution, rate of position"
         " correction)",
         "32 times as fast",
-        faster,
+        partial(similar, tempo=UNITS),
     ),
     "slower": Intervention(
         "[pb]*",
         "*",
         "too fast for a time scale of the engine (cap on speed, rate of position correction)",
         "32 times as slow",
-        slower,
+        partial(similar, tempo=1 / UNITS),
     ),
     "larger": Intervention(
         "[pb]*",
         "*",
         "too small for a length scale of the engine (slop, margin, skin)",
         "32 times as large, at the same speeds",
-        larger,
+        partial(similar, size=UNITS, tempo=1 / UNITS),
     ),
     "smaller": Intervention(
         "[pb]*",
         "*",
         "too large for a length scale of the engine (limit on displacement in a step, slop)",
         "32 times as small, at the same speeds",
-        smaller,
+        partial(similar, size=1 / UNITS, tempo=UNITS),
     ),
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"

@@ -62,13 +62,13 @@ class Case:
 
     Attributes:
         name: lower-case words, as they stand in limits.csv.
-        family: the heading it stands under.
         asks: the question in one sentence.
-        parameter, unit: what is varied, dimensionless where it can be.
+        parameter: what is varied, dimensionless where it can be.
         values: to scan, from gentle to harsh.
         scene: (value, number of the run from 0) -> the scenario; it is played at its only step
             size. Fewer runs are the first of more.
         predicate: decides whether a run fails.
+        unit: of the parameter; "1" for a ratio.
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
             seeds.
         whole: whether the parameter counts something.
@@ -88,13 +88,12 @@ class Case:
     """
 
     name: str
-    family: str
     asks: str
     parameter: str
-    unit: str
     values: tuple[float, ...]
     scene: Callable[[float, int], Scenario]
     predicate: Predicate
+    unit: str = "1"
     runs: int = 1
     whole: bool = False
     also: tuple[str, ...] = ()

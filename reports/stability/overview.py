@@ -23,6 +23,11 @@ from scenarios.model import Scenario
 WITH_FRICTION = {case.name for case in FRICTION}
 
 
+def in_words(limit: Limit) -> str:
+    """The limit in a few characters."""
+    return limit.word or limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
+
+
 class LimitCell(NamedTuple):
     """A cell of a table: its text, a longer remark, its colour in the heat ramp (-1: none), and
     whether it failed."""
@@ -60,8 +65,7 @@ def cell_of(case: Case, limit: Limit | None) -> LimitCell:
         return LimitCell(limit.word, remark, -1, True)
     gentler = sum(case.harsher * value < case.harsher * limit.fails_at for value in case.values)
     passed = gentler / len(case.values)
-    text = limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
-    return LimitCell(text, remark, max(1, min(9, round(9 * (1 - passed)))))
+    return LimitCell(in_words(limit), remark, max(1, min(9, round(9 * (1 - passed)))))
 
 
 def held(case: Case) -> dict[str, str]:

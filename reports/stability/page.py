@@ -18,6 +18,7 @@ from reports.page.documents import CHARTED, render
 from reports.page.links import neighbours
 from reports.page.replay import pack_layers, ratio_of
 from reports.stability import overview
+from reports.stability.cases import FAMILY_OF
 from reports.stability.failures import kept_failure, near
 from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
 from reports.stability.maps import MAPS
@@ -77,12 +78,7 @@ def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
     sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
-    names = (
-        [limit.engine for limit in limits]
-        + [one.engine for one in maps]
-        + [one.engine for one in laws]
-    )
-    names = list(dict.fromkeys(names))
+    names = list(dict.fromkeys(one.engine for one in results.all))
     looks = style.looks_of((*names, style.TRUTH))
     html = render(
         "stability/stability.html.j2",
@@ -115,7 +111,8 @@ def families_of(sections: Sequence[CaseSection]) -> dict[str, list[CaseSection]]
     """The headings with their sections, both in the order of first appearance."""
     found: dict[str, list[CaseSection]] = {}
     for section in sections:
-        found.setdefault(section.case.family, []).append(section)
+        family = FAMILY_OF.get(section.case.name, "A scene of your own")
+        found.setdefault(family, []).append(section)
     return found
 
 
@@ -190,11 +187,8 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
             trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)
         ]
         if len(trials) > 1:
-            x, y = (
-                np.array([getattr(trial, name) for trial in trials], float)
-                for name in ("value", "worst")
-            )
-            lines.append(ChartLine(named(limit), x, np.abs(y)))
+            x = np.array([trial.value for trial in trials])
+            lines.append(ChartLine(named(limit), x, np.array([abs(t.worst) for t in trials])))
     if not lines or not any((line.y > 0).any() for line in lines):
         return Drawing(title, "No engine reads more than 0 anywhere.", None)
     ends = [min(case.values), max(case.values)]
@@ -207,13 +201,10 @@ def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
         "hoverinfo": "skip",
         "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
     }
-    return Drawing(
-        title,
-        caption,
-        figure_of(
-            lines, axis_of(case), predicate.unit, markers=40, guide=[guide], unit=unit_of(case)
-        ),
+    figure = figure_of(
+        lines, axis_of(case), predicate.unit, markers=40, guide=[guide], unit=unit_of(case)
     )
+    return Drawing(title, caption, figure)
 
 
 def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
@@ -222,20 +213,17 @@ def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
     lines = []
     for limit in limits:
         trials = [trial for trial in limit.trials if not trial.left]
-        x, y = (
-            np.array(pair, float) for pair in zip(*((t.value, t.failed / t.runs) for t in trials))
-        )
-        lines.append(ChartLine(named(limit), x, y))
+        x = np.array([trial.value for trial in trials])
+        lines.append(ChartLine(named(limit), x, np.array([t.failed / t.runs for t in trials])))
     caption = (
         f"The share of the runs at each {case.parameter} that failed; harsher to the right. Values"
         " at which the quick form stopped at the first failing run are not drawn."
     )
     title = f"{case.predicate.name.capitalize()}, share of runs"
-    return Drawing(
-        title,
-        caption,
-        figure_of(lines, axis_of(case), "share of runs", log=False, markers=40, unit=unit_of(case)),
+    figure = figure_of(
+        lines, axis_of(case), "share of runs", log=False, markers=40, unit=unit_of(case)
     )
+    return Drawing(title, caption, figure)
 
 
 def unit_of(case: Case) -> str:

@@ -65,6 +65,21 @@ def first_above(t: Array, series: Array, bound: float) -> float:
     return float(t[np.argmax(above)] if above.any() else t[-1])
 
 
+def largest(
+    t: Array,
+    series: Array,
+    bound: float,
+    event: str,
+    *,
+    of: float = 1.0,
+    broken: str = "",
+    disk: int = 0,
+) -> Reading:
+    """The largest of a series (k,), in units of `of`, at the first sample above its bound."""
+    value, at = float(series.max()) / of, first_above(t, series, bound)
+    return Reading(value, at, event, broken, disk=disk)
+
+
 def truth_of(scenario: Scenario) -> Trajectory:
     """The exact answer at the samples; every scenario of these cases has one."""
     assert scenario.truth is not None
@@ -89,8 +104,7 @@ def _collisions_missed(scenario: Scenario, played: Trajectory) -> Reading:
 def _collisions_spurious(scenario: Scenario, played: Trajectory) -> Reading:
     change = np.linalg.norm(played.velocity - played.velocity[0], axis=2).max(axis=1)
     share = change / np.linalg.norm(scenario.scene.velocity, axis=1).max()
-    at = first_above(played.t, share, 1e-3)
-    return Reading(float(share.max()), at, "a spurious collision: the disks do not touch")
+    return largest(played.t, share, 1e-3, "a spurious collision: the disks do not touch")
 
 
 def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
@@ -137,11 +151,7 @@ def _scaled_deviation(scenario: Scenario, played: Trajectory) -> Reading:
     off = (np.linalg.norm(played.position - true.position, axis=2) / scenario.scene.radius).max(
         axis=1
     )
-    return Reading(
-        float(off.max()),
-        first_above(played.t, off, 0.25),
-        "from here the path differs from that at scale 1",
-    )
+    return largest(played.t, off, 0.25, "from here the path differs from that at scale 1")
 
 
 def _angle_off(scenario: Scenario, played: Trajectory) -> Reading:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reports.compare import laws
-from reports.stability.predicates import Predicate, Reading, first_above
+from reports.stability.predicates import Predicate, Reading, first_above, largest
 from scenarios.model import Scenario, Trajectory
 
 
@@ -17,13 +17,8 @@ def _stands(scenario: Scenario, played: Trajectory) -> Reading:
     speed = np.linalg.norm(played.velocity[len(played) // 2 :], axis=2) / own_speed(scenario)
     jitter = float(np.sqrt((speed**2).mean(axis=1)).mean())
     worst = int(np.argmax(np.linalg.norm(played.position[-1] - played.position[0], axis=1)))
-    sinks = Reading(
-        float(moved.max()) / MOST_SINKING,
-        first_above(played.t, moved, MOST_SINKING),
-        f"disk {worst} has moved by {moved.max():.3g} radii",
-        "sinks",
-        disk=worst,
-    )
+    event, most = f"disk {worst} has moved by {moved.max():.3g} radii", MOST_SINKING
+    sinks = largest(played.t, moved, most, event, of=most, broken="sinks", disk=worst)
     jitters = Reading(
         jitter / MOST_JITTER,
         float(played.t[len(played) // 2]),
@@ -60,20 +55,10 @@ def _bursts(scenario: Scenario, played: Trajectory) -> Reading:
     low, high = scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))
     outside = ((played.position < low) | (played.position > high)).any(axis=2).sum(axis=1)
     speed = (np.linalg.norm(played.velocity, axis=2) / scene.radius).max(axis=1)
-    escapes = Reading(
-        2.0 * float(outside.max()),
-        first_above(played.t, outside.astype(float), 0.5),
-        f"{outside.max()} disks are out of the box",
-        "escape",
-        disk=-1,
-    )
-    flies = Reading(
-        float(speed.max()) / MOST_SPEED,
-        first_above(played.t, speed, MOST_SPEED),
-        f"a disk flies at {speed.max():.3g} radii/s",
-        "energy",
-        disk=-1,
-    )
+    event = f"{outside.max()} disks are out of the box"
+    escapes = largest(played.t, outside, 0.5, event, of=0.5, broken="escape", disk=-1)
+    event = f"a disk flies at {speed.max():.3g} radii/s"
+    flies = largest(played.t, speed, MOST_SPEED, event, of=MOST_SPEED, broken="energy", disk=-1)
     return max(escapes, flies)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.stability.predicates import Predicate, Reading, first_above, truth_of
+from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 SETTLED = 0.1  # of a run; in this time the engine corrects what it takes for an overlap
@@ -72,10 +72,7 @@ def _creeps(scenario: Scenario, played: Trajectory) -> Reading:
     radius = scenario.scene.radius[0]
     moved = np.hypot(*(x - x[first]).T) / radius + np.abs(turned - turned[first])
     moved[:first] = 0.0
-    worst = float(moved.max())
-    return Reading(
-        worst, first_above(played.t, moved, CREEPS.bound), f"it has moved by {worst:.3g} radii"
-    )
+    return largest(played.t, moved, CREEPS.bound, f"it has moved by {moved.max():.3g} radii")
 
 
 FRICTION_OFF = Predicate(

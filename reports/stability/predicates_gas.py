@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reports.compare import laws
 from reports.stability.hard_disks import Gas, gas_in_box
-from reports.stability.predicates import Predicate, Reading, first_above, truth_of
+from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
 from scenarios.model import Array, Scenario, Trajectory
 
 BLOCKS = 10
@@ -24,11 +24,8 @@ RANGES = 5  # of speed, with equal numbers of disks
 def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     energy = laws.energy(played, scenario.scene)
     off = np.abs(energy / energy[0] - 1)
-    factor = energy[-1] / energy[0]
-    at = first_above(played.t, off, ENERGY_DRIFTS.bound)
-    return Reading(
-        float(off.max()), at, f"the energy is {factor:.4g} times that at the start", disk=-1
-    )
+    event = f"the energy is {energy[-1] / energy[0]:.4g} times that at the start"
+    return largest(played.t, off, ENERGY_DRIFTS.bound, event, disk=-1)
 
 
 def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
@@ -36,13 +33,8 @@ def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
     momentum = (mass * velocity).sum(axis=1)
     whole = np.linalg.norm(mass * velocity[0], axis=1).sum()
     off = np.linalg.norm(momentum - momentum[0], axis=1) / whole
-    at = first_above(played.t, off, MOMENTUM_DRIFTS.bound)
-    return Reading(
-        float(off.max()),
-        at,
-        f"the momentum has changed by {off.max():.3g} of the sum of all momenta",
-        disk=-1,
-    )
+    event = f"the momentum has changed by {off.max():.3g} of the sum of all momenta"
+    return largest(played.t, off, MOMENTUM_DRIFTS.bound, event, disk=-1)
 
 
 def _gas_diverges(scenario: Scenario, played: Trajectory) -> Reading:
@@ -52,12 +44,8 @@ def _gas_diverges(scenario: Scenario, played: Trajectory) -> Reading:
     )
     off = drift.max(axis=1)
     worst = int(np.argmax(drift[-1]))
-    return Reading(
-        float(off.max()),
-        first_above(played.t, off, GAS_DIVERGES.bound),
-        f"disk {worst} is at another position",
-        disk=worst,
-    )
+    event = f"disk {worst} is at another position"
+    return largest(played.t, off, GAS_DIVERGES.bound, event, disk=worst)
 
 
 def in_blocks(series: Array) -> Array:
@@ -87,15 +75,8 @@ def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
 def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
     collisions = played.collisions
     ought = literature(scenario)
-    parts = _speeds(played)
-    parts.append(
-        _deviation(
-            "rate",
-            counted(played, collisions.j >= 0, np.ones(len(collisions))),
-            ought.rate,
-            "Enskog's rate of collisions",
-        )
-    )
+    met = counted(played, collisions.j >= 0, np.ones(len(collisions)))
+    parts = [*_speeds(played), _deviation("rate", met, ought.rate, "Enskog's rate of collisions")]
     if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
         exchanged = counted(played, collisions.j < 0, collisions.impulse)
         parts.append(
@@ -123,11 +104,11 @@ def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Arr
     )
 
 
-def _deviation(what: str, blocks: Array, ought: float, whose: str, disk: int = -1) -> Reading:
+def _deviation(what: str, blocks: Array, ought: float, whose: str) -> Reading:
     """The relative error of a mean, less `ERRORS` block errors, in units of `MOST_OFF`."""
     ratio, error = float(blocks.mean()) / ought, block_error(blocks) / ought
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
-    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=disk)
+    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=-1)
 
 
 def _speeds(played: Trajectory) -> list[Reading]:

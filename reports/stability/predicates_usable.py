@@ -7,7 +7,7 @@ import numpy as np
 from reports.compare import laws, scales
 from reports.compare.collisions import match, pair_keys, who
 from reports.compare.view import cut
-from reports.stability.predicates import Predicate, Reading, first_above
+from reports.stability.predicates import Predicate, Reading, largest
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
 from scenarios.no_truth import answered
 
@@ -37,28 +37,16 @@ def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
         return None
     energy = laws.energy(played, scenario.scene)
     rise = (energy - energy[0]) / (scales.energy(scenario) or 1.0)
-    at = first_above(played.t, rise, MOST_RISE)
-    return Reading(
-        float(rise.max()) / MOST_RISE,
-        at,
-        f"energy grows by {rise.max():.3g} of the energy at hand",
-        "energy",
-        disk=-1,
-    )
+    event = f"energy grows by {rise.max():.3g} of the energy at hand"
+    return largest(played.t, rise, MOST_RISE, event, of=MOST_RISE, broken="energy", disk=-1)
 
 
 def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
     if scenario.scene.n + len(scenario.scene.walls) < 2:
         return None
     overlap = laws.penetration(played, scenario.scene)
-    at = first_above(played.t, overlap, MOST_OVERLAP)
-    return Reading(
-        float(overlap.max()) / MOST_OVERLAP,
-        at,
-        f"an overlap of {overlap.max():.3g} radii",
-        "penetration",
-        disk=-1,
-    )
+    event, most = f"an overlap of {overlap.max():.3g} radii", MOST_OVERLAP
+    return largest(played.t, overlap, most, event, of=most, broken="penetration", disk=-1)
 
 
 def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:

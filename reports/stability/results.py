@@ -28,7 +28,7 @@ from reports.run.worker_process import Failure
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, with_replays
 from reports.stability.failures import keep_failure
-from reports.stability.limits import FORMS, NEVER_WORKS, Limit, Trial, engines_of
+from reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
 from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import LimitSearch
@@ -113,19 +113,15 @@ class Task:
         """In the worker: do it, with the rows that the plan adds among the others; the first
         failing run at the limit is saved."""
         with taking_part(added):
-            return self.found(folder)
-
-    def found(self, folder: Path) -> Limit | MapOf | LawOf:
-        """What comes of it."""
-        if self.kind == "limit":
-            return found_limit(self, folder)
-        if self.kind == "law":
-            return law_of(self.name, self.engine)
-        started = process_time()
-        return replace(map_of(self.name, self.engine), seconds=process_time() - started)
+            if self.kind == "limit":
+                return found_limit(self, folder)
+            if self.kind == "law":
+                return law_of(self.name, self.engine)
+            started = process_time()
+            return replace(map_of(self.name, self.engine), seconds=process_time() - started)
 
 
-def case_named(name: str) -> Any:
+def case_named(name: str) -> Case:
     """A case of the table, or of a scene file: FILE.toml:vary."""
     return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
 
@@ -148,8 +144,7 @@ def carry_out(
     named = [*plan.cases, *(name for name in plan.added if name not in FETCHED)]
     paths = [name.rpartition(":")[0] for name in named]
     files = {path: digest_of(path) for path in paths if path}
-    header = about(plan.command, 0)
-    header |= {"versions": plan.versions, "form": plan.form, "files": files}
+    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form, "files": files}
     journal.append({"header": header})
     with writing(folder, ["machine.json"]):
         put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
@@ -208,27 +203,28 @@ class StabilityResults(NamedTuple):
     laws: list[LawOf]
     header: dict[str, Any]
 
+    @property
+    def all(self) -> list[Limit | MapOf | LawOf]:
+        """The result of every task."""
+        return [*self.limits, *self.maps, *self.laws]
+
 
 def read(folder: Path) -> StabilityResults:
     """The stability report in a folder, in reading order; raises `ValueError` if its journal
     cannot be used."""
     headers, results = journalled(folder)
-    limits = [one for one in results.values() if isinstance(one, Limit)]
-    maps = [one for one in results.values() if isinstance(one, MapOf)]
-    laws = [one for one in results.values() if isinstance(one, LawOf)]
-    order = {name: k for k, name in enumerate(CASES)}
+    order = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
     engines = list(
         dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case, ENGINES))
     )
-    limits.sort(
-        key=lambda limit: (
-            order.get(limit.case, len(order)),
-            limit.case,
-            engines.index(limit.engine),
-        )
-    )
-    maps.sort(key=lambda one: (list(MAPS).index(one.name), engines.index(one.engine)))
-    laws.sort(key=lambda one: (list(TOUCHING).index(one.name), engines.index(one.engine)))
+
+    def place(task: Task) -> tuple[int, str, int]:
+        return order.get(task.name, len(order)), task.name, engines.index(task.engine)
+
+    ordered = [results[task] for task in sorted(results, key=place)]
+    limits = [one for one in ordered if isinstance(one, Limit)]
+    maps = [one for one in ordered if isinstance(one, MapOf)]
+    laws = [one for one in ordered if isinstance(one, LawOf)]
     return StabilityResults(explained(limits), maps, laws, headers[-1])
 
 
@@ -264,12 +260,10 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
 def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
     """As `impossible`, for a limit whose case is known; a scene file that has changed since is
     not checked."""
-    path = (
-        ""
-        if not isinstance(result, Limit) or result.case in CASES
-        else result.case.rpartition(":")[0]
-    )
-    if not isinstance(result, Limit) or (path and digest_of(path) != files[path]):
+    if not isinstance(result, Limit):
+        return ""
+    path = "" if result.case in CASES else result.case.rpartition(":")[0]
+    if path and digest_of(path) != files[path]:
         return ""
     return impossible(result, case_named(result.case))
 
@@ -313,10 +307,8 @@ def table(limits: Sequence[Limit]) -> pd.DataFrame:
 
 def row_of(limit: Limit) -> dict[str, Any]:
     """The limit as a row of limits.csv."""
-    case, failing = (
-        case_named(limit.case),
-        limit.failing or (limit.trials[0] if limit.status != "ok" else None),
-    )
+    case = case_named(limit.case)
+    failing = limit.failing if limit.status == "ok" else limit.trials[0]
     engine, profile = limit.engine.split(":")
     return {
         "engine": engine,

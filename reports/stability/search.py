@@ -100,21 +100,10 @@ class LimitSearch:
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
         if not failed:
             return Trial(value, count, failed, worst)
-        first = next(k for k, reading in enumerate(readings) if reading.failed)
-        one, left = readings[first], count < self.case.runs
-        return Trial(
-            value,
-            count,
-            failed,
-            worst,
-            first,
-            one.at,
-            one.event,
-            one.broken,
-            one.disk,
-            self.allowed,
-            left,
-        )
+        first, one = next((k, reading) for k, reading in enumerate(readings) if reading.failed)
+        seen = one.at, one.event, one.broken, one.disk
+        left = count < self.case.runs
+        return Trial(value, count, failed, worst, first, *seen, self.allowed, left)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
         """The limit with all trials from gentle to harsh; at its failing value every run is

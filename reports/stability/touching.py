@@ -26,8 +26,6 @@ NEAR = 0.02
 SPEED, DT = 8.0, 1 / 1024
 AFTER = 24  # steps after the collision: an engine may need a step for each contact
 PAIRS, AT_ONCE = "pair after pair", "all contacts at once"
-
-
 GAPS = (0.0, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0)  # radii
 
 
@@ -76,28 +74,21 @@ class LawOf:
     gaps: tuple[AtGap, ...]
     status: str = "ok"
 
-    @property
-    def law(self) -> str:
-        """The law that the engine follows for touching disks."""
-        return self.gaps[0].law if self.gaps else self.status
-
     @staticmethod
     def from_record(record: dict[str, Any]) -> LawOf:
         """From a line of the journal, where what is not finite is text."""
-        gaps = []
-        for gap, law, *numbers, velocity in record["gaps"]:
-            off, momentum, energy = map(float, numbers)
-            gaps.append(
-                AtGap(
-                    gap,
-                    law,
-                    off,
-                    momentum,
-                    energy,
-                    tuple((float(x), float(y)) for x, y in velocity),
-                )
+        gaps = tuple(
+            AtGap(
+                gap,
+                law,
+                float(off),
+                float(momentum),
+                float(energy),
+                tuple((float(x), float(y)) for x, y in velocity),
             )
-        return LawOf(**record | {"gaps": tuple(gaps)})
+            for gap, law, off, momentum, energy, velocity in record["gaps"]
+        )
+        return LawOf(**record | {"gaps": gaps})
 
 
 def cradle(n: int) -> Touching:
@@ -171,11 +162,8 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
     for gap in gaps:
         run = play_as(engine, scene_of(TOUCHING[name], gap))
         if run.status != "ok" or run.trajectory is None:
-            found.append(
-                AtGap(
-                    gap, "refused" if run.status == "unsupported" else run.status, nan, nan, nan, ()
-                )
-            )
+            outcome = "refused" if run.status == "unsupported" else run.status
+            found.append(AtGap(gap, outcome, nan, nan, nan, ()))
             continue
         velocity = run.trajectory.velocity[-1] / SPEED
         found.append(named(velocity, gap, answers(name, gap)))

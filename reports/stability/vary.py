@@ -18,8 +18,6 @@ from scenarios.files.scene_file import read_scene_file
 from scenarios.model import Array, Collisions, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.exact import with_oracle
 
-FAMILY = "A scene of your own"
-
 
 def at_speed(one: Scenario, x: float) -> Scenario:
     """All initial velocities and spins times x."""
@@ -45,73 +43,36 @@ def at_restitution(one: Scenario, x: float) -> Scenario:
     return with_oracle(replace(one, scene=replace(one.scene, restitution=x)))
 
 
-def at_scale(one: Scenario, x: float) -> Scenario:
-    """All lengths times x at the same times, so that velocities, gravity and thrusts grow with
-    them."""
-    scene = one.scene
-    larger: Scene = replace(
-        scene,
-        position=scene.position * x,
-        velocity=scene.velocity * x,
-        radius=scene.radius * x,
-        inertia=scene.inertia * x**2,
-        walls=scene.walls * x,
-        gravity=scene.gravity * x,
-        wrap=None if scene.wrap is None else scene.wrap * x,
-    )
-    thrusts = [scaled_thrust(t, x, x**2) for t in one.thrusts]
-    return replace(one, scene=larger, thrusts=thrusts, truth=similar(one, size=x))
+def similar(one: Scenario, size: float = 1.0, tempo: float = 1.0, shift: float = 0.0) -> Scenario:
+    """The same motion, `size` times as large, `tempo` times as fast in steps that are shorter by
+    the same factor, and moved by `shift` m to the right.
 
-
-def at_tempo(one: Scenario, x: float) -> Scenario:
-    """The same motion x times as fast, in steps that are shorter by the same factor."""
-    scene = one.scene
-    sped: Scene = replace(
+    The exact answer is computed from that of the scene itself. It is exact except for the last
+    digit of the scene's numbers; the oracle does not accept scenes whose scale is far from 1.
+    """
+    scene, truth, by = one.scene, one.truth, np.array([shift, 0.0])
+    changed: Scene = replace(
         scene,
-        velocity=scene.velocity * x,
-        angular_velocity=scene.angular_velocity * x,
-        gravity=scene.gravity * x**2,
+        position=scene.position * size + by,
+        velocity=scene.velocity * (size * tempo),
+        angular_velocity=scene.angular_velocity * tempo,
+        radius=scene.radius * size,
+        inertia=scene.inertia * size**2,
+        walls=scene.walls * size + by,
+        gravity=scene.gravity * (size * tempo**2),
+        wrap=None if scene.wrap is None else scene.wrap * size + by,
     )
     thrusts = [
-        replace(scaled_thrust(t, x**2, x**2), start=t.start / x, stop=t.stop / x)
+        replace(
+            scaled_thrust(t, size * tempo**2, size**2 * tempo**2),
+            start=t.start / tempo,
+            stop=t.stop / tempo,
+        )
         for t in one.thrusts
     ]
-    return replace(
-        one,
-        scene=sped,
-        thrusts=thrusts,
-        duration=one.duration / x,
-        sample_interval=one.sample_interval / x,
-        truth=similar(one, tempo=x),
-    )
 
-
-def at_offset(one: Scenario, x: float) -> Scenario:
-    """The whole scene moved by x m to the right."""
-    scene, by = one.scene, np.array([x, 0.0])
-    moved = replace(
-        scene,
-        position=scene.position + by,
-        walls=scene.walls + by,
-        wrap=None if scene.wrap is None else scene.wrap + by,
-    )
-    return replace(one, scene=moved, truth=similar(one, by=by))
-
-
-def similar(
-    one: Scenario, size: float = 1.0, tempo: float = 1.0, by: Array | float = 0.0
-) -> Callable[[Array], Trajectory] | None:
-    """The exact answer of a scene scaled in size and speed and moved by so many m, computed from
-    that of the scene itself.
-
-    It is exact except for the last digit of the scene's numbers; the oracle does not accept
-    scenes whose scale is far from 1.
-    """
-    truth = one.truth
-    if truth is None:
-        return None
-
-    def changed(t: Array) -> Trajectory:
+    def answer(t: Array) -> Trajectory:
+        assert truth is not None
         was = truth(t * tempo)
         collisions = was.collisions
         return replace(
@@ -130,7 +91,14 @@ def similar(
             ),
         )
 
-    return changed
+    return replace(
+        one,
+        scene=changed,
+        thrusts=thrusts,
+        duration=one.duration / tempo,
+        sample_interval=one.sample_interval / tempo,
+        truth=None if truth is None else answer,
+    )
 
 
 def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
@@ -175,10 +143,13 @@ VARIES = {
         "all lengths / the file's",
         "1",
         (1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, *FACTORS),
-        at_scale,
+        lambda one, x: similar(one, size=x),
     ),
     "offset": Varied(
-        "displacement of the whole scene to the right", "m", (*FACTORS, 1e4, 1e5, 1e6), at_offset
+        "displacement of the whole scene to the right",
+        "m",
+        (*FACTORS, 1e4, 1e5, 1e6),
+        lambda one, x: similar(one, shift=x),
     ),
 }
 """What `--vary` takes, and what it means."""
@@ -211,12 +182,11 @@ def case_of_file(path: str, what: str) -> Case:
     meant = VARIES[what]
     return Case(
         f"{path}:{what}",
-        FAMILY,
         f"{one.name}: {one.asks}",
         meant.parameter,
-        meant.unit,
         meant.values or dense_ladder(one),
         partial(varied, path, what),
         USABLE,
+        meant.unit,
         also=WITH_FRICTION_ONLY if one.scene.friction else (),
     )

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from io import StringIO
 from math import inf, nan
 from pathlib import Path
 from typing import NamedTuple
@@ -75,9 +76,17 @@ def kept(file: Path = FILE) -> list[Kept]:
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    """The rows of a limits.csv."""
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+    """The rows of a limits.csv; raises `ValueError` if a row has not one field for each column,
+    as after a comma that is not in quotes."""
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise ValueError(
+                f"{path}: row {number}: has {len(row)} fields for {len(header)} columns; put a"
+                " text with a comma in quotes"
+            )
+    return [dict(zip(header, row)) for row in rows]
 
 
 def engine_of(row: dict[str, str]) -> str:
@@ -168,15 +177,22 @@ def keep(folder: Path) -> None:
     for path, fetched in ((FILE, False), (FILE_OF_FETCHED, True)):
         here = [row for row in found if (engine_of(row) in FETCHED) == fetched]
         rows = {(row["case"], engine_of(row)): row for row in [*rows_of(path), *here]}
-        with path.open("w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(
-                rows[key]
-                for name, case in CASES.items()
-                for engine in (FETCHED if fetched else engines_of(case))
-                if (key := (name, engine)) in rows
-            )
+        ordered = [
+            rows[key]
+            for name, case in CASES.items()
+            for engine in (FETCHED if fetched else engines_of(case))
+            if (key := (name, engine)) in rows
+        ]
+        path.write_text(text_of(ordered), encoding="utf-8", newline="\n")
+
+
+def text_of(rows: Iterable[dict[str, str]]) -> str:
+    """The text of a file of kept limits with these rows of a limits.csv."""
+    text = StringIO()
+    writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import replace
 from functools import cache
 from math import isfinite, isnan
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,7 +18,16 @@ from reports.stability.limits import FULL, NEVER_FAILS, QUICK, Limit, engines_of
 from reports.stability.search import LimitSearch
 from reports.stability.variants import DRIVEN_ENGINES
 from tests.measured import MEASURED
-from tests.reports.stability.kept_limits import Kept, agrees, in_words, kept
+from tests.reports.stability.kept_limits import (
+    FILE,
+    FILE_OF_FETCHED,
+    Kept,
+    agrees,
+    in_words,
+    kept,
+    rows_of,
+    text_of,
+)
 
 KEPT = kept()
 FAST = (
@@ -166,6 +176,23 @@ def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
             assert row.reason
             unknown = row.reason.startswith("not known")
             assert unknown or row.reason.startswith("likely: ") == (row.tested == ""), row
+
+
+@pytest.mark.parametrize("file", [FILE, FILE_OF_FETCHED], ids=lambda file: file.stem)
+def test_the_kept_limits_are_as_they_are_written(file: Path):
+    """Byte for byte, so that an edit by hand leaves a text with a comma in its quotes."""
+    assert text_of(rows_of(file)).encode() == file.read_bytes()
+
+
+def test_a_comma_that_is_not_in_quotes_is_refused(tmp_path: Path):
+    """The negative control: read as two fields, the rest of the reason would stand for its test."""
+    damaged = tmp_path / "limits.csv"
+    text = FILE.read_text("utf-8")
+    row = next(k for k, line in enumerate(text.splitlines(), start=1) if '"explicit' in line)
+    damaged.write_text(text.replace('"explicit', "explicit", 1).replace('²",', "²,", 1), "utf-8")
+
+    with pytest.raises(ValueError, match=f"row {row}: has 16 fields for 15 columns"):
+        rows_of(damaged)
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.25])

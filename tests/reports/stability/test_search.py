@@ -69,7 +69,7 @@ def case(reading: Callable[[float, int], float], values: tuple[float, ...], **mo
             "made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays)
         )
 
-    return Case("made-up", "", "?", "x", "1", values, scene, TOO_FAST, play=play, **more)
+    return Case("made-up", "?", "x", values, scene, TOO_FAST, play=play, **more)
 
 
 def limit_of(one: Case, form: Any = FULL) -> Limit:
