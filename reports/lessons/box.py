@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +19,12 @@ from reports.lessons.lesson import (
     Shown,
     Simulation,
     Slider,
+    tidy,
     time_step,
 )
 from reports.page.style import TRUTH, number
 from scenarios.families.lesson import falling_box
-from scenarios.model import Scenario, Trajectory
+from scenarios.model import Array, Scenario, Scene, State, Trajectory
 from scenarios.truth.exact import with_oracle
 
 ROUNDING = 1e-11  # J, for each disk: some thousand steps, each of which rounds an energy in float64
@@ -47,15 +48,9 @@ def show_box(settings: Settings) -> Shown:
     """Energy over time, and how far from the exact answer as long as there is one."""
     scenario = small_box(settings["e"], settings["n"])
     shown = Simulation.by(scenario, BOX_NAMES, settings["k"])
-    assert shown.truth is not None
-    scene = scenario.scene
-
-    def energy(each: Trajectory) -> np.ndarray:
-        moving = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1)
-        return np.asarray(moving - each.position @ scene.gravity @ scene.mass)
-
+    energies = shown.curves(partial(energy, scenario.scene))
     end = float(shown.truth.t[-1])
-    exact = float(energy(shown.truth)[0] - energy(shown.truth)[-1])
+    exact = float(energies[-1].y[0] - energies[-1].y[-1])
     budgets = {
         name: budget(name, settings["e"], settings["n"], settings["k"], end) for name in EULER
     }
@@ -63,7 +58,7 @@ def show_box(settings: Settings) -> Shown:
         ("the exact answer ends at", f"{number(end)} s"),
         (
             "exact energy taken by collisions until then",
-            f"{number(exact) if exact > 1e-9 else '0'} J",
+            f"{tidy(exact, 1e-9)} J",
         ),
         *((f"{name}, energy until then", each.in_words) for name, each in budgets.items()),
         *(
@@ -78,7 +73,7 @@ def show_box(settings: Settings) -> Shown:
     ]
     return Shown(
         [
-            LessonChart("Kinetic and potential energy", "time in s", "J", shown.curves(energy)),
+            LessonChart("Kinetic and potential energy", "time in s", "J", energies),
             LessonChart(
                 "Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"
             ),
@@ -87,6 +82,12 @@ def show_box(settings: Settings) -> Shown:
         facts,
         box_claims(shown, settings) + budget_claims(settings, budgets, end, exact),
     )
+
+
+def energy(scene: Scene, each: Trajectory | State) -> Array:
+    """J, kinetic and potential energy of all disks, at each sample or now."""
+    moving: Array = (scene.mass * (each.velocity**2).sum(axis=-1) / 2).sum(axis=-1)
+    return moving - each.position @ scene.gravity @ scene.mass
 
 
 class EnergyChange(NamedTuple):
@@ -102,8 +103,7 @@ class EnergyChange(NamedTuple):
     def in_words(self) -> str:
         """With signs."""
         flight, collisions, moved = (
-            number(part, 3) if abs(part) > 1e-9 else "0"
-            for part in (self.flight, self.collisions, self.moved)
+            tidy(part, 1e-9) for part in (self.flight, self.collisions, self.moved)
         )
         return f"flight {flight} J, collisions {collisions} J, moved apart {moved} J"
 
@@ -129,18 +129,14 @@ def budget(name: str, restitution: float, count: int, k: int, until: float) -> E
         before = engine.read()
         engine.step(steps)
         after, impulses = engine.read(), engine.collisions()
-    start, end = (
-        float((scene.mass * (each.velocity**2).sum(axis=1) / 2).sum())
-        - float(each.position @ scene.gravity @ scene.mass)
-        for each in (before, after)
-    )
+    gained = float(energy(scene, after) - energy(scene, before))
     flight = EULER[name] * float(scene.mass.sum() * (scene.gravity**2).sum()) * dt**2 / 2 * steps
     inverse = 1 / np.append(scene.mass, np.inf)  # the last is that of every wall
     taken = sum(
         each.impulse**2 * (inverse[each.i] + inverse[max(each.j, -1)]) / 2 for each in impulses
     )
     collisions = -(1 - restitution) / (1 + restitution) * float(taken)
-    return EnergyChange(flight, collisions, end - start - flight - collisions, impulses)
+    return EnergyChange(flight, collisions, gained - flight - collisions, impulses)
 
 
 def budget_claims(
@@ -225,7 +221,6 @@ def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim
 def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
     """How the energy changes in flight and at collisions, and how near an event-driven engine
     is."""
-    assert played.truth is not None
     scene, dt = played.scenario.scene, played.scenario.dt(settings["k"])
     flight = played.truth.t < played.first_collision
     g = float(np.hypot(*scene.gravity))
@@ -258,7 +253,7 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
                     np.abs(
                         shown.y(name)[: len(flight)][flight]
                         - shown.y(name)[0]
-                        - rate * played.truth.t[flight]  # type: ignore[union-attr]
+                        - rate * played.truth.t[flight]
                     ).max()
                     < ROUNDING * scene.n
                     for name, rate in (
@@ -294,20 +289,16 @@ BOX = Lesson(
     number="3",
     title="A box of small disks",
     asks="Where does the energy go?",
-    text=(
-        (
-            "Small disks start from random positions with random velocities and fall. In a"
-            " collision of a disk with a wall, or with another disk, the relative velocity along"
-            " the normal <code>u</code> becomes <code>u' = −e u</code>, which leaves"
-            " <code>e²</code> of the energy of this part of the motion. Nothing else may take"
-            " energy. Between two collisions the sum of <code>m v²/2 + m g y</code> must stay"
-            " constant."
-        ),
-        (
-            "The exact answer ends where float64 can no longer follow the motion, or where a disk"
-            " comes to rest; the engines go on. [horizon] explains it."
-        ),
-    ),
+    text="""
+    Small disks start from random positions with random velocities and fall. In a collision of a
+    disk with a wall, or with another disk, the relative velocity along the normal
+    <code>u</code> becomes <code>u' = −e u</code>, which leaves <code>e²</code> of the energy of
+    this part of the motion. Nothing else may take energy. Between two collisions the sum of
+    <code>m v²/2 + m g y</code> must stay constant.
+
+    The exact answer ends where float64 can no longer follow the motion, or where a disk comes
+    to rest; the engines go on. [horizon] explains it.
+    """,
     sliders=(
         Slider("e", "Restitution e", (0.5, 0.8, 0.95, 1.0), 2),
         Slider("n", "Disks", (1, 5, 30), 1),

@@ -77,12 +77,12 @@ SEEN = {
 }
 
 # What is changed in the engines of these cases whose names have a +.
-CHANGES = {
-    name.partition("+")[2]: DRIVEN_ENGINES[name].change
+CHANGES = "; ".join(
+    f"<code>+{name.partition('+')[2]}</code>, {DRIVEN_ENGINES[name].change}"
     for seen in SEEN.values()
     for name in CASES[seen.case].also
     if DRIVEN_ENGINES[name].change
-}
+)
 
 
 @cache
@@ -185,8 +185,8 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
     curves = [
         Curve(
             each.engine,
-            [t.value for t in each.trials],
-            [read(t) for t in each.trials],
+            np.array([t.value for t in each.trials]),
+            np.array([read(t) for t in each.trials]),
             mine,
             not mine,
         )
@@ -261,36 +261,28 @@ LIMITS = Lesson(
     number="8",
     title="Where methods fail",
     asks="How harsh may a scene be before a method breaks?",
-    text=(
-        (
-            "Every method works in gentle scenes. If one parameter gets harsher, such as a speed, a"
-            " distance or a size, a method may <b>fail</b> from some value on: it misses a"
-            " collision, limits a spin, or loses a position to rounding. The search tries values"
-            " from gentle to harsh, with the collision at several moments of its step. It stops at"
-            " the first value that fails. Then it halves the gap to the last value that works until"
-            f" the two are at most {QUICK.ratio - 1:.0%} apart."
-        ),
-        (
-            "In the names of the cases and in the reasons v is a speed, R a radius, b the distance"
-            " of the centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force,"
-            " its angular frequency, and h the duration of a substep."
-        ),
-        (
-            "A reason counts as tested if the limit follows from it, or if an engine that differs"
-            " in this one thing gets farther; else it is called likely. The command"
-            " <code>crosscheck stability</code> searches all cases; these are the quick ones."
-            " [threshold] and [digits] explain two of the reasons."
-        ),
-        (
-            "<b>Continuous collision detection</b> (CCD) looks for a contact along the whole path"
-            " of a disk in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a"
-            " disk against walls and static disks, and against moving disks only if it is marked as"
-            " a <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, as does Box2D 2.3 where"
-            " e = 1 and there is no gravity. A name with a + is an engine with one change: "
-            + "; ".join(f"<code>+{name}</code>, {change}" for name, change in CHANGES.items())
-            + "."
-        ),
-    ),
+    text=f"""
+    Every method works in gentle scenes. If one parameter gets harsher, such as a speed, a distance
+    or a size, a method may <b>fail</b> from some value on: it misses a collision, limits a spin, or
+    loses a position to rounding. The search tries values from gentle to harsh, with the collision
+    at several moments of its step. It stops at the first value that fails. Then it halves the gap
+    to the last value that works until the two are at most {QUICK.ratio - 1:.0%} apart.
+
+    In the names of the cases and in the reasons v is a speed, R a radius, b the distance of the
+    centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force, its angular
+    frequency, and h the duration of a substep.
+
+    A reason counts as tested if the limit follows from it, or if an engine that differs in this one
+    thing gets farther; else it is called likely. The command <code>crosscheck stability</code>
+    searches all cases; these are the quick ones. [threshold] and [digits] explain two of the
+    reasons.
+
+    <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a disk
+    in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk against walls and
+    static disks, and against moving disks only if it is marked as a <b>bullet</b>. As matched,
+    Box2D 3.1 plays without CCD, as does Box2D 2.3 where e = 1 and there is no gravity. A name with
+    a + is an engine with one change: {CHANGES}.
+    """,
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
         Slider("engine", "Engine", tuple(DISTINCT), list(DISTINCT).index("box2d:matched")),

@@ -18,8 +18,8 @@ from starlette.routing import BaseRoute, Route
 from adapters.engines import ENGINES, FETCHED
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
-from reports.lessons.crowd import ROUNDED
 from reports.lessons.friction.bounce import CONE as EDGES
+from reports.lessons.horizon import ROUNDED
 from reports.lessons.lesson import Lesson, unbroken
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.mechanisms.float32 import BETWEEN
@@ -96,7 +96,7 @@ def lesson_page(
         looks=looks_of(lesson),
         connects=not grid,
         lesson=lesson,
-        text=[linked(paragraph, links) for paragraph in lesson.text],
+        text=[linked(paragraph, links) for paragraph in lesson.paragraphs],
         grid=grid,
         around=around,
         links=links,

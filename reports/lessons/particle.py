@@ -10,14 +10,14 @@ import numpy as np
 
 from reports.lessons.lesson import (
     Claim,
-    Curve,
     Lesson,
     LessonChart,
     Settings,
     Shown,
     Simulation,
     Slider,
-    run_of,
+    farthest,
+    swept,
     time_step,
 )
 from reports.page.style import TRUTH, number
@@ -48,12 +48,11 @@ def show_particle(settings: Settings) -> Shown:
     scenario = bouncing(speed, gravity)
     played = Simulation.by(scenario, METHODS, settings["k"])
     steps = np.array([scenario.dt(k) for k in STEPS])
-    errors = []
-    for name in METHODS:
-        runs = [Simulation(scenario, [run_of(name, scenario, k)], played.truth) for k in STEPS]
-        errors.append(
-            Curve(name, 1e3 * steps, [np.max(run.errors()[0].y) for run in runs], dots=True)
-        )
+    errors = swept(
+        1e3 * steps,
+        [Simulation.by(scenario, METHODS, k) for k in STEPS],
+        lambda each, scene: farthest("", each, played.truth, scene).y.max(),
+    )
     dt, radius = scenario.dt(settings["k"]), float(scenario.scene.radius[0])
     height = played.curves(lambda each: each.position[:, 0, 1])
     guides = [("x", 1e3 * dt, "here")]
@@ -92,7 +91,6 @@ def way_of(played: Simulation) -> float:
 
 def without_force(played: Simulation) -> list[Claim]:
     """Exact flight, and a bounce that is found up to one step late."""
-    assert played.truth is not None
     way = way_of(played)
     bounces = np.searchsorted(played.truth.collisions.t, played.truth.t, side="right")
     speed = float(np.hypot(*played.scenario.scene.velocity[0]))
@@ -121,7 +119,6 @@ def without_force(played: Simulation) -> list[Claim]:
 
 def with_gravity(played: Simulation) -> list[Claim]:
     """Two orders of the same two lines."""
-    assert played.truth is not None
     g = float(np.hypot(*played.scenario.scene.gravity))
     gain = g * played.runs[0].dt  # m/s in a step
     flight = played.truth.t < played.first_collision
@@ -213,20 +210,16 @@ PARTICLE = Lesson(
     number="1",
     title="A particle and its step",
     asks="How wrong does a particle get when time goes in steps?",
-    text=(
-        (
-            "A particle is a position, a velocity and a radius. A step of <code>dt</code> moves it"
-            " by <code>v dt</code>. The particle bounces between two walls: at a wall its velocity"
-            " is reversed."
-        ),
-        (
-            "Then a force acts. <b>Explicit Euler</b> (<code>reference:lesson</code>) moves with"
-            " the old velocity and then changes it. <b>Symplectic Euler</b>"
-            " (<code>reference:exercise</code>) changes the velocity first and moves with the new"
-            " one. In the last part a step may be longer than the radius of the particle. Then it"
-            " may pass through a wall: this is <b>tunnelling</b>."
-        ),
-    ),
+    text="""
+    A particle is a position, a velocity and a radius. A step of <code>dt</code> moves it by
+    <code>v dt</code>. The particle bounces between two walls: at a wall its velocity is
+    reversed.
+
+    Then a force acts. <b>Explicit Euler</b> (<code>reference:lesson</code>) moves with the old
+    velocity and then changes it. <b>Symplectic Euler</b> (<code>reference:exercise</code>)
+    changes the velocity first and moves with the new one. In the last part a step may be longer
+    than the radius of the particle. Then it may pass through a wall: this is <b>tunnelling</b>.
+    """,
     sliders=(
         Slider("part", "Part of the lesson", tuple(PARTS)),
         time_step(1 / 8, STEPS, STEPS.index(4)),

@@ -55,7 +55,6 @@ def show_thrust(settings: Settings) -> Shown:
     acceleration = settings["a"]
     scenario = thrust_ship(acceleration)
     shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
-    assert shown.truth is not None
     exact, dt = shown.truth, shown.scenario.dt(settings["k"])
 
     def ahead(each: Trajectory) -> np.ndarray:
@@ -144,14 +143,12 @@ THRUST = Lesson(
     number="2",
     title="Force and thrust",
     asks="Does a force move the ship equally far in every engine?",
-    text=(
-        (
-            "A force changes the velocity by <code>F/m dt</code> in a step. How far the ship moves"
-            " depends on the order of updates in a step. Write the step as <code>x' = x + v dt + α"
-            " a dt²</code>: velocity first is <code>α = 1</code>, position first is <code>α ="
-            " 0</code>, the exact parabola is <code>α = ½</code>. [order] shows this for gravity."
-        ),
-    ),
+    text="""
+    A force changes the velocity by <code>F/m dt</code> in a step. How far the ship moves
+    depends on the order of updates in a step. Write the step as <code>x' = x + v dt + α a
+    dt²</code>: velocity first is <code>α = 1</code>, position first is <code>α = 0</code>, the
+    exact parabola is <code>α = ½</code>. [order] shows this for gravity.
+    """,
     sliders=(
         time_step(1 / 16, (16, 8, 4, 2, 1), 3),
         Slider("a", "Acceleration a", (0.25, 1.0, 4.0), 0, "m/s²"),

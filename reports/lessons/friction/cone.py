@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reports.lessons.friction.thrown import FALL, ROUGH, ablated_runs, taken, thrown
+from reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
 from reports.lessons.lesson import (
     Claim,
     Curve,
@@ -15,11 +15,12 @@ from reports.lessons.lesson import (
     Settings,
     Shown,
     Slider,
+    swept,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import ABLATED, distances, filmed, lies_on
+from reports.lessons.mechanisms.ablation import ABLATED, distances, lies_on
 from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scene
+from scenarios.model import Array, Scene, Trajectory
 
 BOX2D_V3 = "box2d_v3:shipped"
 LIMITS = {"µ × whole impulse": True, "µ × impulse before restitution": False}
@@ -37,32 +38,33 @@ FORESEEN, SUBSTEPS = 0.02, 4
 def show_cone(settings: Settings) -> Shown:
     """Friction over normal impulse, and the normal impulse, against e."""
     mu, whole = settings["mu"], LIMITS[settings["limit"]]
-    found: dict[str, list[tuple[float, float]]] = {}
-    for e in STATED:
-        scenario = thrown(ALONG, 0.0, float(e), mu)
-        runs = ablated_runs(BOX2D_V3, {"rub_restituted": whole}, scenario, settings["k"])
-        for run in runs:
-            if run.trajectory is not None:
-                each = taken(run.trajectory, scenario.scene)
-                ratio = float(np.abs(each.along[0] / each.normal[0]))
-                found.setdefault(run.name, []).append((ratio, float(each.normal[0])))
-    exact = {TRUTH: [(mu, (1 + float(e)) * FALL) for e in STATED]}
-    curves = [
-        [
-            Curve(name, STATED, [row[part] for row in rows], dots=name != TRUTH)
-            for name, rows in (found | exact).items()
-        ]
-        for part in (0, 1)
+    played = [
+        ablated_beside(
+            BOX2D_V3, {"rub_restituted": whole}, thrown(ALONG, 0.0, float(e), mu), settings["k"]
+        )
+        for e in STATED
     ]
-    return Shown(
-        [
-            LessonChart("Friction over normal impulse", "restitution e", "Jₜ / Jₙ", curves[0]),
-            LessonChart("Normal impulse", "restitution e", "Jₙ in N s", curves[1]),
-        ],
-        filmed(scenario, runs),
-        [("replayed: e", number(float(STATED[-1]))), *distances(runs[:1], curves[0], "")],
-        cone_claims(mu, whole, scenario.dt(settings["k"]), scenario.scene),
+    chart = LessonChart(
+        "Friction over normal impulse",
+        "restitution e",
+        "Jₜ / Jₙ",
+        [*swept(STATED, played, friction_share), Curve(TRUTH, STATED, np.full(len(STATED), mu))],
     )
+    exact = Curve(TRUTH, STATED, (1 + STATED) * FALL)
+    normal = swept(STATED, played, lambda each, scene: taken(each, scene).normal[0])
+    last = played[-1]
+    return Shown(
+        [chart, LessonChart("Normal impulse", "restitution e", "Jₙ in N s", [*normal, exact])],
+        last.film,
+        [("replayed: e", number(float(STATED[-1]))), *distances(chart)],
+        cone_claims(mu, whole, last.runs[0].dt, last.scenario.scene),
+    )
+
+
+def friction_share(played: Trajectory, scene: Scene) -> float:
+    """The friction impulse over the normal impulse."""
+    each = taken(played, scene)
+    return float(np.abs(each.along[0] / each.normal[0]))
 
 
 def share_of_v3(dt: float, scene: Scene) -> float:
@@ -139,20 +141,17 @@ CONE = Lesson(
     number="9.2",
     title="Friction before restitution",
     asks="Why does Box2D 3.1 give half of the friction at e = 1?",
-    text=(
-        (
-            "Box2D 3.1 solves a step in two parts. In the first a contact stops the approach, and"
-            " friction acts up to <code>µ</code> times the normal impulse of this part,"
-            " <code>m vₙ</code>. In the second part, restitution adds <code>e m vₙ</code>, and"
-            " friction does not act again. The friction cone is that of a collision with"
-            " <code>e = 0</code>. See [friction] for what the cone is."
-        ),
-        (
-            "The ablated reference plays with the mechanisms of Box2D 3.1. Choose what limits its"
-            " friction. The disk is so fast along the floor that the contact slips at every setting"
-            " here. If the contact sticks within the narrower cone, the order does not matter."
-        ),
-    ),
+    text="""
+    Box2D 3.1 solves a step in two parts. In the first a contact stops the approach, and
+    friction acts up to <code>µ</code> times the normal impulse of this part, <code>m vₙ</code>.
+    In the second part, restitution adds <code>e m vₙ</code>, and friction does not act again.
+    The friction cone is that of a collision with <code>e = 0</code>. See [friction] for what
+    the cone is.
+
+    The ablated reference plays with the mechanisms of Box2D 3.1. Choose what limits its
+    friction. The disk is so fast along the floor that the contact slips at every setting here.
+    If the contact sticks within the narrower cone, the order does not matter.
+    """,
     sliders=(
         Slider("limit", "Friction limit", tuple(LIMITS), 0),
         Slider("mu", "Friction µ", (0.05, 0.1, 0.2), 1),

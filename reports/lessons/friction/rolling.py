@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 
 from adapters.mechanisms.ablated import MIXING
-from adapters.mechanisms.table import IMPULSE, Mechanism, mechanisms_of, with_mechanisms
-from adapters.play import play
+from adapters.mechanisms.table import IMPULSE, Mechanism
 from reports.lessons.friction.thrown import ROUGH
 from reports.lessons.lesson import (
     Claim,
@@ -19,9 +18,10 @@ from reports.lessons.lesson import (
     Simulation,
     Slider,
     run_of,
+    tidy,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import ABLATED
+from reports.lessons.mechanisms.ablation import ablated_as
 from reports.page.style import TRUTH, number
 from scenarios.families.friction import G, slide_on_floor
 from scenarios.model import Array, Scenario, Trajectory
@@ -98,21 +98,15 @@ def sliding(spin: float, friction: float) -> Legs:
 
 def facts(played: Simulation) -> list[tuple[str, str]]:
     """The motion of each engine's disk at the end, and how deep it was in the floor."""
-    motions = {run.name: run.trajectory for run in played.runs} | {"exact answer": played.truth}
     return [
         (
-            name,
-            f"in the end {tidy(each.velocity[-1, 0, 0])} m/s, slip {tidy(slip(each)[-1])} m/s;"
-            f" in the floor by at most {tidy(max(1e3 * deepest(each), 0.0))} mm",
+            "exact answer" if name == TRUTH else name,
+            f"in the end {tidy(each.velocity[-1, 0, 0], DOUBLE)} m/s, slip"
+            f" {tidy(slip(each)[-1], DOUBLE)} m/s; in the floor by at most"
+            f" {tidy(max(1e3 * deepest(each), 0.0), DOUBLE)} mm",
         )
-        for name, each in motions.items()
-        if each is not None
+        for name, each in played.motions.items()
     ]
-
-
-def tidy(value: float) -> str:
-    """To three digits; a number that is 0 except for rounding is shown as 0."""
-    return number(value) if abs(value) > DOUBLE else "0"
 
 
 def rolling_claims(settings: Settings, dt: float) -> list[Claim]:
@@ -151,8 +145,8 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
                 f"The disk rolls from the start, v = −R ω = {number(SPEED)} m/s: the point that"
                 " touches is at rest, there is no friction, and the exact velocity stays.",
                 lambda shown: (
-                    np.abs(shown.y(TRUTH) - SPEED).max() <= DOUBLE
-                    and np.abs(shown.y(TRUTH, 1)).max() <= DOUBLE
+                    shown.follows(TRUTH, SPEED, DOUBLE)
+                    and shown.follows(TRUTH, 0.0, DOUBLE, chart=1)
                 ),
             )
         ]
@@ -183,7 +177,7 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
         ),
         Claim(
             f"From t = {when} = {number(rolls)} s on the exact slip is 0, and the velocity stays at"
-            f" {rule} = {number(end) if abs(end) > DOUBLE else '0'} m/s: the disk {ends}.",
+            f" {rule} = {tidy(end, DOUBLE)} m/s: the disk {ends}.",
             lambda shown: (
                 np.abs(shown.y(TRUTH)[shown.x(TRUTH) >= rolls] - end).max() <= DOUBLE
                 and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) >= rolls]).max() <= DOUBLE
@@ -210,9 +204,10 @@ def mixed_claim(spin: float, mu: float, dt: float) -> Claim:
     return Claim(
         f"{SHIPPED} multiplies the coefficients of floor and disk: its friction is µ² ="
         f" {number(mixed)}. It begins to roll 1/µ = {number(1 / mu)} times as late, {when}.",
-        lambda shown: (
-            np.abs(shown.y(SHIPPED) - sliding(spin, mixed).at(shown.x(SHIPPED))[1][:, 0]).max()
-            <= mixed * G * dt + DOUBLE
+        lambda shown: shown.follows(
+            SHIPPED,
+            sliding(spin, mixed).at(shown.x(SHIPPED))[1][:, 0],
+            mixed * G * dt + DOUBLE,
         ),
     )
 
@@ -222,11 +217,8 @@ def depths_of_v3(spin: float, friction: float, k: int, carried: bool) -> tuple[f
     """m, how deep the disk sinks at the most, and m/s in the end, in the ablated reference with the
     mechanisms of Box2D 3.1; carried: whether its contact points turn with the disk."""
     scenario = disk_on_floor(spin, friction)
-    dt = scenario.dt(k)
-    reported = run_of(BOX2D_V3, scenario, k).settings
-    mechanisms = mechanisms_of(BOX2D_V3, reported, scenario.scene, dt)
-    ablated = with_mechanisms([*mechanisms, Mechanism(IMPULSE, {"carried": carried})])
-    played = play(ablated, ABLATED, scenario, dt).trajectory
+    change = Mechanism(IMPULSE, {"carried": carried})
+    played = ablated_as(run_of(BOX2D_V3, scenario, k), scenario, change).trajectory
     assert played is not None
     return deepest(played), float(played.velocity[-1, 0, 0])
 
@@ -312,25 +304,21 @@ ROLLING = Lesson(
     number="9.4",
     title="From sliding to rolling",
     asks="When does a disk that slides begin to roll?",
-    text=(
-        (
-            "A disk touches the floor and slides. Friction <code>µ m g</code> acts against the slip"
-            " <code>v + R ω</code> of the point that touches. It slows the disk and changes its"
-            " spin until the slip is gone. From then on the disk <b>rolls</b>, and on a level floor"
-            " no friction acts any more. A disk with back spin, here <code>ω > 0</code>, may stop"
-            " and return before it rolls."
-        ),
-        (
-            "An engine keeps a coefficient for each shape, and mixes those of floor and disk by a"
-            " rule of its own: pymunk multiplies them, Box2D takes the root of the product. As"
-            " shipped, both have <code>µ</code> here. <code>pymunk:matched</code> gives both the"
-            " root of <code>µ</code>, whose product is <code>µ</code>. [mixing] compares the rules."
-        ),
-        (
-            "The last chart shows the <b>slip at rest</b>: the slip that remains when the disk"
-            " should roll. See [lever] for the slip at rest of Box2D 2.3."
-        ),
-    ),
+    text="""
+    A disk touches the floor and slides. Friction <code>µ m g</code> acts against the slip
+    <code>v + R ω</code> of the point that touches. It slows the disk and changes its spin until
+    the slip is gone. From then on the disk <b>rolls</b>, and on a level floor no friction acts
+    any more. A disk with back spin, here <code>ω > 0</code>, may stop and return before it
+    rolls.
+
+    An engine keeps a coefficient for each shape, and mixes those of floor and disk by a rule of
+    its own: pymunk multiplies them, Box2D takes the root of the product. As shipped, both have
+    <code>µ</code> here. <code>pymunk:matched</code> gives both the root of <code>µ</code>,
+    whose product is <code>µ</code>. [mixing] compares the rules.
+
+    The last chart shows the <b>slip at rest</b>: the slip that remains when the disk should
+    roll. See [lever] for the slip at rest of Box2D 2.3.
+    """,
     sliders=(
         Slider("spin", "Spin ω at the start", (-8.0, 0.0, 16.0, 32.0), 1, "rad/s"),
         Slider("mu", "Friction µ", (0.1, 0.2, 0.4), 1),

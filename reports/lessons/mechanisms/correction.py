@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from adapters.engines import changed
-from adapters.mechanisms.ablated import BOX2D, AblatedReference
-from adapters.play import play_once
-from reports.lessons.lesson import Claim, LessonChart, Settings, Shown, Slider
+from adapters.mechanisms.ablated import BOX2D
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Settings, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     NO_CCD,
     PLAIN,
+    ablated,
     asked,
     distances,
-    filmed,
     lies_on,
-    over_time,
-    page,
-    runs_of,
+    unswept,
 )
 from reports.page.style import number
 from scenarios.families.placing import lay_out
+
+NAMES = (NO_CCD, PLAIN, ABLATED)
 
 
 def show_position_correction(settings: Settings) -> Shown:
@@ -34,19 +30,20 @@ def show_position_correction(settings: Settings) -> Shown:
         lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0),
         0.4,
     )
-    on = AblatedReference(
-        BOX2D, correction_most=0.2, correction_share=settings["share"], slop=settings["slop"] / 1e3
+    corrects = ablated(
+        order=BOX2D,
+        correction_most=0.2,
+        correction_share=settings["share"],
+        slop=settings["slop"] / 1e3,
     )
-    without = partial(changed, "box2d:matched", continuous=False, bullet=False, length_unit=1.0)
-    runs = [play_once(without, NO_CCD, scenario, scenario.dt(1)), *runs_of([], on, scenario, 1)]
-    curves = over_time(runs, lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
-    slop = f"{number(1e3 * runs[0].settings['linear slop in m'][1])} mm"
-    facts = [(f"{NO_CCD}, linear slop", slop), *distances(runs, curves, "mm")]
+    played = Simulation.by(scenario, NAMES, 1, {**unswept(length_unit=1.0), **corrects})
+    curves = played.curves(lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     chart = LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")
+    slop = f"{number(1e3 * played.runs[0].settings['linear slop in m'][1])} mm"
     return Shown(
         [chart],
-        filmed(scenario, runs),
-        facts,
+        played.film,
+        [(f"{NO_CCD}, linear slop", slop), *distances(chart, "mm")],
         correction_claims(settings["share"], settings["slop"]),
     )
 
@@ -98,18 +95,22 @@ def box2d_overlaps(overlap: float, slop: float, steps: int) -> list[float]:
     return found
 
 
-CORRECTION = page(
-    5,
-    "correction",
-    "Slop and position correction",
-    "What becomes of an overlap?",
-    "The exercise removes an overlap in one step, by projection. Box2D removes a share of it in"
-    " each pass and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact."
-    " Here a disk starts deep in a fixed disk, for which there is no exact answer. Continuous"
-    " collision detection (CCD, see [gravity]) is off in Box2D (<code>+no_ccd</code>), because it"
-    " removes the overlap by other means.",
-    [NO_CCD],
-    show_position_correction,
-    Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),
-    Slider("slop", "Slop", (0.0, 1.25, 2.5, 5.0), 0, "mm"),
+CORRECTION = Lesson(
+    name="correction",
+    number="6.5",
+    title="Slop and position correction",
+    asks="What becomes of an overlap?",
+    text="""
+    The exercise removes an overlap in one step, by projection. Box2D removes a share of it in
+    each pass and leaves a small overlap, the <b>slop</b>, so that the disks stay in contact.
+    Here a disk starts deep in a fixed disk, for which there is no exact answer. Continuous
+    collision detection (CCD, see [gravity]) is off in Box2D (<code>+no_ccd</code>), because it
+    removes the overlap by other means.
+    """,
+    sliders=(
+        Slider("share", "Share undone each time", (0.0, 0.1, 0.2, 0.4), 0),
+        Slider("slop", "Slop", (0.0, 1.25, 2.5, 5.0), 0, "mm"),
+    ),
+    names=NAMES,
+    show=show_position_correction,
 )

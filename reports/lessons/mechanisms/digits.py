@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.mechanisms.ablated import AblatedReference
-from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider
-from reports.lessons.mechanisms.ablation import (
-    PLAIN,
-    asked,
-    distances,
-    filmed,
-    lies_on,
-    over_time,
-    page,
-    runs_of,
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Simulation,
+    Slider,
 )
+from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, asked, distances, lies_on
 from reports.page.style import TRUTH, number
 from scenarios.families.placing import lay_out
 
+NAMES = ("box2d:shipped", PLAIN, ABLATED)
 PRECISION = {53: np.float64, 24: np.float32}
 
 
@@ -29,21 +29,19 @@ def show_digits(settings: Settings) -> Shown:
     scenario = asked(
         lay_out(position=[start], velocity=[v], radius=[0.5], mass=[1.0], restitution=0.0), 2.0
     )
-    runs = runs_of(["box2d:shipped"], AblatedReference(precision=PRECISION[digits]), scenario, 4)
+    played = Simulation.by(scenario, NAMES, 4, ablated(precision=PRECISION[digits]))
     exact = start + scenario.times[:, None] * v
-    curves = over_time(
-        runs, lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16)
+    *engines, _ = played.curves(
+        lambda each: np.maximum(np.hypot(*(each.position[:, 0] - exact).T), 1e-16)
     )
-    facts = distances(runs, curves, "m")
-    curves.append(Curve(TRUTH, scenario.times, np.full(scenario.intervals + 1, 1e-16)))
-    millimetres = [Curve(each.name, each.x, 1e3 * np.asarray(each.y)) for each in curves]
+    # Also the exact answer rounds x + v t: of it the law is drawn.
+    curves = [*engines, Curve(TRUTH, scenario.times, np.full(scenario.intervals + 1, 1e-16))]
+    chart = LessonChart("Distance from x + v t", "time in s", "m", curves, "y")
+    millimetres = [Curve(each.name, each.x, 1e3 * each.y) for each in curves]
     return Shown(
-        [
-            LessonChart("Distance from x + v t", "time in s", "m", curves, "y"),
-            LessonChart("The same on a linear axis", "time in s", "mm", millimetres),
-        ],
-        filmed(scenario, runs),
-        facts,
+        [chart, LessonChart("The same on a linear axis", "time in s", "mm", millimetres)],
+        played.film,
+        distances(chart, "m"),
         digits_claims(far, digits, scenario.intervals * 4, scenario.dt(4), curves[0]),
     )
 
@@ -92,16 +90,20 @@ def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) 
     return claims
 
 
-DIGITS = page(
-    7,
-    "digits",
-    "Single precision",
-    "Why does a free disk drift, far from the origin?",
-    "A float32 number has 24 binary digits. The farther a disk is from the origin, the more of"
-    " these digits the integer part of its coordinate takes. Fewer digits remain for the"
-    " displacement in a step.",
-    ["box2d:shipped"],
-    show_digits,
-    Slider("digits", "Binary digits", (53, 24), 0),
-    Slider("far", "Distance from the origin", (1.0, 100.0, 1e4), 2, "m"),
+DIGITS = Lesson(
+    name="digits",
+    number="6.7",
+    title="Single precision",
+    asks="Why does a free disk drift, far from the origin?",
+    text="""
+    A float32 number has 24 binary digits. The farther a disk is from the origin, the more of
+    these digits the integer part of its coordinate takes. Fewer digits remain for the
+    displacement in a step.
+    """,
+    sliders=(
+        Slider("digits", "Binary digits", (53, 24), 0),
+        Slider("far", "Distance from the origin", (1.0, 100.0, 1e4), 2, "m"),
+    ),
+    names=(*NAMES, TRUTH),
+    show=show_digits,
 )

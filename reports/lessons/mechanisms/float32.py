@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,17 +19,17 @@ from reports.lessons.lesson import (
 from reports.lessons.mechanisms.planck import (
     BOX2D,
     COMMAND,
+    KEPT,
     LADDER,
     PLANCK,
     PROFILES,
     SCENES,
-    kept,
     known,
     largest_deviation,
-    recorded,
-    run_of,
+    played,
     whole,
 )
+from reports.lessons.mechanisms.recorded import made_with, table_in
 from reports.page.style import TRUTH, number
 from scenarios.model import Array
 
@@ -41,9 +40,9 @@ ALIKE = 0.02  # of an error: where float32 changes none of a scene by more, one 
 def show_float32(settings: Settings) -> Shown:
     """The error of both at every step size, and float32's share of it in every scene."""
     name, profile = settings["scene"], settings["profile"]
-    scene, truth = known(name)
+    scene, _ = known(name)
     box2d = f"{BOX2D}:{profile}"
-    rows = kept().set_index(["scenario", "profile"]).loc[(name, profile)]
+    rows = table_in(KEPT).set_index(["scenario", "profile"]).loc[(name, profile)]
     rows = rows[rows.substeps.isin(LADDER)]
     ms = 1e3 * scene.sample_interval / rows.substeps.to_numpy(float)
     curves = [
@@ -52,9 +51,6 @@ def show_float32(settings: Settings) -> Shown:
         Curve(BETWEEN, ms, rows.deviation_radii.to_numpy(float), dots=True),
     ]
     middle = scene.middle_substeps
-    film = Simulation(
-        replace(scene, substeps=(middle,)), [run_of(BOX2D, profile, name, middle)], truth
-    ).film
     shares = shares_of(profile)
     percent = 100 * np.abs(list(shares.values()))
     return Shown(
@@ -71,12 +67,12 @@ def show_float32(settings: Settings) -> Shown:
                 "Share of float32 in the error, all scenes",
                 "scenes, from the smallest share",
                 "%, without its sign",
-                [Curve(box2d, np.arange(1, len(percent) + 1), percent, dots=True)],
+                [Curve(box2d, np.arange(1.0, len(percent) + 1), percent, dots=True)],
                 "y",
                 guides=[("y", 1.0, "1 %")],
             ),
         ],
-        film,
+        Simulation.by(scene, (box2d,), middle).film,
         [
             (f"share of float32 in the error of {box2d}", "below 0: float32 makes it smaller"),
             *((each, f"{number(100 * share, 2)} %") for each, share in reversed(shares.items())),
@@ -88,7 +84,7 @@ def show_float32(settings: Settings) -> Shown:
 @cache
 def errors_of_box2d(name: str, profile: str) -> Array:
     """Radii, at each step size of `LADDER`, on this machine."""
-    runs = [run_of(BOX2D, profile, name, substeps) for substeps in LADDER]
+    runs = [played(BOX2D, profile, name, substeps) for substeps in LADDER]
     return np.array([largest_deviation(whole(run), known(name)[1], name) for run in runs])
 
 
@@ -97,7 +93,7 @@ def shares_of(profile: str) -> dict[str, float]:
     """Scene -> the error of Box2D less that of planck, over that of Box2D, at the middle step size;
     from the smallest share to the largest. A scene in which Box2D is exact has none."""
     found: dict[str, float] = {}
-    for row in kept().to_dict("records"):
+    for row in table_in(KEPT).to_dict("records"):
         name = str(row["scenario"])
         usual = row["substeps"] == known(name)[0].middle_substeps
         if row["profile"] == profile and usual and row["box2d_radii"]:
@@ -108,8 +104,8 @@ def shares_of(profile: str) -> dict[str, float]:
 def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list[Claim]:
     """What the errors of a scene show; `middle`: the place of the middle step size."""
     planck, box2d = f"{PLANCK}:{profile}", f"{BOX2D}:{profile}"
-    p, b, between = (np.asarray(curve.y, float) for curve in curves)
-    ms = np.asarray(curves[0].x, float)
+    p, b, between = (curve.y for curve in curves)
+    ms = curves[0].x
 
     def share(shown: Shown) -> Array:
         return 1 - shown.y(planck) / shown.y(box2d)
@@ -208,18 +204,15 @@ SINGLE = Lesson(
     number="6.10",
     title="planck against Box2D 2.3: what float32 costs",
     asks="How much of an error is the rounding of float32?",
-    text=(
-        (
-            "Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which"
-            " computes in float64. Both have the same settings here, so they differ only by"
-            " rounding. The error of Box2D minus that of planck is the <b>share of float32</b>. A"
-            " share below 0 means that float32 makes the error smaller."
-        ),
-        (
-            "A smaller step makes the error of the method smaller. It also makes more steps, and"
-            " each step rounds. See [digits] for what rounding does far from the origin."
-        ),
-    ),
+    text="""
+    Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which
+    computes in float64. Both have the same settings here, so they differ only by rounding. The
+    error of Box2D minus that of planck is the <b>share of float32</b>. A share below 0 means
+    that float32 makes the error smaller.
+
+    A smaller step makes the error of the method smaller. It also makes more steps, and each
+    step rounds. See [digits] for what rounding does far from the origin.
+    """,
     sliders=(
         Slider("scene", "Scene", SCENES, 0),
         Slider("profile", "Profile", PROFILES, 0),
@@ -232,6 +225,6 @@ SINGLE = Lesson(
     show=show_float32,
     recorded=(
         "The numbers of planck, the distance between the two and the share of float32 in all scenes"
-        f" were recorded on {recorded()}, by {COMMAND}."
+        f" were recorded on {made_with(KEPT)}, by {COMMAND}."
     ),
 )

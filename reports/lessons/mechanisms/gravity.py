@@ -2,58 +2,52 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from adapters.engines import changed
-from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK, AblatedReference
-from adapters.play import play_once
-from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider, time_step
+from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Settings,
+    Shown,
+    Simulation,
+    Slider,
+    time_step,
+)
 from reports.lessons.mechanisms.ablation import (
+    ABLATED,
     FLOAT32,
     NO_CCD,
     PLAIN,
+    ablated,
     distances,
-    filmed,
     lies_on,
-    over_time,
-    page,
-    runs_of,
+    unswept,
 )
 from reports.page.style import TRUTH, number
 from scenarios.families.walls import bouncing_ball_e1
 from scenarios.model import Array, Scene
 
+NAMES = (NO_CCD, "box2d:matched", "pymunk:matched", PLAIN, ABLATED)
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
 
 
 def show_gravity(settings: Settings) -> Shown:
     """The height of a ball that should bounce for ever."""
     scenario, k = bouncing_ball_e1(), settings["k"]
-    names = ["box2d:matched", "pymunk:matched"]
-    ablated = AblatedReference(order=ORDERS[settings["order"]])
-    without = partial(changed, "box2d:matched", continuous=False, bullet=False)
-    dt = scenario.dt(k)
-    runs = [play_once(without, NO_CCD, scenario, dt), *runs_of(names, ablated, scenario, k)]
-    curves = over_time(runs, lambda each: each.position[:, 0, 1])
-    facts = distances(runs, curves, "m")
-    assert scenario.truth is not None
-    curves.append(Curve(TRUTH, scenario.times, scenario.truth(scenario.times).position[:, 0, 1]))
-    start = float(scenario.scene.position[0, 1])
-    turns = [[start, *turned(np.asarray(curve.y, float))] for curve in curves]
-    heights = [
-        Curve(curve.name, np.arange(len(found)), found, dots=True)
-        for curve, found in zip(curves, turns)
-    ]
+    makes = {**unswept(), **ablated(order=ORDERS[settings["order"]])}
+    played = Simulation.by(scenario, NAMES, k, makes)
+    curves = played.curves(lambda each: each.position[:, 0, 1])
+    chart = LessonChart("Height of the centre", "time in s", "m", curves)
+    turns = [(curve.name, np.append(curve.y[0], turned(curve.y))) for curve in curves]
+    heights = [Curve(name, np.arange(float(len(found))), found, dots=True) for name, found in turns]
     return Shown(
-        [
-            LessonChart("Height of the centre", "time in s", "m", curves),
-            LessonChart("How high it rises", "bounces so far", "m", heights),
-        ],
-        filmed(scenario, runs),
-        facts,
-        bounce_claims(scenario.scene, dt, settings["order"]),
+        [chart, LessonChart("How high it rises", "bounces so far", "m", heights)],
+        played.film,
+        distances(chart, "m"),
+        bounce_claims(scenario.scene, scenario.dt(k), settings["order"]),
     )
 
 
@@ -121,18 +115,22 @@ def turned(y: Array) -> Array:
     return y[1:-1][(y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])]
 
 
-GRAVITY = page(
-    4,
-    "gravity",
-    "Impulse before or after gravity",
-    "Why does a ball in Box2D bounce ever higher?",
-    "A bounce reverses the velocity with which a ball meets the floor. If gravity has already"
-    " changed this velocity in the step, the change is reversed, too."
-    " <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a"
-    " disk in a step, not only at its end. Box2D plays twice, with CCD and without it"
-    " (<code>+no_ccd</code>), because CCD hides the effect at some step sizes.",
-    [NO_CCD, "box2d:matched", "pymunk:matched"],
-    show_gravity,
-    Slider("order", "Velocity that is reversed", tuple(ORDERS), 0),
-    time_step(1 / 60, (8, 4, 2, 1), 1),
+GRAVITY = Lesson(
+    name="gravity",
+    number="6.4",
+    title="Impulse before or after gravity",
+    asks="Why does a ball in Box2D bounce ever higher?",
+    text="""
+    A bounce reverses the velocity with which a ball meets the floor. If gravity has already
+    changed this velocity in the step, the change is reversed, too. <b>Continuous collision
+    detection</b> (CCD) looks for a contact along the whole path of a disk in a step, not only
+    at its end. Box2D plays twice, with CCD and without it (<code>+no_ccd</code>), because CCD
+    hides the effect at some step sizes.
+    """,
+    sliders=(
+        Slider("order", "Velocity that is reversed", tuple(ORDERS), 0),
+        time_step(1 / 60, (8, 4, 2, 1), 1),
+    ),
+    names=(*NAMES, TRUTH),
+    show=show_gravity,
 )

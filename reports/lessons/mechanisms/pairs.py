@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.mechanisms.ablation import Read
+from reports.lessons.lesson import Read
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scene, Trajectory
 

@@ -255,7 +255,7 @@ NO_CLAIM = {
 
 def sentences(lesson: Lesson) -> list[str]:
     """Of its paragraphs, without their markup, each with a capital letter."""
-    plain = re.sub(r"<[^>]*>|\[\w+\]", "", " ".join(lesson.text))
+    plain = re.sub(r"<[^>]*>|\[\w+\]", "", " ".join(lesson.paragraphs))
     return [each[:1].upper() + each[1:] for each in re.split(r"(?<=[.?!:;]) ", plain)]
 
 
@@ -281,7 +281,7 @@ def test_a_float32_number_has_24_binary_digits():
 )
 def test_a_limit_is_bracketed_as_closely_as_the_text_says(cases: int | None):
     """The ratio of what works to what fails, of all limits of the cases of lesson 8."""
-    assert f"{QUICK.ratio - 1:.0%} apart" in LESSONS["limits"].text[0]
+    assert f"{QUICK.ratio - 1:.0%} apart" in LESSONS["limits"].paragraphs[0]
     for seen in list(SEEN.values())[:cases]:
         for limit in limits_of(seen.case):
             if limit.verdict == LIMIT:

@@ -178,7 +178,7 @@ def test_a_lesson_links_to_what_it_speaks_of():
 @pytest.mark.parametrize("name", LESSONS)
 def test_every_lesson_that_a_text_speaks_of_is_there(name: str):
     """A name that is wrong raises."""
-    for paragraph in LESSONS[name].text:
+    for paragraph in LESSONS[name].paragraphs:
         assert "[" not in linked(paragraph, LIVE)
 
 
