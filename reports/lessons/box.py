@@ -15,7 +15,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -44,16 +43,14 @@ EULER = {"reference:lesson": 1, "reference:exercise": -1}  # the sign of its gai
 BOX_NAMES = ("reference:lesson", "reference:exercise", "pymunk:matched", "event_driven:float64")
 
 
-def show_box(settings: Settings) -> Shown:
+def show_box(e: float, n: int, k: int) -> Shown:
     """Energy over time, and how far from the exact answer as long as there is one."""
-    scenario = small_box(settings["e"], settings["n"])
-    shown = Simulation.by(scenario, BOX_NAMES, settings["k"])
+    scenario = small_box(e, n)
+    shown = Simulation.by(scenario, BOX_NAMES, k)
     energies = shown.curves(partial(energy, scenario.scene))
     end = float(shown.truth.t[-1])
     exact = float(energies[-1].y[0] - energies[-1].y[-1])
-    budgets = {
-        name: budget(name, settings["e"], settings["n"], settings["k"], end) for name in EULER
-    }
+    budgets = {name: budget(name, e, n, k, end) for name in EULER}
     facts = [
         ("the exact answer ends at", f"{number(end)} s"),
         (
@@ -80,7 +77,7 @@ def show_box(settings: Settings) -> Shown:
         ],
         shown.film,
         facts,
-        box_claims(shown, settings) + budget_claims(settings, budgets, end, exact),
+        box_claims(shown, e) + budget_claims(shown.scenario, budgets, end, exact),
     )
 
 
@@ -140,7 +137,7 @@ def budget(name: str, restitution: float, count: int, k: int, until: float) -> E
 
 
 def budget_claims(
-    settings: Settings, budgets: dict[str, EnergyChange], end: float, exact: float
+    scenario: Scenario, budgets: dict[str, EnergyChange], end: float, exact: float
 ) -> list[Claim]:
     """What becomes of the energy after the first collision; end: s, of the exact answer; exact: J
     that its collisions take."""
@@ -165,7 +162,7 @@ def budget_claims(
             ),
         )
     ]
-    if settings["e"] == 1.0:
+    if scenario.scene.restitution == 1.0:
         claims.append(
             Claim(
                 "With e = 1 a collision takes nothing: the energy of reference:lesson rises by what"
@@ -192,18 +189,18 @@ def budget_claims(
             ),
         )
     )
-    if settings["e"] == 0.5 and end == SECONDS:
-        claims.append(resting_claim(settings, budgets))
+    if scenario.scene.restitution == 0.5 and end == SECONDS:
+        claims.append(resting_claim(scenario, budgets))
     return claims
 
 
-def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim:
+def resting_claim(scenario: Scenario, budgets: dict[str, EnergyChange]) -> Claim:
     """Why the two count so many and so few collisions once the disks lie on the floor."""
-    steps = round(SECONDS * 60 * settings["k"])
+    steps = scenario.intervals * scenario.substeps[0]
 
     def last(name: str) -> float:
         late = sum(each.step >= steps - 60 for each in budgets[name].impulses)
-        return float(late / 60 / settings["n"])
+        return float(late / 60 / scenario.scene.n)
 
     return Claim(
         "In the end the disks lie on the floor. reference:exercise puts each back in every step and"
@@ -218,10 +215,10 @@ def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim
     )
 
 
-def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
+def box_claims(played: Simulation, e: float) -> list[Claim]:
     """How the energy changes in flight and at collisions, and how near an event-driven engine
     is."""
-    scene, dt = played.scenario.scene, played.scenario.dt(settings["k"])
+    scene, dt = played.scenario.scene, played.runs[0].dt
     flight = played.truth.t < played.first_collision
     g = float(np.hypot(*scene.gravity))
     gain = float(scene.mass.sum()) * g**2 * dt / 2  # W
@@ -264,7 +261,7 @@ def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
                 ),
             ),
         )
-    if settings["e"] == 1.0:
+    if e == 1.0:
         claims.append(
             Claim(
                 "With e = 1 the exact energy stays constant through every collision.",

@@ -11,7 +11,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -61,20 +60,20 @@ def cost(name: str, scenario: Scenario) -> tuple[float, float]:
     return least / steps * 1e6, second / least
 
 
-def show_cost(settings: Settings) -> Shown:
+def show_cost(sizes: str, fill: float) -> Shown:
     """Time of a step against the number of disks, and how many pairs there are."""
-    sizes = SIZES[settings["sizes"]]
-    scenes = [crowd(size, settings["fill"]) for size in sizes]
+    numbers = SIZES[sizes]
+    scenes = [crowd(size, fill) for size in numbers]
     costs = {name: [cost(name, scene) for scene in scenes] for name in NAMES}
     curves = [
-        Curve(name, np.array(sizes), np.array([each for each, _ in found]), dots=True)
+        Curve(name, np.array(numbers), np.array([each for each, _ in found]), dots=True)
         for name, found in costs.items()
     ]
     noise = max(ratio for found in costs.values() for _, ratio in found) - 1
-    last = sizes[-1]
-    facts = [(f"pairs of {size} disks", str(size * (size - 1) // 2)) for size in (sizes[0], last)]
+    few, many = numbers[0], numbers[-1]
+    facts = [(f"pairs of {size} disks", str(size * (size - 1) // 2)) for size in (few, many)]
     facts += [
-        (f"{curve.name}, from {sizes[0]} to {last} disks", f"{number(growth_of(curve), 2)} times")
+        (f"{curve.name}, from {few} to {many} disks", f"{number(growth_of(curve), 2)} times")
         for curve in curves
     ]
     replayed = with_oracle(max((s for s in scenes if s.scene.n <= MOST_DISKS), key=size_of))
@@ -85,7 +84,7 @@ def show_cost(settings: Settings) -> Shown:
         [LessonChart("Cost of a step", "disks", "µs a step", curves, "xy")],
         film,
         facts,
-        cost_claims(sizes, growth_of(curves[0]), noise),
+        cost_claims(few, many, growth_of(curves[0]), noise),
         opening={"pace": replayed.duration / SECONDS},
     )
 
@@ -100,14 +99,13 @@ def growth_of(curve: Curve) -> float:
     return float(curve.y[-1] / curve.y[0])
 
 
-def cost_claims(sizes: tuple[int, ...], grown: float, noise: float) -> list[Claim]:
+def cost_claims(few: int, many: int, grown: float, noise: float) -> list[Claim]:
     """The pairs dominate among many disks, the call among few; grown: how much longer the most
     disks take; noise: by what share the two shortest runs differ.
 
     The bounds leave room for a machine that does other things, too: among many disks 64 times the
     pairs cost 40 to 60 times as much on one that is idle, as the call itself stays.
     """
-    few, many = sizes[0], sizes[-1]
     pairs = many * (many - 1) / (few * (few - 1))
     more = (
         f" What exceeds {number(pairs, 2)} times is no work of pairs: the machine did other things,"

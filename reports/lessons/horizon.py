@@ -14,7 +14,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -41,10 +40,10 @@ def field(seed: int, restitution: float) -> Scenario:
     return with_oracle(Scenario("field", "How long is it comparable?", "", scene, 20.0, 1 / 32))
 
 
-def show_horizon(settings: Settings) -> Shown:
+def show_horizon(seed: int, e: float, k: int) -> Shown:
     """The error as long as there is an exact answer, and the energy."""
-    scenario = field(settings["seed"], settings["e"])
-    shown = Simulation.by(scenario, NAMES, settings["k"])
+    scenario = field(seed, e)
+    shown = Simulation.by(scenario, NAMES, k)
     scene = scenario.scene
 
     def energy(each: Trajectory) -> Array:
@@ -54,7 +53,7 @@ def show_horizon(settings: Settings) -> Shown:
         return share
 
     end = float(shown.truth.t[-1])
-    moved = moved_by_a_rounding(settings["seed"], settings["e"], settings["k"])
+    moved = moved_by_a_rounding(seed, e, k)
     kept = [float(energy(shown.motions[name])[-1]) for name in STEPPED]
     return Shown(
         [
@@ -84,7 +83,7 @@ def show_horizon(settings: Settings) -> Shown:
                 for name, each in shown.motions.items()
             ),
         ],
-        horizon_claims(shown, settings["e"], kept, moved),
+        horizon_claims(shown, e, kept, moved),
     )
 
 

@@ -29,7 +29,6 @@ POINTS = 400  # of a curve, at most: more than a chart has pixels for
 BEFORE_A_UNIT = re.compile(
     r"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:[mµnk]?[ms]|kg|rad|Hz|kHz|J|N|%)(?:[/²³·]\S*)?(?:\W|$))"
 )
-Settings = Mapping[str, Any]
 Read = Callable[[Trajectory], Array]  # what a curve shows of a motion
 Makes = Mapping[str, Callable[[], Engine]]  # name -> how that engine is made
 
@@ -246,7 +245,7 @@ class Lesson:
             trend is a claim of `show`, not text.
         sliders: what can be changed.
         names: who may be drawn, in the order of the legend.
-        show: settings (key -> value) -> what is shown.
+        show: what is shown where the sliders have these values; its arguments are their keys.
         recorded: whose numbers are not of a run of now, and when and with what they were made; a
             sentence, or "".
     """
@@ -258,7 +257,7 @@ class Lesson:
     text: str
     sliders: Sequence[Slider]
     names: Sequence[str]
-    show: Callable[[Settings], Shown]
+    show: Callable[..., Shown]
     recorded: str = ""
 
     @property
@@ -280,7 +279,7 @@ class Lesson:
                     f"{slider.key} = {place}: must be from 0 to {len(slider.values) - 1}"
                 )
         return self.show(
-            {slider.key: slider.values[place] for slider, place in zip(self.sliders, places)}
+            **{slider.key: slider.values[place] for slider, place in zip(self.sliders, places)}
         )
 
     @property

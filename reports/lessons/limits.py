@@ -20,7 +20,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Slider,
 )
@@ -77,7 +76,7 @@ SEEN = {
 }
 
 # What is changed in the engines of these cases whose names have a +.
-CHANGES = "; ".join(
+CHANGES = dict.fromkeys(
     f"<code>+{name.partition('+')[2]}</code>, {DRIVEN_ENGINES[name].change}"
     for seen in SEEN.values()
     for name in CASES[seen.case].also
@@ -117,12 +116,12 @@ def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]
     )
 
 
-def show_limits(settings: Settings) -> Shown:
+def show_limits(case: str, engine: str, place: int) -> Shown:
     """The run at this value beside the exact answer, and the readings of all engines up to their
     limits."""
-    seen, engine = SEEN[settings["case"]], settings["engine"]
-    case, value, limits = CASES[seen.case], seen.value(settings["place"]), limits_of(seen.case)
-    trial, scenario, run = run_at(case, engine, value)
+    seen = SEEN[case]
+    asked, value, limits = CASES[seen.case], seen.value(place), limits_of(seen.case)
+    trial, scenario, run = run_at(asked, engine, value)
     assert scenario.truth is not None
     truth = scenario.truth(scenario.times)
     drawn = [(engine, run.trajectory), (TRUTH, truth)]
@@ -131,14 +130,14 @@ def show_limits(settings: Settings) -> Shown:
     return Shown(
         [
             LessonChart(seen.what, "time in s", seen.unit, curves),
-            readings(case, limits, engine, value),
+            readings(asked, limits, engine, value),
         ],
         Comparison(scenario, truth, [run], pd.DataFrame()),
-        [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in DISTINCT],
-        limit_claims(case, found),
-        in_numbers(case, trial, found),
+        [(limit.engine, in_words(limit, asked)) for limit in limits if limit.engine in DISTINCT],
+        limit_claims(asked, found),
+        in_numbers(asked, trial, found),
         {"pace": scenario.duration / SECONDS} | event_of(trial),
-        {"place": with_unit(f"{case.parameter} = {number(value)}", case)},
+        {"place": with_unit(f"{asked.parameter} = {number(value)}", asked)},
     )
 
 
@@ -281,7 +280,7 @@ LIMITS = Lesson(
     in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk against walls and
     static disks, and against moving disks only if it is marked as a <b>bullet</b>. As matched,
     Box2D 3.1 plays without CCD, as does Box2D 2.3 where e = 1 and there is no gravity. A name with
-    a + is an engine with one change: {CHANGES}.
+    a + is an engine with one change: {"; ".join(CHANGES)}.
     """,
     sliders=(
         Slider("case", "Case", tuple(SEEN)),

@@ -14,7 +14,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -154,10 +153,10 @@ def pair(vector: Array) -> str:
     return f"({x}, {y})"
 
 
-def show_meeting(settings: Settings) -> Shown:
+def show_meeting(e: float, ratio: float, offset: float, k: int) -> Shown:
     """The collision, drawn and in numbers."""
-    scenario = two(settings["e"], settings["ratio"], settings["offset"])
-    shown = Simulation.by(scenario, NAMES, settings["k"])
+    scenario = two(e, ratio, offset)
+    shown = Simulation.by(scenario, NAMES, k)
     return Shown(
         [
             LessonChart(
@@ -171,14 +170,13 @@ def show_meeting(settings: Settings) -> Shown:
             ),
         ],
         shown.film,
-        claims=meeting_claims(settings),
-        steps=in_numbers(scenario.scene, shown.scenario.dt(settings["k"])),
+        claims=meeting_claims(e, ratio, offset, k),
+        steps=in_numbers(scenario.scene, scenario.dt(k)),
     )
 
 
-def meeting_claims(settings: Settings) -> list[Claim]:
+def meeting_claims(e: float, ratio: float, offset: float, k: int) -> list[Claim]:
     """Off the centre line a late normal is wrong; on the centre line every normal is the same."""
-    offset = settings["offset"]
     # A velocity below 3 m/s that is rounded a few times: by Box2D in float32, by the others in
     # float64.
     single, double = 3e-7, 4e-15
@@ -212,7 +210,7 @@ def meeting_claims(settings: Settings) -> list[Claim]:
                 and abs(shown.y(NAMES[0])[-1] - shown.y(NAMES[1])[-1]) <= double
             ),
         ),
-        *box2d_claims(settings),
+        *box2d_claims(e, ratio, offset, k),
         exact,
     ]
 
@@ -222,9 +220,8 @@ def off(shown: Shown, name: str) -> float:
     return float(abs(shown.y(name)[-1] - shown.y(TRUTH)[-1]))
 
 
-def box2d_claims(settings: Settings) -> list[Claim]:
+def box2d_claims(e: float, ratio: float, offset: float, k: int) -> list[Claim]:
     """When Box2D reads the normal, and which of its mechanisms decides that."""
-    restitution, ratio, offset, k = (settings[key] for key in ("e", "ratio", "offset", "k"))
     early = Claim(
         "With this long step box2d:matched leaves with a velocity at least five times nearer to"
         " the exact one than pymunk:matched: its continuous collision detection (CCD) stops the"
@@ -237,10 +234,10 @@ def box2d_claims(settings: Settings) -> list[Claim]:
         " errors of velocity differ by less than a hundredth.",
         lambda shown: abs(off(shown, NAMES[2]) / off(shown, NAMES[1]) - 1) < 0.01,
     )
-    if k == 1 and restitution < 1.0:
+    if k == 1 and e < 1.0:
         return [early]
     if k == 1:
-        on = box2d_with_ccd(restitution, ratio, offset, k, MATCHED["length_unit"])
+        on = box2d_with_ccd(e, ratio, offset, k, MATCHED["length_unit"])
         return [
             late,
             Claim(
@@ -249,9 +246,9 @@ def box2d_claims(settings: Settings) -> list[Claim]:
                 lambda shown: on < off(shown, NAMES[2]) / 5,
             ),
         ]
-    deep = overlap_found(two(restitution, ratio, offset).scene, INTERVAL / k)
-    off_too = ", and at e = 1 the profile switches CCD off" if restitution == 1.0 else ""
-    finer = box2d_with_ccd(restitution, ratio, offset, k, MATCHED["length_unit"] / 10)
+    deep = overlap_found(two(e, ratio, offset).scene, INTERVAL / k)
+    off_too = ", and at e = 1 the profile switches CCD off" if e == 1.0 else ""
+    finer = box2d_with_ccd(e, ratio, offset, k, MATCHED["length_unit"] / 10)
     return [
         late,
         Claim(

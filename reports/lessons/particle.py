@@ -12,7 +12,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -42,18 +41,18 @@ def bouncing(speed: float, gravity: float) -> Scenario:
     )
 
 
-def show_particle(settings: Settings) -> Shown:
+def show_particle(part: str, k: int) -> Shown:
     """Height over time, and the error against the step."""
-    speed, gravity, claims = PARTS[settings["part"]]
+    speed, gravity, claims = PARTS[part]
     scenario = bouncing(speed, gravity)
-    played = Simulation.by(scenario, METHODS, settings["k"])
-    steps = np.array([scenario.dt(k) for k in STEPS])
+    played = Simulation.by(scenario, METHODS, k)
+    steps = np.array([scenario.dt(each) for each in STEPS])
     errors = swept(
         1e3 * steps,
-        [Simulation.by(scenario, METHODS, k) for k in STEPS],
+        [Simulation.by(scenario, METHODS, each) for each in STEPS],
         lambda each, scene: farthest("", each, played.truth, scene).y.max(),
     )
-    dt, radius = scenario.dt(settings["k"]), float(scenario.scene.radius[0])
+    dt, radius = scenario.dt(k), float(scenario.scene.radius[0])
     height = played.curves(lambda each: each.position[:, 0, 1])
     guides = [("x", 1e3 * dt, "here")]
     if speed * scenario.dt(STEPS[-1]) > radius:

@@ -12,7 +12,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -50,19 +49,18 @@ THRUST_NAMES = (
 )
 
 
-def show_thrust(settings: Settings) -> Shown:
+def show_thrust(k: int, a: float) -> Shown:
     """Which engines are ahead of the parabola and which are behind, and the formula for it."""
-    acceleration = settings["a"]
-    scenario = thrust_ship(acceleration)
-    shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
-    exact, dt = shown.truth, shown.scenario.dt(settings["k"])
+    scenario = thrust_ship(a)
+    shown = Simulation.by(scenario, THRUST_NAMES, k)
+    exact, dt = shown.truth, scenario.dt(k)
 
     def ahead(each: Trajectory) -> np.ndarray:
         return 1e3 * (each.position[:, 0, 0] - exact.position[: len(each), 0, 0])
 
     seconds = min(exact.t[-1], STOP) - START
     laws = {
-        run.name: 1e3 * (ENGINES[run.name].alpha - 0.5) * acceleration * dt * seconds
+        run.name: 1e3 * (ENGINES[run.name].alpha - 0.5) * a * dt * seconds
         for run in shown.runs
         if run.status == "ok"
     }

@@ -13,7 +13,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -47,10 +46,9 @@ class Law(NamedTuple):
     edge: float
 
 
-def show_bounce(settings: Settings) -> Shown:
+def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
     """The impulse in its cone; the friction impulse and the spin at every angle."""
-    e, mu, spin = settings["e"], settings["mu"], settings["spin"]
-    along = speed_along(settings["angle"])
+    along = speed_along(angle)
     here = Simulation.by(thrown(along, spin, e, mu), NAMES, 1)
     scene, impulses = here.scenario.scene, taken_by(here)
     normal = float(impulses[TRUTH].normal[0])
@@ -61,16 +59,16 @@ def show_bounce(settings: Settings) -> Shown:
     return Shown(
         [
             cone_chart(impulses, law),
-            friction_chart(angles, swept, law, settings["angle"]),
-            spin_chart(angles, swept, spin, float(scene.inertia[0]), settings["angle"]),
+            friction_chart(angles, swept, law, angle),
+            spin_chart(angles, swept, spin, float(scene.inertia[0]), angle),
         ],
         here.film,
         [
             ("exact answer" if name == TRUTH else name, left_with(each, scene))
             for name, each in impulses.items()
         ],
-        bounce_claims(settings, law, angles),
-        in_numbers(settings, law, float(impulses[TRUTH].along[0])),
+        bounce_claims(e, mu, angle, spin, law, angles),
+        in_numbers(e, mu, angle, spin, law, float(impulses[TRUTH].along[0])),
     )
 
 
@@ -149,9 +147,10 @@ def left_with(each: Taken, scene: Scene) -> str:
     )
 
 
-def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str, str]]:
+def in_numbers(
+    e: float, mu: float, angle: float, spin: float, law: Law, friction: float
+) -> list[tuple[str, str]]:
     """Slip, normal impulse, cone and friction impulse, with the numbers of this bounce."""
-    angle, spin = settings["angle"], settings["spin"]
     slip = float(slip_at(angle, spin))
     along, slips, size, need, found = (
         tidy(float(value), SINGLE, 4)
@@ -164,8 +163,7 @@ def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str,
         ),
         (
             "Normal impulse",
-            f"Jₙ = (1 + e) m vₙ = {number(1 + settings['e'])} · 1 · {number(FALL)} ="
-            f" {number(law.normal)} N s",
+            f"Jₙ = (1 + e) m vₙ = {number(1 + e)} · 1 · {number(FALL)} = {number(law.normal)} N s",
         ),
         (
             "To stick",
@@ -174,7 +172,7 @@ def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str,
         ),
         (
             "Cone",
-            f"µ Jₙ = {number(settings['mu'])} · {number(law.normal)} = {number(law.edge)} N s",
+            f"µ Jₙ = {number(mu)} · {number(law.normal)} = {number(law.edge)} N s",
         ),
         (
             "Friction impulse",
@@ -184,9 +182,11 @@ def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str,
     ]
 
 
-def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
+def bounce_claims(
+    e: float, mu: float, angle: float, spin: float, law: Law, angles: Array
+) -> list[Claim]:
     """When the contact sticks, which engines have the exact answer, and what the others do."""
-    slips = slip_at(angles, settings["spin"])
+    slips = slip_at(angles, spin)
     exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
     return [
         Claim(
@@ -198,7 +198,7 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
                 and abs(abs(shown.y(CONE, 1)[0]) - law.edge) <= DOUBLE
             ),
         ),
-        *claims_here(float(slip_at(settings["angle"], settings["spin"])), settings["spin"], law),
+        *claims_here(float(slip_at(angle, spin)), spin, law),
         Claim(
             "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
             f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in"
@@ -218,9 +218,9 @@ def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
             f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
             f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
             " friction impulse should change it.",
-            lambda shown: turned_short(shown, settings["spin"]),
+            lambda shown: turned_short(shown, spin),
         ),
-        cone_of_v3(settings["e"], settings["mu"]),
+        cone_of_v3(e, mu),
     ]
 
 

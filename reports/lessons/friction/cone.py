@@ -12,7 +12,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Slider,
     swept,
@@ -35,13 +34,11 @@ CARRIED = 2e-3
 FORESEEN, SUBSTEPS = 0.02, 4
 
 
-def show_cone(settings: Settings) -> Shown:
+def show_cone(limit: str, mu: float, k: int) -> Shown:
     """Friction over normal impulse, and the normal impulse, against e."""
-    mu, whole = settings["mu"], LIMITS[settings["limit"]]
+    whole = LIMITS[limit]
     played = [
-        ablated_beside(
-            BOX2D_V3, {"rub_restituted": whole}, thrown(ALONG, 0.0, float(e), mu), settings["k"]
-        )
+        ablated_beside(BOX2D_V3, {"rub_restituted": whole}, thrown(ALONG, 0.0, float(e), mu), k)
         for e in STATED
     ]
     chart = LessonChart(

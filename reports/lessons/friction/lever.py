@@ -12,7 +12,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Slider,
     swept,
@@ -31,9 +30,9 @@ SKIN = 0.01  # m, of a wall: b2_polygonRadius, two slops of 5 mm
 SINGLE = 1e-6
 
 
-def show_lever(settings: Settings) -> Shown:
+def show_lever(where: str, k: int) -> Shown:
     """The lever arm over the radius, against the radius."""
-    share, k = WHERE[settings["where"]], settings["k"]
+    share = WHERE[where]
     played = [
         ablated_beside(BOX2D, {"lever": share}, thrown(8.0, 0.0, 0.5, 0.1, float(radius)), k)
         for radius in RADII

@@ -13,7 +13,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -39,9 +38,8 @@ DOUBLE = 960 * 8 * 2.0**-53
 STILL = 1e-16  # m/s, as low as a logarithmic axis goes
 
 
-def show_rolling(settings: Settings) -> Shown:
+def show_rolling(spin: float, mu: float, k: int) -> Shown:
     """Velocity and slip over time, and the slip once more on a logarithmic axis."""
-    mu, spin, k = settings["mu"], settings["spin"], settings["k"]
     scenario = disk_on_floor(spin, mu)
     played = Simulation.by(scenario, NAMES, k)
     legs = sliding(spin, mu)
@@ -74,7 +72,7 @@ def show_rolling(settings: Settings) -> Shown:
         ],
         played.film,
         facts(played),
-        rolling_claims(settings, scenario.dt(k)),
+        rolling_claims(spin, mu, k, scenario.dt(k)),
     )
 
 
@@ -109,9 +107,8 @@ def facts(played: Simulation) -> list[tuple[str, str]]:
     ]
 
 
-def rolling_claims(settings: Settings, dt: float) -> list[Claim]:
+def rolling_claims(spin: float, mu: float, k: int, dt: float) -> list[Claim]:
     """When the disk rolls and how fast, which engines are exact, and the slip at the end."""
-    mu, spin, k = settings["mu"], settings["spin"], settings["k"]
     legs = sliding(spin, mu)
     rolls, end = float(legs.start[-1]), float(legs.velocity[-1, 0])
     late = f"one step of friction, µ g dt = {number(1e3 * mu * G * dt)} mm/s"

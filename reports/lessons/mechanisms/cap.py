@@ -9,7 +9,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -32,7 +31,7 @@ NAMES = ("box2d:shipped", PLAIN, ABLATED)
 SECONDS = 3.0  # that the tenth of a second of the page on the cap is replayed for
 
 
-def show_cap(settings: Settings) -> Shown:
+def show_cap(cap: float, k: int) -> Shown:
     """The speed a disk has against the speed it was given."""
     given = np.geomspace(20.0, 2000.0, 15)
     scene = lay_out(
@@ -43,8 +42,8 @@ def show_cap(settings: Settings) -> Shown:
         restitution=0.0,
     )
     scenario = asked(scene, 0.1)
-    cap, dt = settings["cap"], scenario.dt(settings["k"])
-    played = Simulation.by(scenario, NAMES, settings["k"], ablated(order=BOX2D, cap=cap))
+    dt = scenario.dt(k)
+    played = Simulation.by(scenario, NAMES, k, ablated(order=BOX2D, cap=cap))
     curves = played.curves(lambda each: each.velocity[-1, :, 0], given)
     chart = LessonChart("Speed of a free disk", "speed it was given in m/s", "m/s", curves, "xy")
     claims = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.mechanisms.ablated import BOX2D
-from reports.lessons.lesson import Claim, Lesson, LessonChart, Settings, Shown, Simulation, Slider
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
@@ -23,28 +23,23 @@ from scenarios.families.placing import lay_out
 NAMES = (NO_CCD, PLAIN, ABLATED)
 
 
-def show_position_correction(settings: Settings) -> Shown:
+def show_position_correction(share: float, slop: float) -> Shown:
     """How an overlap that is there at the start is undone."""
     x, still = [[0.0, 0.0], [0.8, 0.0]], np.zeros((2, 2))
     scenario = asked(
         lay_out(position=x, velocity=still, radius=[0.5] * 2, mass=[np.inf, 2.0], restitution=0.0),
         0.4,
     )
-    corrects = ablated(
-        order=BOX2D,
-        correction_most=0.2,
-        correction_share=settings["share"],
-        slop=settings["slop"] / 1e3,
-    )
+    corrects = ablated(order=BOX2D, correction_most=0.2, correction_share=share, slop=slop / 1e3)
     played = Simulation.by(scenario, NAMES, 1, {**unswept(length_unit=1.0), **corrects})
     curves = played.curves(lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
     chart = LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")
-    slop = f"{number(1e3 * played.runs[0].settings['linear slop in m'][1])} mm"
+    own = f"{number(1e3 * played.runs[0].settings['linear slop in m'][1])} mm"
     return Shown(
         [chart],
         played.film,
-        [(f"{NO_CCD}, linear slop", slop), *distances(chart, "mm")],
-        correction_claims(settings["share"], settings["slop"]),
+        [(f"{NO_CCD}, linear slop", own), *distances(chart, "mm")],
+        correction_claims(share, slop),
     )
 
 

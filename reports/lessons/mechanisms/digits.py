@@ -9,7 +9,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -22,9 +21,8 @@ NAMES = ("box2d:shipped", PLAIN, ABLATED)
 PRECISION = {53: np.float64, 24: np.float32}
 
 
-def show_digits(settings: Settings) -> Shown:
+def show_digits(digits: int, far: float) -> Shown:
     """How far a disk far out is from x + v t."""
-    far, digits = settings["far"], settings["digits"]
     start, v = np.array([far, 0.0]), np.array([1.0, 0.3])
     scenario = asked(
         lay_out(position=[start], velocity=[v], radius=[0.5], mass=[1.0], restitution=0.0), 2.0

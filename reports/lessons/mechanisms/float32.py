@@ -11,7 +11,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -37,20 +36,20 @@ BETWEEN = "between the two"
 ALIKE = 0.02  # of an error: where float32 changes none of a scene by more, one sentence says so
 
 
-def show_float32(settings: Settings) -> Shown:
+def show_float32(scene: str, profile: str) -> Shown:
     """The error of both at every step size, and float32's share of it in every scene."""
-    name, profile = settings["scene"], settings["profile"]
-    scene, _ = known(name)
+    scenario, _ = known(scene)
     box2d = f"{BOX2D}:{profile}"
-    rows = table_in(KEPT).set_index(["scenario", "profile"]).loc[(name, profile)]
-    rows = rows[rows.substeps.isin(LADDER)]
-    ms = 1e3 * scene.sample_interval / rows.substeps.to_numpy(float)
+    table = table_in(KEPT)
+    mine = (table.scenario == scene) & (table.profile == profile)
+    rows = table[mine & table.substeps.isin(LADDER)]
+    ms = 1e3 * scenario.sample_interval / rows.substeps.to_numpy(float)
     curves = [
         Curve(f"{PLANCK}:{profile}", ms, rows.planck_radii.to_numpy(float), dots=True),
-        Curve(box2d, ms, errors_of_box2d(name, profile), dots=True),
+        Curve(box2d, ms, errors_of_box2d(scene, profile), dots=True),
         Curve(BETWEEN, ms, rows.deviation_radii.to_numpy(float), dots=True),
     ]
-    middle = scene.middle_substeps
+    middle = scenario.middle_substeps
     shares = shares_of(profile)
     percent = 100 * np.abs(list(shares.values()))
     return Shown(
@@ -61,7 +60,7 @@ def show_float32(settings: Settings) -> Shown:
                 "radii",
                 curves,
                 "xy",
-                guides=[("x", 1e3 * scene.dt(middle), "middle")],
+                guides=[("x", 1e3 * scenario.dt(middle), "middle")],
             ),
             LessonChart(
                 "Share of float32 in the error, all scenes",
@@ -72,12 +71,12 @@ def show_float32(settings: Settings) -> Shown:
                 guides=[("y", 1.0, "1 %")],
             ),
         ],
-        Simulation.by(scene, (box2d,), middle).film,
+        Simulation.by(scenario, (box2d,), middle).film,
         [
             (f"share of float32 in the error of {box2d}", "below 0: float32 makes it smaller"),
             *((each, f"{number(100 * share, 2)} %") for each, share in reversed(shares.items())),
         ],
-        [*claims_of(name, profile, curves, LADDER.index(middle)), claim_of_all(profile, percent)],
+        [*claims_of(scene, profile, curves, LADDER.index(middle)), claim_of_all(profile, percent)],
     )
 
 

@@ -10,7 +10,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -34,10 +33,10 @@ NAMES = (NO_CCD, "box2d:matched", "pymunk:matched", PLAIN, ABLATED)
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
 
 
-def show_gravity(settings: Settings) -> Shown:
+def show_gravity(order: str, k: int) -> Shown:
     """The height of a ball that should bounce for ever."""
-    scenario, k = bouncing_ball_e1(), settings["k"]
-    makes = {**unswept(), **ablated(order=ORDERS[settings["order"]])}
+    scenario = bouncing_ball_e1()
+    makes = {**unswept(), **ablated(order=ORDERS[order])}
     played = Simulation.by(scenario, NAMES, k, makes)
     curves = played.curves(lambda each: each.position[:, 0, 1])
     chart = LessonChart("Height of the centre", "time in s", "m", curves)
@@ -47,7 +46,7 @@ def show_gravity(settings: Settings) -> Shown:
         [chart, LessonChart("How high it rises", "bounces so far", "m", heights)],
         played.film,
         distances(chart, "m"),
-        bounce_claims(scenario.scene, scenario.dt(k), settings["order"]),
+        bounce_claims(scenario.scene, scenario.dt(k), order),
     )
 
 

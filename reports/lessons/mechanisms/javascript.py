@@ -9,7 +9,6 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -34,11 +33,10 @@ KEPT_E = 1e-3  # by how much e may be off for a sentence to say that it is kept
 STUCK = 0.25  # of e: a collision that gives less is called cut, one that gives more is not
 
 
-def show_javascript(settings: Settings) -> Shown:
+def show_javascript(e: float, off: str) -> Shown:
     """e of a collision against its closing speed."""
-    e, version = settings["e"], settings["off"]
     curves = [
-        Curve(name_in(engine, version), CLOSING, ratios(engine, version, e), dots=True)
+        Curve(name_in(engine, off), CLOSING, ratios(engine, off, e), dots=True)
         for engine in ENGINES
     ]
     claims = [claim_of(e, curve) for curve in curves]

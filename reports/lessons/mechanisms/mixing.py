@@ -18,7 +18,6 @@ from reports.lessons.lesson import (
     LessonChart,
     Makes,
     Read,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -106,26 +105,26 @@ def played_with(what: str, rule: str, one: float, other: float | None) -> Simula
     return replace(engines, runs=[*engines.runs, ablated])
 
 
-def show_mixing(settings: Settings) -> Shown:
+def show_mixing(what: str, rule: str, other: str) -> Shown:
     """The coefficient of a collision against the one that is stated on one of the disks."""
-    what, rule, other = settings["what"], settings["rule"], OTHERS[settings["other"]]
-    played = [played_with(what, rule, float(value), other) for value in STATED]
+    second = OTHERS[other]
+    played = [played_with(what, rule, float(value), second) for value in STATED]
     curves = swept(STATED, played, lambda each, _: READ[what](each)[0])
-    if other is None:
+    if second is None:
         curves.append(Curve(TRUTH, STATED, STATED))
     mark = what[-1]
     chart = LessonChart(
         f"{what.split()[0].capitalize()} of a pair",
-        f"{mark} of the one disk" if other is not None else f"{mark} of each of the two disks",
+        f"{mark} of the one disk" if second is not None else f"{mark} of each of the two disks",
         f"{mark} of the collision",
         curves,
     )
     facts = [
         (f"replayed: {mark} of the one disk", number(SHOWN)),
-        (f"{mark} of the other disk", "the same" if other is None else number(other)),
+        (f"{mark} of the other disk", "the same" if second is None else number(second)),
         *distances(chart),
     ]
-    claims = same_claims(what, rule) if other is None else mixing_claims(what, rule, other)
+    claims = same_claims(what, rule) if second is None else mixing_claims(what, rule, second)
     return Shown([chart], played[STATED.tolist().index(SHOWN)].film, facts, claims)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.mechanisms.ablated import EXERCISE, POSITION_FIRST
-from reports.lessons.lesson import Claim, Lesson, Settings, Shown, Slider, time_step
+from reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
 from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, lies_on
 from reports.lessons.mechanisms.falling import ROUNDING_MM, falling
 from reports.page.style import TRUTH, number
@@ -15,9 +15,9 @@ from scenarios.model import Array
 END = free_fall().duration  # s
 
 
-def show_order(settings: Settings) -> Shown:
+def show_order(order: str, k: int) -> Shown:
     """Velocity then position, or position then velocity."""
-    position_first = settings["order"] == "position first"
+    position_first = order == "position first"
 
     def claims(offset: Array) -> list[Claim]:
         mm, both = number(offset[-1]), number(2 * offset[-1])
@@ -45,8 +45,8 @@ def show_order(settings: Settings) -> Shown:
             lies_on("pymunk:matched", position_first, ROUNDING_MM, "mm"),
         ]
 
-    order = POSITION_FIRST if position_first else EXERCISE
-    return falling("pymunk:matched", ablated(order=order), settings["k"], claims)
+    steps = POSITION_FIRST if position_first else EXERCISE
+    return falling("pymunk:matched", ablated(order=steps), k, claims)
 
 
 ORDER = Lesson(

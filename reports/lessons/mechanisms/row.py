@@ -11,7 +11,6 @@ from reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
@@ -31,16 +30,15 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
 
 NAMES = ("box2d:matched", "pymunk:matched", PLAIN, ABLATED)
+ORDERS = {"pair by pair": EXERCISE, "together": BOX2D}
 GAP = 1e-6  # m, between the disks of the row that is set beside the touching one
 OVERLAP = 1e-12  # m, of the disks of the other one
 ROUNDING = 1e-12  # m/s: up to 5 impulses at 5 m/s, each rounded a few times in float64
 
 
-def show_row(settings: Settings) -> Shown:
+def show_row(order: str, iterations: int, n: int) -> Shown:
     """The velocities after a disk has struck a row that touches."""
-    n = settings["n"]
-    order = {"pair by pair": EXERCISE, "together": BOX2D}[settings["order"]]
-    makes = ablated(order=order, iterations=settings["iterations"], touching=True)
+    makes = ablated(order=ORDERS[order], iterations=iterations, touching=True)
     played = Simulation.by(struck(n, 0.0), NAMES, 4, makes)
     curves = played.curves(lambda each: each.velocity[-1, :, 0], np.arange(n + 1.0))
     chart = LessonChart("Velocity after the collision", "disk", "m/s", curves)
@@ -48,9 +46,9 @@ def show_row(settings: Settings) -> Shown:
         [chart],
         played.film,
         distances(chart, "m/s"),
-        row_claims(n, settings["order"], settings["iterations"]),
+        row_claims(n, order, iterations),
         # pair by pair goes through the contacts once
-        said={} if order is BOX2D else {"iterations": "not used pair by pair"},
+        said={} if order == "together" else {"iterations": "not used pair by pair"},
     )
 
 
@@ -161,7 +159,7 @@ ROW = Lesson(
     <b>iterations</b>.
     """,
     sliders=(
-        Slider("order", "Contacts", ("pair by pair", "together"), 0),
+        Slider("order", "Contacts", tuple(ORDERS), 0),
         Slider("iterations", "Iterations", (1, 2, 4, 8, 50), 3),
         Slider("n", "Disks in the row", (2, 3, 5), 1),
     ),

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from reports.lessons.lesson import Claim, Lesson, Settings, Shown, Slider, time_step
+from reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
 from reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, PLAIN, ablated, lies_on
 from reports.lessons.mechanisms.falling import ROUNDING_MM, falling
 from reports.page.style import TRUTH, number
 from scenarios.model import Array
 
 
-def show_substeps(settings: Settings) -> Shown:
+def show_substeps(substeps: int, k: int) -> Shown:
     """A step cut into smaller ones."""
-    n = settings["substeps"]
+    n = substeps
     single = 1e3 * 360 * 4 * FLOAT32  # mm: 360 substeps, heights up to 4 m
 
     def claims(offset: Array) -> list[Claim]:
@@ -30,7 +30,7 @@ def show_substeps(settings: Settings) -> Shown:
             lies_on("box2d_v3:matched", n == 4, single, "mm", off=10.0),
         ]
 
-    return falling("box2d_v3:matched", ablated(substeps=n), settings["k"], claims)
+    return falling("box2d_v3:matched", ablated(substeps=n), k, claims)
 
 
 SUBSTEPS = Lesson(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.lesson import Claim, Lesson, LessonChart, Settings, Shown, Simulation, Slider
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
@@ -21,12 +21,11 @@ from reports.page.style import TRUTH, number
 NAMES = ("box2d:shipped", PLAIN, ABLATED)
 
 
-def show_threshold(settings: Settings) -> Shown:
+def show_threshold(threshold: float, e: float) -> Shown:
     """e of a collision against its closing speed."""
     closing = np.array(
         [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]
     )
-    threshold, e = settings["threshold"], settings["e"]
     scenario = asked(pairs(closing, e), 0.5)
     played = Simulation.by(scenario, NAMES, 4, ablated(threshold=threshold))
     curves = played.curves(separation(closing), closing)
