@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -71,27 +72,25 @@ def show_cost(sizes: str, fill: float) -> Shown:
     ]
     noise = max(ratio for found in costs.values() for _, ratio in found) - 1
     few, many = numbers[0], numbers[-1]
-    facts = [(f"pairs of {size} disks", str(size * (size - 1) // 2)) for size in (few, many)]
-    facts += [
-        (f"{curve.name}, from {few} to {many} disks", f"{number(growth_of(curve), 2)} times")
-        for curve in curves
-    ]
-    replayed = with_oracle(max((s for s in scenes if s.scene.n <= MOST_DISKS), key=size_of))
-    facts.append(("the two shortest runs differ by at most", f"{number(100 * noise, 2)} %"))
-    facts.append(("replayed", f"{size_of(replayed)} disks"))
-    film = Simulation.by(replayed, (LISTED, EVENTS), SUBSTEPS).film
+    replayed = with_oracle([scene for scene in scenes if scene.scene.n <= MOST_DISKS][-1])
     return Shown(
         [LessonChart("Cost of a step", "disks", "µs a step", curves, "xy")],
-        film,
-        facts,
-        cost_claims(few, many, growth_of(curves[0]), noise),
+        Simulation.by(replayed, (LISTED, EVENTS), SUBSTEPS).film,
+        [
+            *((f"pairs of {size} disks", str(size * (size - 1) // 2)) for size in (few, many)),
+            *(
+                (
+                    f"{curve.name}, from {few} to {many} disks",
+                    f"{number(growth_of(curve), 2)} times",
+                )
+                for curve in curves
+            ),
+            ("the two shortest runs differ by at most", f"{number(100 * noise, 2)} %"),
+            ("replayed", f"{replayed.scene.n} disks"),
+        ],
+        list(cost_claims(few, many, growth_of(curves[0]), noise)),
         opening={"pace": replayed.duration / SECONDS},
     )
-
-
-def size_of(scenario: Scenario) -> int:
-    """How many disks it has."""
-    return scenario.scene.n
 
 
 def growth_of(curve: Curve) -> float:
@@ -99,7 +98,7 @@ def growth_of(curve: Curve) -> float:
     return float(curve.y[-1] / curve.y[0])
 
 
-def cost_claims(few: int, many: int, grown: float, noise: float) -> list[Claim]:
+def cost_claims(few: int, many: int, grown: float, noise: float) -> Iterator[Claim]:
     """The pairs dominate among many disks, the call among few; grown: how much longer the most
     disks take; noise: by what share the two shortest runs differ.
 
@@ -114,40 +113,34 @@ def cost_claims(few: int, many: int, grown: float, noise: float) -> list[Claim]:
         else ""
     )
     if few < 100:
-        return [
-            Claim(
-                f"From {few} to {many} disks there are {number(pairs, 2)} times as many pairs. The"
-                " cost of testing all of them grows less than a quarter as much: with few disks"
-                " the call takes most of the time of a step.",
-                lambda shown: growth_of(shown.curve(EVERY_PAIR)) < pairs / 4,
-            ),
-            Claim(
-                "With so few disks and so few steps in a call a neighbour list saves little:"
-                f" {LISTED} takes a third to three times as long.",
-                lambda shown: all(
-                    1 / 3 < ratio < 3 for ratio in shown.y(LISTED) / shown.y(EVERY_PAIR)
-                ),
-            ),
-        ]
-    return [
-        Claim(
-            f"From {few} to {many} disks, {many // few} times as many, there are"
-            f" {number(pairs, 2)} times as many pairs. Testing all of them costs at least 20 times"
-            f" as much.{more}",
-            lambda shown: (
-                growth_of(shown.curve(EVERY_PAIR)) >= 20
-                and (growth_of(shown.curve(EVERY_PAIR)) > pairs) == bool(more)
-            ),
+        yield Claim(
+            f"From {few} to {many} disks there are {number(pairs, 2)} times as many pairs. The"
+            " cost of testing all of them grows less than a quarter as much: with few disks"
+            " the call takes most of the time of a step.",
+            lambda shown: growth_of(shown.curve(EVERY_PAIR)) < pairs / 4,
+        )
+        yield Claim(
+            "With so few disks and so few steps in a call a neighbour list saves little:"
+            f" {LISTED} takes a third to three times as long.",
+            lambda shown: all(1 / 3 < ratio < 3 for ratio in shown.y(LISTED) / shown.y(EVERY_PAIR)),
+        )
+        return
+    yield Claim(
+        f"From {few} to {many} disks, {many // few} times as many, there are {number(pairs, 2)}"
+        f" times as many pairs. Testing all of them costs at least 20 times as much.{more}",
+        lambda shown: (
+            growth_of(shown.curve(EVERY_PAIR)) >= 20
+            and (growth_of(shown.curve(EVERY_PAIR)) > pairs) == bool(more)
         ),
-        Claim(
-            f"{LISTED} tests near pairs only. Its cost grows less than half as much, and with"
-            f" {many} disks it costs less than a fifth.",
-            lambda shown: (
-                growth_of(shown.curve(LISTED)) < growth_of(shown.curve(EVERY_PAIR)) / 2
-                and shown.y(LISTED)[-1] < shown.y(EVERY_PAIR)[-1] / 5
-            ),
+    )
+    yield Claim(
+        f"{LISTED} tests near pairs only. Its cost grows less than half as much, and with"
+        f" {many} disks it costs less than a fifth.",
+        lambda shown: (
+            growth_of(shown.curve(LISTED)) < growth_of(shown.curve(EVERY_PAIR)) / 2
+            and shown.y(LISTED)[-1] < shown.y(EVERY_PAIR)[-1] / 5
         ),
-    ]
+    )
 
 
 COST = Lesson(

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from math import log
 
 import numpy as np
 
+from reports.lessons.box import energy
 from reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
-    LessonChart,
     Shown,
     Simulation,
     Slider,
@@ -42,37 +42,21 @@ def field(seed: int, restitution: float) -> Scenario:
 
 def show_horizon(seed: int, e: float, k: int) -> Shown:
     """The error as long as there is an exact answer, and the energy."""
-    scenario = field(seed, e)
-    shown = Simulation.by(scenario, NAMES, k)
-    scene = scenario.scene
+    played = Simulation.by(field(seed, e), NAMES, k)
+    scene = played.scenario.scene
 
-    def energy(each: Trajectory) -> Array:
-        share: Array = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1) / (
-            (scene.mass * (scene.velocity**2).sum(axis=1)).sum() / 2
-        )
-        return share
+    def energy_left(each: Trajectory) -> Array:
+        return energy(scene, each) / energy(scene, scene.state)
 
-    end = float(shown.truth.t[-1])
+    end = float(played.truth.t[-1])
     moved = moved_by_a_rounding(seed, e, k)
-    kept = [float(energy(shown.motions[name])[-1]) for name in STEPPED]
+    kept = [float(energy_left(played.motions[name])[-1]) for name in STEPPED]
     return Shown(
         [
-            LessonChart(
-                "Farthest disk from the exact answer",
-                "time in s",
-                "m",
-                [*shown.errors(), moved],
-                "y",
-                guides=[("x", end, "horizon")],
-            ),
-            LessonChart(
-                "Kinetic energy over that at the start",
-                "time in s",
-                "ratio",
-                shown.curves(energy),
-            ),
+            played.errors_over_time(moved, guides=[("x", end, "horizon")]),
+            played.over_time("Kinetic energy over that at the start", "ratio", energy_left),
         ],
-        shown.film,
+        played.film,
         [
             ("the exact answer ends at", f"{number(end)} s"),
             *(
@@ -80,10 +64,10 @@ def show_horizon(seed: int, e: float, k: int) -> Shown:
                     f"collisions of {'the exact answer' if name == TRUTH else name} until then",
                     str(int((each.collisions.t <= end).sum())),
                 )
-                for name, each in shown.motions.items()
+                for name, each in played.motions.items()
             ),
         ],
-        horizon_claims(shown, e, kept, moved),
+        list(horizon_claims(played, e, kept, moved)),
     )
 
 
@@ -129,62 +113,51 @@ def rounding_claim(played: Simulation, factor: float, moved: Curve) -> Claim:
 
 def horizon_claims(
     played: Simulation, restitution: float, kept: Sequence[float], moved: Curve
-) -> list[Claim]:
+) -> Iterator[Claim]:
     """Errors grow exponentially up to the size of the box; the energy stays comparable: `kept` is
     the share that each engine with steps has left."""
     end = float(played.truth.t[-1])
     factor = growth(played)
-    claims = [
-        Claim(
-            f"The exact answer ends at {number(end)} s. Until then the event-driven engine, whose"
-            " only error is rounding, is less than 1 nm off.",
-            lambda shown: shown.x(EVENTS)[-1] == end and shown.y(EVENTS).max() < 1e-9,
+    yield Claim(
+        f"The exact answer ends at {number(end)} s. Until then the event-driven engine, whose"
+        " only error is rounding, is less than 1 nm off.",
+        lambda shown: shown.x(EVENTS)[-1] == end and shown.y(EVENTS).max() < 1e-9,
+    )
+    yield Claim(
+        "Its error grows exponentially: on average a collision multiplies it by"
+        f" {number(factor, 2)}.",
+        lambda shown: abs(growth(played, shown.curve(EVENTS)) / factor - 1) < 1e-9 and factor > 1.2,
+    )
+    yield rounding_claim(played, factor, moved)
+    yield Claim(
+        "The engines with steps detect collisions late. Half way to the horizon they are at least a"
+        " million times farther off than the event-driven engine, and later at least a decimetre.",
+        lambda shown: all(
+            half_way(shown, name) > 1e6 * half_way(shown, EVENTS) and shown.y(name).max() > 0.1
+            for name in STEPPED
         ),
-        Claim(
-            "Its error grows exponentially: on average a collision multiplies it by"
-            f" {number(factor, 2)}.",
-            lambda shown: (
-                abs(growth(played, shown.curve(EVENTS)) / factor - 1) < 1e-9 and factor > 1.2
-            ),
-        ),
-        rounding_claim(played, factor, moved),
-        Claim(
-            "The engines with steps detect collisions late. Half way to the horizon they are at"
-            " least a million times farther off than the event-driven engine, and later at least a"
-            " decimetre.",
+    )
+    if restitution == 1.0:
+        yield Claim(
+            "The energy stays comparable: with e = 1 the engines with steps keep it for 20 s,"
+            " long past the horizon, within a millionth (Box2D computes in single precision).",
             lambda shown: all(
-                half_way(shown, name) > 1e6 * half_way(shown, EVENTS) and shown.y(name).max() > 0.1
+                shown.x(name, 1)[-1] == 20 > 1.3 * end and np.abs(shown.y(name, 1) - 1).max() < 1e-6
                 for name in STEPPED
             ),
-        ),
-    ]
-    if restitution == 1.0:
-        claims.append(
-            Claim(
-                "The energy stays comparable: with e = 1 the engines with steps keep it for 20 s,"
-                " long past the horizon, within a millionth (Box2D computes in single precision).",
-                lambda shown: all(
-                    shown.x(name, 1)[-1] == 20 > 1.3 * end
-                    and np.abs(shown.y(name, 1) - 1).max() < 1e-6
-                    for name in STEPPED
-                ),
-            )
         )
     else:
-        claims.append(
-            Claim(
-                "The energy stays comparable: after 20 s, long past the horizon, the engines with"
-                f" steps have {number(min(kept), 2)} to {number(max(kept), 2)} of it left. How much"
-                " depends on their collisions.",
-                lambda shown: (
-                    1.3 * end < 20
-                    and all(shown.x(name, 1)[-1] == 20 for name in STEPPED)
-                    and [shown.y(name, 1)[-1] for name in STEPPED] == kept
-                    and max(kept) < 1.25 * min(kept)
-                ),
-            )
+        yield Claim(
+            "The energy stays comparable: after 20 s, long past the horizon, the engines with"
+            f" steps have {number(min(kept), 2)} to {number(max(kept), 2)} of it left. How much"
+            " depends on their collisions.",
+            lambda shown: (
+                1.3 * end < 20
+                and all(shown.x(name, 1)[-1] == 20 for name in STEPPED)
+                and [shown.y(name, 1)[-1] for name in STEPPED] == kept
+                and max(kept) < 1.25 * min(kept)
+            ),
         )
-    return claims
 
 
 def half_way(shown: Shown, name: str) -> float:

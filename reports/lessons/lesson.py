@@ -165,7 +165,7 @@ class Shown:
         film: what is replayed, or None.
         facts: (what, number and unit) of this run.
         claims: every number and every trend that the page states in words about its curves.
-        steps: paragraphs with the numbers of this run filled in.
+        steps: title -> a paragraph with the numbers of this run filled in.
         opening: how the film opens, as `more` of `pack_layers`.
         said: slider -> what it means here, where that depends on the others.
     """
@@ -174,7 +174,7 @@ class Shown:
     film: Comparison | None = None
     facts: Sequence[tuple[str, str]] = ()
     claims: Sequence[Claim] = ()
-    steps: Sequence[tuple[str, str]] = ()
+    steps: Mapping[str, str] = field(default_factory=dict)
     opening: Mapping[str, Any] = field(default_factory=dict)
     said: Mapping[str, str] = field(default_factory=dict)
 
@@ -227,7 +227,7 @@ class Shown:
             "drawn": self.drawn(),
             "facts": [(what, unbroken(text)) for what, text in (*self.facts, *self.refusals())],
             "claims": [[unbroken(claim.text), bool(claim.holds(self))] for claim in self.claims],
-            "steps": [(title, unbroken(text)) for title, text in self.steps],
+            "steps": [(title, unbroken(text)) for title, text in self.steps.items()],
             "said": {key: unbroken(text) for key, text in self.said.items()},
         }
 
@@ -347,6 +347,17 @@ class Simulation:
             for name, each in self.motions.items()
         ]
 
+    def over_time(
+        self,
+        title: str,
+        y: str,
+        read: Read,
+        log: str = "",
+        guides: Sequence[tuple[str, float, str]] = (),
+    ) -> LessonChart:
+        """`read` of every motion over time."""
+        return LessonChart(title, "time in s", y, self.curves(read), log, guides)
+
     def error(self, name: str, motion: Trajectory) -> Curve:
         """m, the distance of the farthest disk from the exact answer over time, while there is
         one."""
@@ -355,6 +366,14 @@ class Simulation:
     def errors(self) -> list[Curve]:
         """m, the error of every engine."""
         return [self.error(*each) for each in self.motions.items() if each[0] != TRUTH]
+
+    def errors_over_time(
+        self, *others: Curve, guides: Sequence[tuple[str, float, str]] = ()
+    ) -> LessonChart:
+        """The error of every engine, and other errors."""
+        curves = [*self.errors(), *others]
+        title = "Farthest disk from the exact answer"
+        return LessonChart(title, "time in s", "m", curves, "y", guides)
 
 
 def run_of(

@@ -3,6 +3,7 @@ collision."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 from functools import cache, partial
 
@@ -13,7 +14,6 @@ from adapters.engines import ENGINES, changed
 from reports.lessons.lesson import (
     Claim,
     Lesson,
-    LessonChart,
     Shown,
     Simulation,
     Slider,
@@ -73,7 +73,7 @@ def overlap_found(scene: Scene, dt: float) -> float:
     return float(scene.radius.sum() - np.hypot(*(x[0] - x[1])))
 
 
-def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
+def in_numbers(scene: Scene, dt: float) -> dict[str, str]:
     """Detection, projection, impulse and momentum, each with the numbers of this collision."""
     before, after, reported = collision_of_the_reference(scene, dt)
     (m1, m2), e = scene.mass, scene.restitution
@@ -86,47 +86,22 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
     impulse = -(1 + e) * closing / (1 / m1 + 1 / m2)
     separating = float((after.velocity[0] - after.velocity[1]) @ n)
     start, end = scene.mass @ before.velocity, scene.mass @ after.velocity
-    return [
-        (
-            "Detect",
-            (
-                f"|x₁ − x₂| = {number(distance)} m < R₁ + R₂ = {number(reach)} m: they overlap by δ"
-                f" = {number(1e3 * overlap)} mm, detected at the end of a step, up to dt ="
-                f" {number(1e3 * dt)} ms late"
-            ),
-        ),
-        (
-            "Project",
-            (
-                f"n = (x₁ − x₂)/|x₁ − x₂| = {pair(n)}; x₁ moves by (1/m₁)/(1/m₁ + 1/m₂) δ = "
-                f"{number(1e3 * overlap * share)} mm along n, "
-                f"x₂ by {number(1e3 * overlap * (1 - share))} mm against it"
-            ),
-        ),
-        (
-            "Impulse",
-            (
-                f"v₁ − v₂ along n is {number(closing)} m/s; J = −(1 + e)(v₁ − v₂)·n / (1/m₁ + 1/m₂)"
-                f" = {number(1 + e)} · {number(-closing)} / {number(1 / m1 + 1 / m2)} ="
-                f" {number(impulse)} N s; the solver reports {number(reported)} N s"
-            ),
-        ),
-        (
-            "Update",
-            (
-                f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, "
-                f"v₂' = v₂ − J n/m₂ = {pair(after.velocity[1])} m/s; "
-                f"separation over approach speed: {or_rounding(-separating / closing, 6)}"
-            ),
-        ),
-        (
-            "Momentum",
-            (
-                f"m₁v₁ + m₂v₂ = {pair(start)} before and {pair(end)} kg m/s after: off by "
-                f"{or_rounding(float(np.abs(end - start).max()), 2)}"
-            ),
-        ),
-    ]
+    return {
+        "Detect": f"|x₁ − x₂| = {number(distance)} m < R₁ + R₂ = {number(reach)} m: they overlap by"
+        f" δ = {number(1e3 * overlap)} mm, detected at the end of a step, up to dt ="
+        f" {number(1e3 * dt)} ms late",
+        "Project": f"n = (x₁ − x₂)/|x₁ − x₂| = {pair(n)}; x₁ moves by (1/m₁)/(1/m₁ + 1/m₂) δ ="
+        f" {number(1e3 * overlap * share)} mm along n, x₂ by"
+        f" {number(1e3 * overlap * (1 - share))} mm against it",
+        "Impulse": f"v₁ − v₂ along n is {number(closing)} m/s; J = −(1 + e)(v₁ − v₂)·n / (1/m₁ +"
+        f" 1/m₂) = {number(1 + e)} · {number(-closing)} / {number(1 / m1 + 1 / m2)} ="
+        f" {number(impulse)} N s; the solver reports {number(reported)} N s",
+        "Update": f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, v₂' = v₂ − J n/m₂ ="
+        f" {pair(after.velocity[1])} m/s; separation over approach speed:"
+        f" {or_rounding(-separating / closing, 6)}",
+        "Momentum": f"m₁v₁ + m₂v₂ = {pair(start)} before and {pair(end)} kg m/s after: off by"
+        f" {or_rounding(float(np.abs(end - start).max()), 2)}",
+    }
 
 
 @cache
@@ -156,26 +131,21 @@ def pair(vector: Array) -> str:
 def show_meeting(e: float, ratio: float, offset: float, k: int) -> Shown:
     """The collision, drawn and in numbers."""
     scenario = two(e, ratio, offset)
-    shown = Simulation.by(scenario, NAMES, k)
+    played = Simulation.by(scenario, NAMES, k)
     return Shown(
         [
-            LessonChart(
-                "Velocity of the first disk along x",
-                "time in s",
-                "m/s",
-                shown.curves(lambda each: each.velocity[:, 0, 0]),
+            played.over_time(
+                "Velocity of the first disk along x", "m/s", lambda each: each.velocity[:, 0, 0]
             ),
-            LessonChart(
-                "Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"
-            ),
+            played.errors_over_time(),
         ],
-        shown.film,
-        claims=meeting_claims(e, ratio, offset, k),
+        played.film,
+        claims=list(meeting_claims(e, ratio, offset, k)),
         steps=in_numbers(scenario.scene, scenario.dt(k)),
     )
 
 
-def meeting_claims(e: float, ratio: float, offset: float, k: int) -> list[Claim]:
+def meeting_claims(e: float, ratio: float, offset: float, k: int) -> Iterator[Claim]:
     """Off the centre line a late normal is wrong; on the centre line every normal is the same."""
     # A velocity below 3 m/s that is rounded a few times: by Box2D in float32, by the others in
     # float64.
@@ -190,29 +160,26 @@ def meeting_claims(e: float, ratio: float, offset: float, k: int) -> list[Claim]
         ),
     )
     if offset == 0.0:
-        return [
-            Claim(
-                "On the centre line the normal is the same whenever it is read: every engine leaves"
-                " with the exact velocity, to rounding (Box2D rounds to single precision).",
-                lambda shown: all(
-                    off(shown, name) <= (single if "box2d" in name else double) for name in NAMES
-                ),
+        yield Claim(
+            "On the centre line the normal is the same whenever it is read: every engine leaves"
+            " with the exact velocity, to rounding (Box2D rounds to single precision).",
+            lambda shown: all(
+                off(shown, name) <= (single if "box2d" in name else double) for name in NAMES
             ),
-            exact,
-        ]
-    return [
-        Claim(
-            "Off the centre line the normal turns while the disks overlap. The engines that read it"
-            " at the end of a step leave with a wrong velocity; reference:exercise and"
-            " pymunk:matched read it at the same time and leave with the same one.",
-            lambda shown: (
-                all(off(shown, name) > 1e-5 for name in NAMES[:3])
-                and abs(shown.y(NAMES[0])[-1] - shown.y(NAMES[1])[-1]) <= double
-            ),
+        )
+        yield exact
+        return
+    yield Claim(
+        "Off the centre line the normal turns while the disks overlap. The engines that read it"
+        " at the end of a step leave with a wrong velocity; reference:exercise and"
+        " pymunk:matched read it at the same time and leave with the same one.",
+        lambda shown: (
+            all(off(shown, name) > 1e-5 for name in NAMES[:3])
+            and abs(shown.y(NAMES[0])[-1] - shown.y(NAMES[1])[-1]) <= double
         ),
-        *box2d_claims(e, ratio, offset, k),
-        exact,
-    ]
+    )
+    yield from box2d_claims(e, ratio, offset, k)
+    yield exact
 
 
 def off(shown: Shown, name: str) -> float:
@@ -220,7 +187,7 @@ def off(shown: Shown, name: str) -> float:
     return float(abs(shown.y(name)[-1] - shown.y(TRUTH)[-1]))
 
 
-def box2d_claims(e: float, ratio: float, offset: float, k: int) -> list[Claim]:
+def box2d_claims(e: float, ratio: float, offset: float, k: int) -> Iterator[Claim]:
     """When Box2D reads the normal, and which of its mechanisms decides that."""
     early = Claim(
         "With this long step box2d:matched leaves with a velocity at least five times nearer to"
@@ -235,30 +202,28 @@ def box2d_claims(e: float, ratio: float, offset: float, k: int) -> list[Claim]:
         lambda shown: abs(off(shown, NAMES[2]) / off(shown, NAMES[1]) - 1) < 0.01,
     )
     if k == 1 and e < 1.0:
-        return [early]
+        yield early
+        return
     if k == 1:
         on = box2d_with_ccd(e, ratio, offset, k, MATCHED["length_unit"])
-        return [
-            late,
-            Claim(
-                "That is not because of e: the profile switches CCD off where e = 1 and there is"
-                f" no gravity. With CCD on it would be {number(on)} m/s off, less than a fifth.",
-                lambda shown: on < off(shown, NAMES[2]) / 5,
-            ),
-        ]
+        yield late
+        yield Claim(
+            "That is not because of e: the profile switches CCD off where e = 1 and there is"
+            f" no gravity. With CCD on it would be {number(on)} m/s off, less than a fifth.",
+            lambda shown: on < off(shown, NAMES[2]) / 5,
+        )
+        return
     deep = overlap_found(two(e, ratio, offset).scene, INTERVAL / k)
     off_too = ", and at e = 1 the profile switches CCD off" if e == 1.0 else ""
     finer = box2d_with_ccd(e, ratio, offset, k, MATCHED["length_unit"] / 10)
-    return [
-        late,
-        Claim(
-            f"CCD has nothing to do here: it lets disks overlap by {number(1e3 * STOPPED)} mm,"
-            f" three times the slop of Box2D, and this step finds them {number(1e3 * deep)} mm"
-            f" deep{off_too}. With CCD on and a tenth of that slop the error would be"
-            f" {number(finer)} m/s, at most two thirds.",
-            lambda shown: deep < STOPPED and finer < off(shown, NAMES[2]) * 2 / 3,
-        ),
-    ]
+    yield late
+    yield Claim(
+        f"CCD has nothing to do here: it lets disks overlap by {number(1e3 * STOPPED)} mm,"
+        f" three times the slop of Box2D, and this step finds them {number(1e3 * deep)} mm"
+        f" deep{off_too}. With CCD on and a tenth of that slop the error would be"
+        f" {number(finer)} m/s, at most two thirds.",
+        lambda shown: deep < STOPPED and finer < off(shown, NAMES[2]) * 2 / 3,
+    )
 
 
 MEETING = Lesson(

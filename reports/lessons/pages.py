@@ -38,12 +38,13 @@ GROUPS = {
     "Spin and friction": "9",
 }
 MEASURING = Lock()  # two pages that ask at once get one measurement
+GREY = look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3))
 OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
-    EDGES: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
-    BETWEEN: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
+    EDGES: GREY,
+    BETWEEN: GREY,
     CHANGED: look("matter", "shipped")._replace(dash=(3, 3)),
-    ROUNDED: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
+    ROUNDED: GREY,
 }
 
 

@@ -11,7 +11,6 @@ from adapters.engines import ENGINES
 from reports.lessons.lesson import (
     Claim,
     Lesson,
-    LessonChart,
     Shown,
     Simulation,
     Slider,
@@ -39,7 +38,7 @@ def thrust_ship(acceleration: float) -> Scenario:
     )
 
 
-THRUST_NAMES = (
+NAMES = (
     "reference:exercise",
     "reference:lesson",
     "pymunk:matched",
@@ -52,8 +51,8 @@ THRUST_NAMES = (
 def show_thrust(k: int, a: float) -> Shown:
     """Which engines are ahead of the parabola and which are behind, and the formula for it."""
     scenario = thrust_ship(a)
-    shown = Simulation.by(scenario, THRUST_NAMES, k)
-    exact, dt = shown.truth, scenario.dt(k)
+    played = Simulation.by(scenario, NAMES, k)
+    exact, dt = played.truth, scenario.dt(k)
 
     def ahead(each: Trajectory) -> np.ndarray:
         return 1e3 * (each.position[:, 0, 0] - exact.position[: len(each), 0, 0])
@@ -61,17 +60,15 @@ def show_thrust(k: int, a: float) -> Shown:
     seconds = min(exact.t[-1], STOP) - START
     laws = {
         run.name: 1e3 * (ENGINES[run.name].alpha - 0.5) * a * dt * seconds
-        for run in shown.runs
+        for run in played.runs
         if run.status == "ok"
     }
     return Shown(
         [
-            LessonChart("Ahead of the exact answer", "time in s", "mm", shown.curves(ahead)),
-            LessonChart(
-                "Velocity", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])
-            ),
+            played.over_time("Ahead of the exact answer", "mm", ahead),
+            played.over_time("Velocity", "m/s", lambda each: each.velocity[:, 0, 0]),
         ],
-        shown.film,
+        played.film,
         [
             (f"{name}, α = {number(ENGINES[name].alpha)}", f"(α − ½) a dt T = {number(law)} mm")
             for name, law in laws.items()
@@ -151,6 +148,6 @@ THRUST = Lesson(
         time_step(1 / 16, (16, 8, 4, 2, 1), 3),
         Slider("a", "Acceleration a", (0.25, 1.0, 4.0), 0, "m/s²"),
     ),
-    names=(*THRUST_NAMES, TRUTH),
+    names=(*NAMES, TRUTH),
     show=show_thrust,
 )

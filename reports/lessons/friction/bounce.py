@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +67,7 @@ def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
             ("exact answer" if name == TRUTH else name, left_with(each, scene))
             for name, each in impulses.items()
         ],
-        bounce_claims(e, mu, angle, spin, law, angles),
+        list(bounce_claims(e, mu, angle, spin, law, angles)),
         in_numbers(e, mu, angle, spin, law, float(impulses[TRUTH].along[0])),
     )
 
@@ -149,121 +149,99 @@ def left_with(each: Taken, scene: Scene) -> str:
 
 def in_numbers(
     e: float, mu: float, angle: float, spin: float, law: Law, friction: float
-) -> list[tuple[str, str]]:
+) -> dict[str, str]:
     """Slip, normal impulse, cone and friction impulse, with the numbers of this bounce."""
     slip = float(slip_at(angle, spin))
     along, slips, size, need, found = (
         tidy(float(value), SINGLE, 4)
         for value in (speed_along(angle), slip, abs(slip), abs(slip) * law.weight, friction)
     )
-    return [
-        (
-            "Slip",
-            f"vₜ + R ω = {along} + {number(RADIUS)} · {number(spin)} = {slips} m/s",
-        ),
-        (
-            "Normal impulse",
-            f"Jₙ = (1 + e) m vₙ = {number(1 + e)} · 1 · {number(FALL)} = {number(law.normal)} N s",
-        ),
-        (
-            "To stick",
-            f"|slip| / (1/m + R²/I) = {size} / {number(1 / law.weight)} = {need} N s would end the"
-            " slip",
-        ),
-        (
-            "Cone",
-            f"µ Jₙ = {number(mu)} · {number(law.normal)} = {number(law.edge)} N s",
-        ),
-        (
-            "Friction impulse",
-            f"the smaller of these two, against the slip: Jₜ = {found} N s; it changes vₜ by Jₜ/m"
-            " and ω by R Jₜ/I",
-        ),
-    ]
+    return {
+        "Slip": f"vₜ + R ω = {along} + {number(RADIUS)} · {number(spin)} = {slips} m/s",
+        "Normal impulse": f"Jₙ = (1 + e) m vₙ = {number(1 + e)} · 1 · {number(FALL)} ="
+        f" {number(law.normal)} N s",
+        "To stick": f"|slip| / (1/m + R²/I) = {size} / {number(1 / law.weight)} = {need} N s would"
+        " end the slip",
+        "Cone": f"µ Jₙ = {number(mu)} · {number(law.normal)} = {number(law.edge)} N s",
+        "Friction impulse": f"the smaller of these two, against the slip: Jₜ = {found} N s; it"
+        " changes vₜ by Jₜ/m and ω by R Jₜ/I",
+    }
 
 
 def bounce_claims(
     e: float, mu: float, angle: float, spin: float, law: Law, angles: Array
-) -> list[Claim]:
+) -> Iterator[Claim]:
     """When the contact sticks, which engines have the exact answer, and what the others do."""
     slips = slip_at(angles, spin)
     exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
-    return [
-        Claim(
-            f"The normal impulse is (1 + e) m vₙ = {number(law.normal)} N s in every engine. At"
-            f" every angle the cone is equally wide, µ Jₙ = {number(law.edge)} N s to each side.",
-            lambda shown: (
-                all(abs(shown.y(name)[-1] - law.normal) <= SINGLE for name in (*NAMES, TRUTH))
-                and np.ptp(shown.y(CONE, 1)) == 0.0
-                and abs(abs(shown.y(CONE, 1)[0]) - law.edge) <= DOUBLE
-            ),
+    yield Claim(
+        f"The normal impulse is (1 + e) m vₙ = {number(law.normal)} N s in every engine. At"
+        f" every angle the cone is equally wide, µ Jₙ = {number(law.edge)} N s to each side.",
+        lambda shown: (
+            all(abs(shown.y(name)[-1] - law.normal) <= SINGLE for name in (*NAMES, TRUTH))
+            and np.ptp(shown.y(CONE, 1)) == 0.0
+            and abs(abs(shown.y(CONE, 1)[0]) - law.edge) <= DOUBLE
         ),
-        *claims_here(float(slip_at(angle, spin)), spin, law),
-        Claim(
-            "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
-            f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in"
-            " proportion to the slip. Where the slip is larger the impulse stays on the edge of"
-            " the cone.",
-            lambda shown: shown.follows(TRUTH, exact, DOUBLE, chart=1),
+    )
+    yield from claims_here(float(slip_at(angle, spin)), spin, law)
+    yield Claim(
+        "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
+        f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in proportion"
+        " to the slip. Where the slip is larger the impulse stays on the edge of the cone.",
+        lambda shown: shown.follows(TRUTH, exact, DOUBLE, chart=1),
+    )
+    yield Claim(
+        f"{', '.join(EXACT[:-1])} and {EXACT[-1]} have the exact friction impulse and the exact"
+        " spin at every angle, to rounding.",
+        lambda shown: all(
+            shown.gap(name, chart=1) <= DOUBLE and shown.gap(name, chart=2) <= 32 * DOUBLE
+            for name in EXACT
         ),
-        Claim(
-            f"{', '.join(EXACT[:-1])} and {EXACT[-1]} have the exact friction impulse and the exact"
-            " spin at every angle, to rounding.",
-            lambda shown: all(
-                shown.gap(name, chart=1) <= DOUBLE and shown.gap(name, chart=2) <= 32 * DOUBLE
-                for name in EXACT
-            ),
-        ),
-        Claim(
-            f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
-            f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
-            " friction impulse should change it.",
-            lambda shown: turned_short(shown, spin),
-        ),
-        cone_of_v3(e, mu),
-    ]
+    )
+    yield Claim(
+        f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
+        f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
+        " friction impulse should change it.",
+        lambda shown: turned_short(shown, spin),
+    )
+    yield cone_of_v3(e, mu)
 
 
-def claims_here(slip: float, spin: float, law: Law) -> list[Claim]:
+def claims_here(slip: float, spin: float, law: Law) -> Iterator[Claim]:
     """Whether the contact of the replay sticks or slips."""
     need = abs(slip) * law.weight
     if need <= DOUBLE and not spin:
-        return [
-            Claim(
-                "Here the disk falls straight and does not spin: nothing slides, and no engine"
-                " gives a friction impulse.",
-                lambda shown: all(abs(shown.x(name)[-1]) <= SINGLE for name in (*NAMES, TRUTH)),
-            )
-        ]
-    if need <= DOUBLE:
-        return [
-            Claim(
-                "Here the point that touches is at rest, as that of a wheel that rolls: the exact"
-                f" friction impulse is 0. {BOX2D} gives one, because it takes the slip of a point"
-                " above the one that touches, and that point moves.",
-                lambda shown: (
-                    abs(shown.x(TRUTH)[-1]) <= DOUBLE and abs(shown.x(BOX2D)[-1]) > 100 * SINGLE
-                ),
-            )
-        ]
-    if need <= law.edge:
-        return [
-            Claim(
-                f"Here the contact sticks: {number(need, 4)} N s end the slip, and the cone allows"
-                f" {number(law.edge, 4)} N s. The exact impulse lies within the cone.",
-                lambda shown: (
-                    abs(abs(shown.x(TRUTH)[-1]) - need) <= DOUBLE
-                    and abs(shown.x(TRUTH)[-1]) <= shown.x(CONE)[-1] + DOUBLE
-                ),
-            )
-        ]
-    return [
-        Claim(
-            f"Here the contact slips: {number(need, 4)} N s would end the slip, and the cone allows"
-            f" only {number(law.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
-            lambda shown: abs(abs(shown.x(TRUTH)[-1]) - shown.x(CONE)[-1]) <= DOUBLE,
+        yield Claim(
+            "Here the disk falls straight and does not spin: nothing slides, and no engine"
+            " gives a friction impulse.",
+            lambda shown: all(abs(shown.x(name)[-1]) <= SINGLE for name in (*NAMES, TRUTH)),
         )
-    ]
+        return
+    if need <= DOUBLE:
+        yield Claim(
+            "Here the point that touches is at rest, as that of a wheel that rolls: the exact"
+            f" friction impulse is 0. {BOX2D} gives one, because it takes the slip of a point"
+            " above the one that touches, and that point moves.",
+            lambda shown: (
+                abs(shown.x(TRUTH)[-1]) <= DOUBLE and abs(shown.x(BOX2D)[-1]) > 100 * SINGLE
+            ),
+        )
+        return
+    if need <= law.edge:
+        yield Claim(
+            f"Here the contact sticks: {number(need, 4)} N s end the slip, and the cone allows"
+            f" {number(law.edge, 4)} N s. The exact impulse lies within the cone.",
+            lambda shown: (
+                abs(abs(shown.x(TRUTH)[-1]) - need) <= DOUBLE
+                and abs(shown.x(TRUTH)[-1]) <= shown.x(CONE)[-1] + DOUBLE
+            ),
+        )
+        return
+    yield Claim(
+        f"Here the contact slips: {number(need, 4)} N s would end the slip, and the cone allows"
+        f" only {number(law.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
+        lambda shown: abs(abs(shown.x(TRUTH)[-1]) - shown.x(CONE)[-1]) <= DOUBLE,
+    )
 
 
 def turned_short(shown: Shown, spin: float) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def show_cone(limit: str, mu: float, k: int) -> Shown:
         [chart, LessonChart("Normal impulse", "restitution e", "Jₙ in N s", [*normal, exact])],
         last.film,
         [("replayed: e", number(float(STATED[-1]))), *distances(chart)],
-        cone_claims(mu, whole, last.runs[0].dt, last.scenario.scene),
+        list(cone_claims(mu, whole, last.runs[0].dt, last.scenario.scene)),
     )
 
 
@@ -76,7 +76,7 @@ def share_of_v3(dt: float, scene: Scene) -> float:
     return 1 - left / substep if left < substep and step + left < FORESEEN else 1.0
 
 
-def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> list[Claim]:
+def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> Iterator[Claim]:
     """The normal impulse, and the friction that each engine gives."""
     share = share_of_v3(dt, scene)
     narrow = mu / (1 + STATED) * np.where(STATED > 0, share, 1.0)
@@ -85,30 +85,28 @@ def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> list[Claim]:
     def gives(name: str, law: Array) -> Callable[[Shown], np.bool_]:
         return lambda shown: np.abs(shown.y(name) / law - 1).max() <= CARRIED
 
-    return [
-        Claim(
-            "The normal impulse is right in every engine: (1 + e) m vₙ.",
-            lambda shown: all(
-                shown.gap(name, chart=1) <= 10 * SINGLE for name in (BOX2D_V3, ROUGH, ABLATED)
-            ),
+    yield Claim(
+        "The normal impulse is right in every engine: (1 + e) m vₙ.",
+        lambda shown: all(
+            shown.gap(name, chart=1) <= 10 * SINGLE for name in (BOX2D_V3, ROUGH, ABLATED)
         ),
-        Claim(
-            f"The exact friction impulse is µ = {number(mu)} of the normal impulse at every e."
-            f" {ROUGH} gives it.",
-            # Velocities of 8 m/s that float64 rounds a few times.
-            lambda shown: shown.gap(ROUGH) <= 1e-13 and np.ptp(shown.y(TRUTH)) == 0.0,
-        ),
-        foreseen_claim(gives(BOX2D_V3, narrow), share, dt),
-        Claim(
-            "The ablated reference has all other mechanisms of Box2D 3.1, and gives the exact"
-            " friction at every e."
-            if whole
-            else "The ablated reference now gives what Box2D 3.1 gives: that friction does not act"
-            " after restitution is the whole cause.",
-            gives(ABLATED, ablated),
-        ),
-        lies_on(BOX2D_V3, not whole, SINGLE),
-    ]
+    )
+    yield Claim(
+        f"The exact friction impulse is µ = {number(mu)} of the normal impulse at every e."
+        f" {ROUGH} gives it.",
+        # Velocities of 8 m/s that float64 rounds a few times.
+        lambda shown: shown.gap(ROUGH) <= 1e-13 and np.ptp(shown.y(TRUTH)) == 0.0,
+    )
+    yield foreseen_claim(gives(BOX2D_V3, narrow), share, dt)
+    yield Claim(
+        "The ablated reference has all other mechanisms of Box2D 3.1, and gives the exact"
+        " friction at every e."
+        if whole
+        else "The ablated reference now gives what Box2D 3.1 gives: that friction does not act"
+        " after restitution is the whole cause.",
+        gives(ABLATED, ablated),
+    )
+    yield lies_on(BOX2D_V3, not whole, SINGLE)
 
 
 def foreseen_claim(holds: Callable[[Shown], np.bool_], share: float, dt: float) -> Claim:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,6 @@ from reports.lessons.friction.thrown import ROUGH
 from reports.lessons.lesson import (
     Claim,
     Lesson,
-    LessonChart,
     Shown,
     Simulation,
     Slider,
@@ -47,32 +47,21 @@ def show_rolling(spin: float, mu: float, k: int) -> Shown:
     guides = [("x", begins, "rolls")] if begins else []
     return Shown(
         [
-            LessonChart(
-                "Velocity along the floor",
-                "time in s",
-                "m/s",
-                played.curves(lambda each: each.velocity[:, 0, 0]),
-                guides=guides,
+            played.over_time(
+                "Velocity along the floor", "m/s", lambda each: each.velocity[:, 0, 0], "", guides
             ),
-            LessonChart(
-                "Slip of the point that touches",
-                "time in s",
-                "v + R ω in m/s",
-                played.curves(slip),
-                guides=guides,
-            ),
-            LessonChart(
+            played.over_time("Slip of the point that touches", "v + R ω in m/s", slip, "", guides),
+            played.over_time(
                 "Size of that slip",
-                "time in s",
                 "|v + R ω| in m/s",
-                played.curves(lambda each: np.maximum(np.abs(slip(each)), STILL)),
+                lambda each: np.maximum(np.abs(slip(each)), STILL),
                 "y",
-                guides=guides,
+                guides,
             ),
         ],
         played.film,
         facts(played),
-        rolling_claims(spin, mu, k, scenario.dt(k)),
+        list(rolling_claims(spin, mu, k, scenario.dt(k))),
     )
 
 
@@ -107,46 +96,42 @@ def facts(played: Simulation) -> list[tuple[str, str]]:
     ]
 
 
-def rolling_claims(spin: float, mu: float, k: int, dt: float) -> list[Claim]:
+def rolling_claims(spin: float, mu: float, k: int, dt: float) -> Iterator[Claim]:
     """When the disk rolls and how fast, which engines are exact, and the slip at the end."""
     legs = sliding(spin, mu)
     rolls, end = float(legs.start[-1]), float(legs.velocity[-1, 0])
     late = f"one step of friction, µ g dt = {number(1e3 * mu * G * dt)} mm/s"
-    return [
-        *exact_claims(spin, mu, rolls, end),
-        Claim(
-            f"{ROUGH} and {EVENTS} have the exact velocity, to rounding. {MATCHED} is off by at"
-            f" most {late}.",
-            lambda shown: (
-                max(shown.gap(ROUGH), shown.gap(EVENTS)) <= DOUBLE
-                and shown.gap(MATCHED) <= mu * G * dt + DOUBLE
-            ),
+    yield from exact_claims(spin, mu, rolls, end)
+    yield Claim(
+        f"{ROUGH} and {EVENTS} have the exact velocity, to rounding. {MATCHED} is off by at"
+        f" most {late}.",
+        lambda shown: (
+            max(shown.gap(ROUGH), shown.gap(EVENTS)) <= DOUBLE
+            and shown.gap(MATCHED) <= mu * G * dt + DOUBLE
         ),
-        Claim(
-            "When they roll, these three have no slip, to rounding.",
-            lambda shown: all(
-                np.abs(shown.y(name, 1)[shown.x(name, 1) > rolls + 2 * dt]).max() <= DOUBLE
-                for name in (ROUGH, EVENTS, MATCHED)
-            ),
+    )
+    yield Claim(
+        "When they roll, these three have no slip, to rounding.",
+        lambda shown: all(
+            np.abs(shown.y(name, 1)[shown.x(name, 1) > rolls + 2 * dt]).max() <= DOUBLE
+            for name in (ROUGH, EVENTS, MATCHED)
         ),
-        mixed_claim(spin, mu, dt),
-        *slip_claims(spin, mu, k),
-    ]
+    )
+    yield mixed_claim(spin, mu, dt)
+    yield from slip_claims(spin, mu, k)
 
 
-def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim]:
+def exact_claims(spin: float, mu: float, rolls: float, end: float) -> Iterator[Claim]:
     """The closed form, in words."""
     if not rolls:
-        return [
-            Claim(
-                f"The disk rolls from the start, v = −R ω = {number(SPEED)} m/s: the point that"
-                " touches is at rest, there is no friction, and the exact velocity stays.",
-                lambda shown: (
-                    shown.follows(TRUTH, SPEED, DOUBLE)
-                    and shown.follows(TRUTH, 0.0, DOUBLE, chart=1)
-                ),
-            )
-        ]
+        yield Claim(
+            f"The disk rolls from the start, v = −R ω = {number(SPEED)} m/s: the point that"
+            " touches is at rest, there is no friction, and the exact velocity stays.",
+            lambda shown: (
+                shown.follows(TRUTH, SPEED, DOUBLE) and shown.follows(TRUTH, 0.0, DOUBLE, chart=1)
+            ),
+        )
+        return
     brake = mu * G
 
     def slows(shown: Shown) -> bool:
@@ -158,30 +143,25 @@ def exact_claims(spin: float, mu: float, rolls: float, end: float) -> list[Claim
             and np.abs(slid - (slid[0] - (1 + SOLID) * brake * t)).max() <= DOUBLE
         )
 
-    ends = {
-        "rolls": "rolls on",
-        "stops": "stands still: the spin was just enough to stop it",
-        "returns": "has turned back",
-    }["stops" if abs(end) <= DOUBLE else "rolls" if end > 0 else "returns"]
+    stops = "stands still: the spin was just enough to stop it"
+    ends = stops if abs(end) <= DOUBLE else "rolls on" if end > 0 else "has turned back"
     rule = "2/3 v₀" if not spin else "(2 v₀ − R ω₀)/3"
     when = "v₀/(3 µ g)" if not spin else "(v₀ + R ω₀)/(3 µ g)"
-    return [
-        Claim(
-            f"While the disk slides, its velocity falls by µ g = {number(brake)} m/s each second."
-            " Friction turns it, too, so that the slip falls by 3 µ g ="
-            f" {number(3 * brake)} m/s each second.",
-            slows,
+    yield Claim(
+        f"While the disk slides, its velocity falls by µ g = {number(brake)} m/s each second."
+        " Friction turns it, too, so that the slip falls by 3 µ g ="
+        f" {number(3 * brake)} m/s each second.",
+        slows,
+    )
+    yield Claim(
+        f"From t = {when} = {number(rolls)} s on the exact slip is 0, and the velocity stays at"
+        f" {rule} = {tidy(end, DOUBLE)} m/s: the disk {ends}.",
+        lambda shown: (
+            np.abs(shown.y(TRUTH)[shown.x(TRUTH) >= rolls] - end).max() <= DOUBLE
+            and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) >= rolls]).max() <= DOUBLE
+            and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) < rolls]).min() > DOUBLE
         ),
-        Claim(
-            f"From t = {when} = {number(rolls)} s on the exact slip is 0, and the velocity stays at"
-            f" {rule} = {tidy(end, DOUBLE)} m/s: the disk {ends}.",
-            lambda shown: (
-                np.abs(shown.y(TRUTH)[shown.x(TRUTH) >= rolls] - end).max() <= DOUBLE
-                and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) >= rolls]).max() <= DOUBLE
-                and np.abs(shown.y(TRUTH, 1)[shown.x(TRUTH) < rolls]).min() > DOUBLE
-            ),
-        ),
-    ]
+    )
 
 
 def mixed_claim(spin: float, mu: float, dt: float) -> Claim:
@@ -193,18 +173,13 @@ def mixed_claim(spin: float, mu: float, dt: float) -> Claim:
             f"{SHIPPED} rolls, too: where nothing slides, no coefficient matters.",
             lambda shown: shown.gap(SHIPPED) <= DOUBLE,
         )
-    when = (
-        f"at {number(rolls)} s"
-        if rolls < SECONDS
-        else f"at {number(rolls)} s, after the end of the replay"
-    )
+    after = "" if rolls < SECONDS else ", after the end of the replay"
     return Claim(
         f"{SHIPPED} multiplies the coefficients of floor and disk: its friction is µ² ="
-        f" {number(mixed)}. It begins to roll 1/µ = {number(1 / mu)} times as late, {when}.",
+        f" {number(mixed)}. It begins to roll 1/µ = {number(1 / mu)} times as late, at"
+        f" {number(rolls)} s{after}.",
         lambda shown: shown.follows(
-            SHIPPED,
-            sliding(spin, mixed).at(shown.x(SHIPPED))[1][:, 0],
-            mixed * G * dt + DOUBLE,
+            SHIPPED, sliding(spin, mixed).at(shown.x(SHIPPED))[1][:, 0], mixed * G * dt + DOUBLE
         ),
     )
 
@@ -225,7 +200,7 @@ def deepest(played: Trajectory) -> float:
     return float(RADIUS - played.position[:, 0, 1].min())
 
 
-def slip_claims(spin: float, mu: float, k: int) -> list[Claim]:
+def slip_claims(spin: float, mu: float, k: int) -> Iterator[Claim]:
     """The slip that remains in Box2D."""
 
     def share(shown: Shown, name: str) -> float:
@@ -244,37 +219,33 @@ def slip_claims(spin: float, mu: float, k: int) -> list[Claim]:
     depth, end = depths_of_v3(spin, mu, k, True)
     level, straight = depths_of_v3(spin, mu, k, False)
 
-    claims = [
-        Claim(
-            f"{BOX2D} never stops slipping. The disk rests 5 mm deep in the skin of the floor, so"
-            " the lever arm of friction is 2.5 mm too short, 1 % of the radius. Friction stops a"
-            " point above the one that touches, which slips at 1 % of the velocity.",
-            lambda shown: (
-                abs(share(shown, BOX2D) - 0.01) <= 5e-4
-                and abs(height(shown, BOX2D) - RADIUS - 0.005) <= 1e-4
-            ),
+    yield Claim(
+        f"{BOX2D} never stops slipping. The disk rests 5 mm deep in the skin of the floor, so"
+        " the lever arm of friction is 2.5 mm too short, 1 % of the radius. Friction stops a"
+        " point above the one that touches, which slips at 1 % of the velocity.",
+        lambda shown: (
+            abs(share(shown, BOX2D) - 0.01) <= 5e-4
+            and abs(height(shown, BOX2D) - RADIUS - 0.005) <= 1e-4
         ),
-        Claim(
-            f"In {BOX2D_V3} the disk sinks into the floor, here by up to {number(1e3 * depth)} mm:"
-            " the point that touches turns with the disk within a step, and Box2D takes the rise of"
-            " that point for a gap. The faster the spin and the longer the step, the deeper. The"
-            " ablated reference, which is not drawn here, sinks as deep and ends within 4 mm/s of"
-            " its velocity. Without this mechanism it sinks by less than 0.1 mm.",
-            lambda shown: (
-                abs(deepest(played(shown, BOX2D_V3)) - depth) <= 2e-6 + 2e-3 * depth
-                and level < min(depth, 1e-4)
-                and abs(shown.y(BOX2D_V3)[-1] - end) <= 4e-3
-            ),
+    )
+    yield Claim(
+        f"In {BOX2D_V3} the disk sinks into the floor, here by up to {number(1e3 * depth)} mm:"
+        " the point that touches turns with the disk within a step, and Box2D takes the rise of"
+        " that point for a gap. The faster the spin and the longer the step, the deeper. The"
+        " ablated reference, which is not drawn here, sinks as deep and ends within 4 mm/s of"
+        " its velocity. Without this mechanism it sinks by less than 0.1 mm.",
+        lambda shown: (
+            abs(deepest(played(shown, BOX2D_V3)) - depth) <= 2e-6 + 2e-3 * depth
+            and level < min(depth, 1e-4)
+            and abs(shown.y(BOX2D_V3)[-1] - end) <= 4e-3
         ),
-    ]
+    )
     if abs(sliding(spin, 1.0).velocity[-1, 0]) <= DOUBLE:
-        return [
-            *claims,
-            Claim(
-                f"{BOX2D_V3} lets a disk that is slow enough sleep: in the end nothing moves.",
-                lambda shown: shown.y(BOX2D_V3)[-1] == shown.y(BOX2D_V3, 1)[-1] == 0.0,
-            ),
-        ]
+        yield Claim(
+            f"{BOX2D_V3} lets a disk that is slow enough sleep: in the end nothing moves.",
+            lambda shown: shown.y(BOX2D_V3)[-1] == shown.y(BOX2D_V3, 1)[-1] == 0.0,
+        )
+        return
     near = abs(end - exact) < 1e-3 * abs(exact)
     velocity = (
         "which is within a thousandth of the exact one"
@@ -282,18 +253,15 @@ def slip_claims(spin: float, mu: float, k: int) -> list[Claim]:
         else f"which is {number(end, 4)} m/s, not {number(exact, 4)} m/s; without this mechanism it"
         f" is {number(straight, 4)} m/s"
     )
-    return [
-        *claims,
-        Claim(
-            "This shortens the lever arm, too. In the end the point that touches slips at less than"
-            f" 0.3 % of the velocity, {velocity}.",
-            lambda shown: (
-                1e-5 < share(shown, BOX2D_V3) < 0.003
-                and abs(shown.y(BOX2D_V3)[-1] - end) <= 1e-4
-                and (near or abs(straight - exact) < abs(end - exact) / 4)
-            ),
+    yield Claim(
+        "This shortens the lever arm, too. In the end the point that touches slips at less than"
+        f" 0.3 % of the velocity, {velocity}.",
+        lambda shown: (
+            1e-5 < share(shown, BOX2D_V3) < 0.003
+            and abs(shown.y(BOX2D_V3)[-1] - end) <= 1e-4
+            and (near or abs(straight - exact) < abs(end - exact) / 4)
         ),
-    ]
+    )
 
 
 ROLLING = Lesson(

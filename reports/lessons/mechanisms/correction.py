@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.mechanisms.ablated import BOX2D
-from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
@@ -32,8 +32,12 @@ def show_position_correction(share: float, slop: float) -> Shown:
     )
     corrects = ablated(order=BOX2D, correction_most=0.2, correction_share=share, slop=slop / 1e3)
     played = Simulation.by(scenario, NAMES, 1, {**unswept(length_unit=1.0), **corrects})
-    curves = played.curves(lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3))
-    chart = LessonChart("Overlap", "time in s", "mm, 0 drawn as 0.001", curves, "y")
+    chart = played.over_time(
+        "Overlap",
+        "mm, 0 drawn as 0.001",
+        lambda each: np.maximum(1e3 * (1.0 - each.position[:, 1, 0]), 1e-3),
+        "y",
+    )
     own = f"{number(1e3 * played.runs[0].settings['linear slop in m'][1])} mm"
     return Shown(
         [chart],
@@ -55,9 +59,8 @@ def correction_claims(share: float, slop: float) -> list[Claim]:
         ),
         Claim(
             "Box2D undoes 0.2 of what exceeds its slop of 2.5 mm, three times a step as long as the"
-            " overlap is more than three slops, and once a step from then on:"
-            f" {number(left[1])} mm are left after the first step, and in the end the slop and less"
-            " than 0.1 mm more.",
+            f" overlap is more than three slops, and once a step from then on: {number(left[1])} mm"
+            " are left after the first step, and in the end the slop and less than 0.1 mm more.",
             lambda shown: (
                 np.abs(shown.y(NO_CCD) - left[: len(shown.y(NO_CCD))]).max() <= single
                 and own <= shown.y(NO_CCD)[-1] < own + 0.1

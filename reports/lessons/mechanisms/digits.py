@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from reports.lessons.lesson import (
@@ -40,52 +42,45 @@ def show_digits(digits: int, far: float) -> Shown:
         [chart, LessonChart("The same on a linear axis", "time in s", "mm", millimetres)],
         played.film,
         distances(chart, "m"),
-        digits_claims(far, digits, scenario.intervals * 4, scenario.dt(4), curves[0]),
+        list(digits_claims(far, digits, scenario.intervals * 4, scenario.dt(4), curves[0])),
     )
 
 
-def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) -> list[Claim]:
+def digits_claims(far: float, digits: int, steps: int, dt: float, box2d: Curve) -> Iterator[Claim]:
     """The largest sum of the rounding errors of a position, and their sum in Box2D."""
     apart = float(np.spacing(np.float32(far + 2)))  # m; the disk moves by 2 m
     near = float(np.spacing(np.float32(far)))
     most = steps * apart / 2  # along x; y has smaller numbers, and far more digits
-    largest = float(np.max(box2d.y))
-    claims = [
-        Claim(
-            f"Two neighbouring float32 numbers are {number(1e3 * near)} mm apart at x ="
-            f" {number(far)} m, where the disk starts, and {number(1e3 * apart)} mm at x ="
-            f" {number(far + 2, 5)} m, where it ends; a step is {number(1e3 * dt)} mm along x."
-            f" Box2D rounds x in each of {steps} steps, by at most half of this distance. These"
-            f" errors could add up to {number(1e3 * most)} mm. Here the largest distance is"
-            f" {number(1e3 * largest)} mm.",
-            lambda shown: (
-                apart / 100 < shown.y("box2d:shipped").max() <= most
-                and abs(shown.y("box2d:shipped").max() / largest - 1) <= 1e-9
-            ),
+    largest = float(box2d.y.max())
+
+    def in_proportion(shown: Shown) -> bool:
+        y = shown.y("box2d:shipped", 1)
+        law = y[-1] * shown.x("box2d:shipped", 1) / 2
+        return bool(np.abs(y - law).max() < 0.05 * y[-1])
+
+    yield Claim(
+        f"Two neighbouring float32 numbers are {number(1e3 * near)} mm apart at x = {number(far)}"
+        f" m, where the disk starts, and {number(1e3 * apart)} mm at x = {number(far + 2, 5)} m,"
+        f" where it ends; a step is {number(1e3 * dt)} mm along x. Box2D rounds x in each of"
+        f" {steps} steps, by at most half of this distance. These errors could add up to"
+        f" {number(1e3 * most)} mm. Here the largest distance is {number(1e3 * largest)} mm.",
+        lambda shown: (
+            apart / 100 < shown.y("box2d:shipped").max() <= most
+            and abs(shown.y("box2d:shipped").max() / largest - 1) <= 1e-9
         ),
-        Claim(
-            "reference:exercise computes with 53 binary digits and stays within a millionth of a"
-            " millimetre.",
-            lambda shown: shown.y(PLAIN).max() < 1e-9,
-        ),
-        lies_on("box2d:shipped", digits == 24, 0.0),
-    ]
+    )
     if far == 1e4:
-        claims.insert(
-            1,
-            Claim(
-                "Here every step is rounded the same way, so the error grows in proportion to the"
-                " time: on the linear axis it is a straight line.",
-                lambda shown: (
-                    np.abs(
-                        shown.y("box2d:shipped", 1)
-                        - shown.y("box2d:shipped", 1)[-1] * shown.x("box2d:shipped", 1) / 2
-                    ).max()
-                    < 0.05 * shown.y("box2d:shipped", 1)[-1]
-                ),
-            ),
+        yield Claim(
+            "Here every step is rounded the same way, so the error grows in proportion to the"
+            " time: on the linear axis it is a straight line.",
+            in_proportion,
         )
-    return claims
+    yield Claim(
+        "reference:exercise computes with 53 binary digits and stays within a millionth of a"
+        " millimetre.",
+        lambda shown: shown.y(PLAIN).max() < 1e-9,
+    )
+    yield lies_on("box2d:shipped", digits == 24, 0.0)
 
 
 DIGITS = Lesson(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from reports.lessons.lesson import Claim, LessonChart, Makes, Shown, Simulation
+from reports.lessons.lesson import Claim, Makes, Shown, Simulation
 from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, distances
 from scenarios.families.lesson import free_fall
 from scenarios.model import Array
@@ -19,7 +19,8 @@ def falling(
     scenario = free_fall()
     played = Simulation.by(scenario, (engine, PLAIN, ABLATED), substeps, makes)
     exact = played.truth.position
-    curves = played.curves(lambda each: 1e3 * (each.position - exact)[:, 0, 1])
-    chart = LessonChart("Above the parabola", "time in s", "mm", curves)
+    chart = played.over_time(
+        "Above the parabola", "mm", lambda each: 1e3 * (each.position - exact)[:, 0, 1]
+    )
     offset = 1e3 * 9.81 * scenario.dt(substeps) * scenario.times / 2
     return Shown([chart], played.film, distances(chart, "mm"), claims(offset))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -100,7 +101,7 @@ def shares_of(profile: str) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda one: abs(one[1])))
 
 
-def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list[Claim]:
+def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> Iterator[Claim]:
     """What the errors of a scene show; `middle`: the place of the middle step size."""
     planck, box2d = f"{PLANCK}:{profile}", f"{BOX2D}:{profile}"
     p, b, between = (curve.y for curve in curves)
@@ -119,57 +120,46 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
         if usual >= 0
         else f"without float32 the error would be {part} larger"
     )
-    claims = [
-        Claim(
-            f"At the middle step size, {number(ms[middle])} ms, {planck} is"
-            f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: {effect}.",
-            lambda shown: abs(share(shown)[middle] - usual) <= 1e-9,
-        )
-    ]
+    yield Claim(
+        f"At the middle step size, {number(ms[middle])} ms, {planck} is"
+        f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: {effect}.",
+        lambda shown: abs(share(shown)[middle] - usual) <= 1e-9,
+    )
     if name == "free_fall":
-        claims.append(
-            Claim(
-                f"Half the step gives half the error of {planck}, at every step size.",
-                lambda shown: np.abs(shown.y(planck)[:-1] / shown.y(planck)[1:] - 2).max() < 1e-3,
-            )
+        yield Claim(
+            f"Half the step gives half the error of {planck}, at every step size.",
+            lambda shown: np.abs(shown.y(planck)[:-1] / shown.y(planck)[1:] - 2).max() < 1e-3,
         )
     worst = float(np.abs(1 - p / b).max())
     if worst <= ALIKE:
-        claims.append(
-            Claim(
-                "Float32 matters little here: at no step size does it change the error by more"
-                f" than {number(100 * worst, 2)} %.",
-                lambda shown: np.abs(share(shown)).max() <= worst * (1 + 1e-9),
-            )
+        yield Claim(
+            "Float32 matters little here: at no step size does it change the error by more"
+            f" than {number(100 * worst, 2)} %.",
+            lambda shown: np.abs(share(shown)).max() <= worst * (1 + 1e-9),
         )
-        return claims
+        return
     best = int(np.argmin(b))
     times = float(b[-1] / p[-1])
-    claims.append(
-        Claim(
-            f"{box2d} is nearest to the exact answer at {number(ms[best], 2)} ms. Smaller steps"
-            f" make its error larger: at {number(ms[-1], 2)} ms it is {number(times, 2)} times"
-            f" that of {planck}.",
-            lambda shown: (
-                int(np.argmin(shown.y(box2d))) == best < len(ms) - 1
-                and abs(shown.y(box2d)[-1] / shown.y(planck)[-1] / times - 1) <= 1e-9
-            ),
-        )
+    yield Claim(
+        f"{box2d} is nearest to the exact answer at {number(ms[best], 2)} ms. Smaller steps"
+        f" make its error larger: at {number(ms[-1], 2)} ms it is {number(times, 2)} times"
+        f" that of {planck}.",
+        lambda shown: (
+            int(np.argmin(shown.y(box2d))) == best < len(ms) - 1
+            and abs(shown.y(box2d)[-1] / shown.y(planck)[-1] / times - 1) <= 1e-9
+        ),
     )
     growth = ends(between)
     if growth > 1:
-        claims.append(
-            Claim(
-                "The distance between the two grows with the number of steps:"
-                f" {LADDER[-1]} times as many steps make it {number(growth, 2)} times as large.",
-                lambda shown: (
-                    abs(ends(shown.y(BETWEEN)) / growth - 1) <= 1e-9
-                    and ends(shown.x(BETWEEN)) == 1 / LADDER[-1]
-                    and np.polyfit(np.log(shown.x(BETWEEN)), np.log(shown.y(BETWEEN)), 1)[0] < -0.5
-                ),
-            )
+        yield Claim(
+            "The distance between the two grows with the number of steps:"
+            f" {LADDER[-1]} times as many steps make it {number(growth, 2)} times as large.",
+            lambda shown: (
+                abs(ends(shown.y(BETWEEN)) / growth - 1) <= 1e-9
+                and ends(shown.x(BETWEEN)) == 1 / LADDER[-1]
+                and np.polyfit(np.log(shown.x(BETWEEN)), np.log(shown.y(BETWEEN)), 1)[0] < -0.5
+            ),
         )
-    return claims
 
 
 def claim_of_all(profile: str, percent: Array) -> Claim:

@@ -38,9 +38,8 @@ def show_gravity(order: str, k: int) -> Shown:
     scenario = bouncing_ball_e1()
     makes = {**unswept(), **ablated(order=ORDERS[order])}
     played = Simulation.by(scenario, NAMES, k, makes)
-    curves = played.curves(lambda each: each.position[:, 0, 1])
-    chart = LessonChart("Height of the centre", "time in s", "m", curves)
-    turns = [(curve.name, np.append(curve.y[0], turned(curve.y))) for curve in curves]
+    chart = played.over_time("Height of the centre", "m", lambda each: each.position[:, 0, 1])
+    turns = [(curve.name, np.append(curve.y[0], turned(curve.y))) for curve in chart.curves]
     heights = [Curve(name, np.arange(float(len(found))), found, dots=True) for name, found in turns]
     return Shown(
         [chart, LessonChart("How high it rises", "bounces so far", "m", heights)],
@@ -82,10 +81,9 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
     )
     return [
         Claim(
-            "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already"
-            " changed. The ball gains about |v| dt of height at each bounce, where v is"
-            f" its speed: some {number(1e3 * fall * dt, 2)} mm at the first, and more at each later"
-            " one.",
+            "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already changed. The"
+            " ball gains about |v| dt of height at each bounce, where v is its speed: some"
+            f" {number(1e3 * fall * dt, 2)} mm at the first, and more at each later one.",
             lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
         ),
         continuous,

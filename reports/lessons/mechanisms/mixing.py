@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -124,7 +125,13 @@ def show_mixing(what: str, rule: str, other: str) -> Shown:
         (f"{mark} of the other disk", "the same" if second is None else number(second)),
         *distances(chart),
     ]
-    claims = same_claims(what, rule) if second is None else mixing_claims(what, rule, second)
+    if second is None:
+        claims = list(same_claims(what, rule))
+    else:
+        claims = [
+            *rule_claims(PYMUNK, what, rule, second, DOUBLE),
+            *rule_claims(BOX2D, what, rule, second, ROUNDED),
+        ]
     return Shown([chart], played[STATED.tolist().index(SHOWN)].film, facts, claims)
 
 
@@ -132,62 +139,48 @@ def show_mixing(what: str, rule: str, other: str) -> Shown:
 DOUBLE, ROUNDED = 16 * 2.0**-53, 16 * FLOAT32
 
 
-def same_claims(what: str, rule: str) -> list[Claim]:
+def same_claims(what: str, rule: str) -> Iterator[Claim]:
     """Of two disks with the same number: which engine multiplies, and which gives that number."""
     mark, product = what[-1], rule == "the product"
     own = 0.2 if what == FRICTION else 0.0
-    claims = [
-        Claim(
-            f"{PYMUNK} multiplies: two disks with {mark} have a collision with {mark}².",
-            lambda shown: np.abs(shown.y(PYMUNK) - shown.x(PYMUNK) ** 2).max() <= DOUBLE,
+    yield Claim(
+        f"{PYMUNK} multiplies: two disks with {mark} have a collision with {mark}².",
+        lambda shown: shown.follows(PYMUNK, shown.x(PYMUNK) ** 2, DOUBLE),
+    )
+    yield Claim(
+        f"{BOX2D} has the {mark} that is stated."
+        + (f" A scene without friction gets the default of Box2D, {own}." if own else ""),
+        lambda shown: (
+            np.abs(shown.y(BOX2D) - shown.x(BOX2D))[1:].max() <= ROUNDED
+            and abs(shown.y(BOX2D)[0] - own) <= ROUNDED
         ),
-        Claim(
-            f"{BOX2D} has the {mark} that is stated."
-            + (f" A scene without friction gets the default of Box2D, {own}." if own else ""),
-            lambda shown: (
-                np.abs(shown.y(BOX2D) - shown.x(BOX2D))[1:].max() <= ROUNDED
-                and abs(shown.y(BOX2D)[0] - own) <= ROUNDED
-            ),
-        ),
-        lies_on(PYMUNK, product, DOUBLE),
-    ]
+    )
+    yield lies_on(PYMUNK, product, DOUBLE)
     if not product:
-        claims.append(
-            Claim(
-                f"For two disks with the same {mark} this rule gives the {mark} that is stated, as"
-                " does every rule but the product: only another number on the other disk shows"
-                " which it is.",
-                lambda shown: (
-                    shown.gap(ABLATED) <= DOUBLE
-                    and all(
-                        abs(mix(SHOWN, SHOWN) - SHOWN) <= DOUBLE
-                        for name, mix in MIXING.items()
-                        if name != "the product"
-                    )
-                ),
-            )
-        )
-    return claims
-
-
-def mixing_claims(what: str, rule: str, other: float) -> list[Claim]:
-    """Of two disks with different numbers: the rule of each engine."""
-    mark = what[-1]
-
-    def takes(name: str, bound: float) -> Claim:
-        own = OWN_RULES[name][what]
-        law = np.array([MIXING[own](float(x), other) for x in STATED])
-        return Claim(
-            f"{name} takes {own}: with {number(SHOWN)} and {number(other)} the {mark} of the"
-            f" collision is {number(MIXING[own](SHOWN, other))}.",
-            lambda shown: shown.follows(name, law, bound),
+        yield Claim(
+            f"For two disks with the same {mark} this rule gives the {mark} that is stated, as does"
+            " every rule but the product: only another number on the other disk shows which it is.",
+            lambda shown: (
+                shown.gap(ABLATED) <= DOUBLE
+                and all(
+                    abs(mix(SHOWN, SHOWN) - SHOWN) <= DOUBLE
+                    for name, mix in MIXING.items()
+                    if name != "the product"
+                )
+            ),
         )
 
-    return [
-        claim
-        for name, bound in ((PYMUNK, DOUBLE), (BOX2D, ROUNDED))
-        for claim in (takes(name, bound), lies_on(name, rule == OWN_RULES[name][what], bound))
-    ]
+
+def rule_claims(name: str, what: str, rule: str, other: float, bound: float) -> Iterator[Claim]:
+    """Of two disks with different numbers: the rule of an engine."""
+    mark, own = what[-1], OWN_RULES[name][what]
+    law = np.array([MIXING[own](float(x), other) for x in STATED])
+    yield Claim(
+        f"{name} takes {own}: with {number(SHOWN)} and {number(other)} the {mark} of the collision"
+        f" is {number(MIXING[own](SHOWN, other))}.",
+        lambda shown: shown.follows(name, law, bound),
+    )
+    yield lies_on(name, rule == own, bound)
 
 
 MIXING_RULE = Lesson(

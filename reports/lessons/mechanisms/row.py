@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
@@ -46,7 +47,7 @@ def show_row(order: str, iterations: int, n: int) -> Shown:
         [chart],
         played.film,
         distances(chart, "m/s"),
-        row_claims(n, order, iterations),
+        list(row_claims(n, order, iterations)),
         # pair by pair goes through the contacts once
         said={} if order == "together" else {"iterations": "not used pair by pair"},
     )
@@ -79,7 +80,7 @@ def overlapping(n: int) -> Array:
     return run.trajectory.velocity[-1, :, 0]
 
 
-def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
+def row_claims(n: int, order: str, iterations: int) -> Iterator[Claim]:
     """How the 5 m/s are shared among the disks."""
     last, thrown = np.append(np.zeros(n), 5.0), overlapping(n)
     # 8 iterations over up to 5 contacts, at 5 m/s.
@@ -89,56 +90,45 @@ def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
         y = shown.y("box2d:matched")
         return bool(y[0] < -1 and (y[1:] > 1).all() and abs(y.sum() - 5) < 1e-4)
 
-    claims = [
-        Claim(
-            "In the exact answer the last disk takes all of the 5 m/s and the others stay.",
-            lambda shown: shown.follows(TRUTH, last, 0.0),
+    yield Claim(
+        "In the exact answer the last disk takes all of the 5 m/s and the others stay.",
+        lambda shown: shown.follows(TRUTH, last, 0.0),
+    )
+    yield Claim(
+        f"With gaps of {number(1e6 * GAP)} µm between the disks the pairs collide one after the"
+        " other, and the exact answer ends with the same velocities.",
+        lambda shown: shown.follows(TRUTH, with_gaps(n), ROUNDING),
+    )
+    yield Claim(
+        "reference:exercise takes one pair after the other, and ends with these velocities, too.",
+        lambda shown: shown.follows(PLAIN, last, ROUNDING),
+    )
+    yield Claim(
+        "So does pymunk:matched here, because it finds no contact between disks that just touch. If"
+        f" the disks of the row overlap by {number(OVERLAP)} m, it solves their contacts together:"
+        f" the first disk is thrown back at {number(-thrown[0])} m/s, and all others move on.",
+        lambda shown: (
+            shown.follows("pymunk:matched", last, ROUNDING)
+            and bool(thrown[0] < -1 and (thrown[1:] > 1).all())
         ),
-        Claim(
-            f"With gaps of {number(1e6 * GAP)} µm between the disks the pairs collide one after the"
-            " other, and the exact answer ends with the same velocities.",
-            lambda shown: shown.follows(TRUTH, with_gaps(n), ROUNDING),
-        ),
-        Claim(
-            "reference:exercise takes one pair after the other, and ends with these velocities,"
-            " too.",
-            lambda shown: shown.follows(PLAIN, last, ROUNDING),
-        ),
-        Claim(
-            "So does pymunk:matched here, because it finds no contact between disks that just"
-            " touch."
-            f" If the disks of the row overlap by {number(OVERLAP)} m, it solves their contacts"
-            f" together: the first disk is thrown back at {number(-thrown[0])} m/s, and all others"
-            " move on.",
-            lambda shown: (
-                shown.follows("pymunk:matched", last, ROUNDING)
-                and bool(thrown[0] < -1 and (thrown[1:] > 1).all())
-            ),
-        ),
-        Claim(
-            "In Box2D the first disk is thrown back and all others move on; the momentum is the"
-            " same.",
-            shared,
-        ),
-    ]
+    )
+    yield Claim(
+        "In Box2D the first disk is thrown back and all others move on; the momentum is the same.",
+        shared,
+    )
     if order == "pair by pair":
-        claims.append(lies_on("pymunk:matched", True, ROUNDING, "m/s"))
+        yield lies_on("pymunk:matched", True, ROUNDING, "m/s")
     if order == "together" and iterations == 50:
         together = 10 / (n + 1)  # m/s: one body of n disks, struck with e = 1
-        claims.append(
-            Claim(
-                "After 50 iterations the row of the ablated reference moves on as one body, at"
-                f" {number(together)} m/s, within 1 mm/s.",
-                lambda shown: shown.follows(
-                    ABLATED, np.append(5 - n * together, np.full(n, together)), 1e-3
-                ),
-            )
+        yield Claim(
+            "After 50 iterations the row of the ablated reference moves on as one body, at"
+            f" {number(together)} m/s, within 1 mm/s.",
+            lambda shown: shown.follows(
+                ABLATED, np.append(5 - n * together, np.full(n, together)), 1e-3
+            ),
         )
     else:
-        claims.append(
-            lies_on("box2d:matched", order == "together" and iterations == 8, single, "m/s")
-        )
-    return claims
+        yield lies_on("box2d:matched", order == "together" and iterations == 8, single, "m/s")
 
 
 ROW = Lesson(

@@ -110,7 +110,7 @@ def test_the_numbers_of_a_collision_are_those_of_the_solver():
     """The impulse that lesson 4 writes out is the one the solver reports, and momentum is kept."""
     scene = two(0.9, 10.0, 1.0).scene
     before, after, reported = collision_of_the_reference(scene, 1 / 64)
-    steps = dict(LESSONS["meeting"].at((2, 2, 2, 1)).steps)
+    steps = LESSONS["meeting"].at((2, 2, 2, 1)).steps
     kick = scene.mass[0] * np.hypot(*(after.velocity[0] - before.velocity[0]))
 
     assert reported == pytest.approx(kick, rel=1e-14)
