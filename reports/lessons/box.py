@@ -12,15 +12,7 @@ import numpy as np
 
 from adapters.engine import ContactImpulse
 from adapters.engines import ENGINES
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    Shown,
-    Simulation,
-    Slider,
-    tidy,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, tidy, time_step
 from reports.page.style import TRUTH, number
 from scenarios.families.lesson import falling_box
 from scenarios.model import Array, Scenario, Scene, State, Trajectory

@@ -82,7 +82,8 @@ def moved_by_a_rounding(seed: int, restitution: float, k: int) -> Curve:
     )
     assert one is not None
     assert other is not None
-    return farthest(ROUNDED, one, other, scene)
+    apart = farthest(one, other, scene)
+    return Curve(ROUNDED, one.t[: len(apart)], apart)
 
 
 def rounding_claim(played: Simulation, factor: float, moved: Curve) -> Claim:

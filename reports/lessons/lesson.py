@@ -361,7 +361,8 @@ class Simulation:
     def error(self, name: str, motion: Trajectory) -> Curve:
         """m, the distance of the farthest disk from the exact answer over time, while there is
         one."""
-        return farthest(name, motion, self.truth, self.scenario.scene)
+        distances = farthest(motion, self.truth, self.scenario.scene)
+        return Curve(name, motion.t[: len(distances)], distances)
 
     def errors(self) -> list[Curve]:
         """m, the error of every engine."""
@@ -383,10 +384,10 @@ def run_of(
     return play_once(make or row_of(name).make, name, scenario, scenario.dt(substeps))
 
 
-def farthest(name: str, one: Trajectory, other: Trajectory, scene: Scene) -> Curve:
-    """m, the largest distance of any disk between two motions over time, as long as both last."""
-    distances = deviation(one, other, scene).max(axis=1)
-    return Curve(name, one.t[: len(distances)], distances)
+def farthest(one: Trajectory, other: Trajectory, scene: Scene) -> Array:
+    """(k,) m, the largest distance of any disk between two motions, as long as both last."""
+    distances: Array = deviation(one, other, scene).max(axis=1)
+    return distances
 
 
 def swept(

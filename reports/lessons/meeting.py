@@ -11,15 +11,7 @@ import numpy as np
 
 from adapters.box2d import MATCHED
 from adapters.engines import ENGINES, changed
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    Shown,
-    Simulation,
-    Slider,
-    tidy,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, tidy, time_step
 from reports.page.style import TRUTH, number
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, State

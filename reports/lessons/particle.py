@@ -50,7 +50,7 @@ def show_particle(part: str, k: int) -> Shown:
     errors = swept(
         1e3 * steps,
         [Simulation.by(scenario, METHODS, each) for each in STEPS],
-        lambda each, scene: farthest("", each, played.truth, scene).y.max(),
+        lambda each, scene: farthest(each, played.truth, scene).max(),
     )
     dt, radius = scenario.dt(k), float(scenario.scene.radius[0])
     guides = [("x", 1e3 * dt, "here")]

@@ -48,19 +48,25 @@ class Law(NamedTuple):
 
 def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
     """The impulse in its cone; the friction impulse and the spin at every angle."""
-    along = speed_along(angle)
-    here = Simulation.by(thrown(along, spin, e, mu), NAMES, 1)
+    here = Simulation.by(thrown(speed_along(angle), spin, e, mu), NAMES, 1)
     scene, impulses = here.scenario.scene, taken_by(here)
     normal = float(impulses[TRUTH].normal[0])
     weight = 1 / float(1 / scene.mass[0] + scene.radius[0] ** 2 / scene.inertia[0])
     law = Law(weight, normal, mu * normal)
     angles = angles_of(law, spin)
-    swept = taken_by(Simulation.by(thrown(speed_along(angles), spin, e, mu), NAMES, 1))
+    at_angles = taken_by(Simulation.by(thrown(speed_along(angles), spin, e, mu), NAMES, 1))
+    edges = [Curve(CONE, angles, np.full(len(angles), side * law.edge)) for side in (-1.0, 1.0)]
+    frictions = [Curve(name, angles, each.along) for name, each in at_angles.items()]
+    spins = [
+        Curve(name, angles, spin + each.turning / scene.inertia[0])
+        for name, each in at_angles.items()
+    ]
+    incidence, mark = "angle of incidence from the normal in degrees", [("x", angle, "here")]
     return Shown(
         [
             cone_chart(impulses, law),
-            friction_chart(angles, swept, law, angle),
-            spin_chart(angles, swept, spin, float(scene.inertia[0]), angle),
+            LessonChart("Friction impulse", incidence, "Jₜ in N s", [*edges, *frictions], "", mark),
+            LessonChart("Spin after the bounce", incidence, "ω in rad/s", spins, "", mark),
         ],
         here.film,
         [
@@ -110,31 +116,6 @@ def cone_chart(impulses: Mapping[str, Taken], law: Law) -> LessonChart:
         "friction impulse Jₜ in N s",
         "normal impulse Jₙ in N s",
         [edges, *lines],
-    )
-
-
-def friction_chart(angles: Array, swept: Mapping[str, Taken], law: Law, here: float) -> LessonChart:
-    """The friction impulse at every angle, between the edges of the cone."""
-    edges = [Curve(CONE, angles, np.full(len(angles), side * law.edge)) for side in (-1.0, 1.0)]
-    return LessonChart(
-        "Friction impulse",
-        "angle of incidence from the normal in degrees",
-        "Jₜ in N s",
-        [*edges, *(Curve(name, angles, each.along) for name, each in swept.items())],
-        guides=[("x", here, "here")],
-    )
-
-
-def spin_chart(
-    angles: Array, swept: Mapping[str, Taken], spin: float, inertia: float, here: float
-) -> LessonChart:
-    """The spin after the bounce at every angle."""
-    return LessonChart(
-        "Spin after the bounce",
-        "angle of incidence from the normal in degrees",
-        "ω in rad/s",
-        [Curve(name, angles, spin + each.turning / inertia) for name, each in swept.items()],
-        guides=[("x", here, "here")],
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import ceil
 
 import numpy as np
@@ -49,7 +50,7 @@ def show_lever(where: str, k: int) -> Shown:
         [chart],
         played[RADII.tolist().index(REPLAYED)].film,
         [("replayed: radius", f"{number(REPLAYED)} m"), *distances(chart)],
-        lever_claims(share, played[-1].runs[0].dt, played[-1].scenario.scene),
+        list(lever_claims(share, played[-1].runs[0].dt, played[-1].scenario.scene)),
     )
 
 
@@ -60,32 +61,30 @@ def overlap(dt: float, scene: Scene) -> float:
     return ceil(gap / (FALL * dt)) * FALL * dt - gap
 
 
-def lever_claims(share: float, dt: float, scene: Scene) -> list[Claim]:
+def lever_claims(share: float, dt: float, scene: Scene) -> Iterator[Claim]:
     """The length by which each lever arm is too short."""
     deep = overlap(dt, scene)
     half = 1 - deep / 2 / RADII
     # Every step rounds a height of up to 2 m; the smallest radius shows it most.
     flown = SINGLE + scene.position[0, 1] / (FALL * dt) * 2 * FLOAT32 / RADII[0]
-    return [
-        Claim(
-            f"{ROUGH} has the lever arm R at every radius.",
-            lambda shown: shown.follows(ROUGH, 1.0, 1e-12),  # float64, at the smallest impulses
-        ),
-        Claim(
-            f"With this step {BOX2D} finds the contact when the disk overlaps the skin by"
-            f" {number(1e3 * deep)} mm. Its lever arm is half of that too short at every radius, by"
-            f" {number(1e3 * deep / 2)} mm: {number(100 * (1 - half[0]))} % of the smallest radius,"
-            f" {number(100 * (1 - half[-1]))} % of the largest.",
-            lambda shown: shown.follows(BOX2D, half, flown),
-        ),
-        Claim(
-            f"The lever arm of the ablated reference is {number(1e3 * share * deep)} mm too short."
-            if share
-            else "The ablated reference has the lever arm R, too.",
-            lambda shown: shown.follows(ABLATED, 1 - share * deep / RADII, flown),
-        ),
-        lies_on(BOX2D, share == 0.5, SINGLE),
-    ]
+    yield Claim(
+        f"{ROUGH} has the lever arm R at every radius.",
+        lambda shown: shown.follows(ROUGH, 1.0, 1e-12),  # float64, at the smallest impulses
+    )
+    yield Claim(
+        f"With this step {BOX2D} finds the contact when the disk overlaps the skin by"
+        f" {number(1e3 * deep)} mm. Its lever arm is half of that too short at every radius, by"
+        f" {number(1e3 * deep / 2)} mm: {number(100 * (1 - half[0]))} % of the smallest radius,"
+        f" {number(100 * (1 - half[-1]))} % of the largest.",
+        lambda shown: shown.follows(BOX2D, half, flown),
+    )
+    yield Claim(
+        f"The lever arm of the ablated reference is {number(1e3 * share * deep)} mm too short."
+        if share
+        else "The ablated reference has the lever arm R, too.",
+        lambda shown: shown.follows(ABLATED, 1 - share * deep / RADII, flown),
+    )
+    yield lies_on(BOX2D, share == 0.5, SINGLE)
 
 
 LEVER = Lesson(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 
 import numpy as np
@@ -10,16 +10,7 @@ import numpy as np
 from adapters.mechanisms.ablated import MIXING
 from adapters.mechanisms.table import IMPULSE, Mechanism
 from reports.lessons.friction.thrown import ROUGH
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    Shown,
-    Simulation,
-    Slider,
-    run_of,
-    tidy,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, run_of, tidy, time_step
 from reports.lessons.mechanisms.ablation import ablated_as
 from reports.page.style import TRUTH, number
 from scenarios.families.friction import G, slide_on_floor
@@ -40,10 +31,8 @@ STILL = 1e-16  # m/s, as low as a logarithmic axis goes
 
 def show_rolling(spin: float, mu: float, k: int) -> Shown:
     """Velocity and slip over time, and the slip once more on a logarithmic axis."""
-    scenario = disk_on_floor(spin, mu)
-    played = Simulation.by(scenario, NAMES, k)
-    legs = sliding(spin, mu)
-    begins = float(legs.start[-1])
+    played = Simulation.by(disk_on_floor(spin, mu), NAMES, k)
+    begins = float(sliding(spin, mu).start[-1])
     guides = [("x", begins, "rolls")] if begins else []
     return Shown(
         [
@@ -61,7 +50,7 @@ def show_rolling(spin: float, mu: float, k: int) -> Shown:
         ],
         played.film,
         facts(played),
-        list(rolling_claims(spin, mu, k, scenario.dt(k))),
+        list(rolling_claims(played, spin, mu, k)),
     )
 
 
@@ -96,9 +85,9 @@ def facts(played: Simulation) -> list[tuple[str, str]]:
     ]
 
 
-def rolling_claims(spin: float, mu: float, k: int, dt: float) -> Iterator[Claim]:
+def rolling_claims(played: Simulation, spin: float, mu: float, k: int) -> Iterator[Claim]:
     """When the disk rolls and how fast, which engines are exact, and the slip at the end."""
-    legs = sliding(spin, mu)
+    legs, dt = sliding(spin, mu), played.runs[0].dt
     rolls, end = float(legs.start[-1]), float(legs.velocity[-1, 0])
     late = f"one step of friction, µ g dt = {number(1e3 * mu * G * dt)} mm/s"
     yield from exact_claims(spin, mu, rolls, end)
@@ -118,7 +107,7 @@ def rolling_claims(spin: float, mu: float, k: int, dt: float) -> Iterator[Claim]
         ),
     )
     yield mixed_claim(spin, mu, dt)
-    yield from slip_claims(spin, mu, k)
+    yield from slip_claims(played.motions, spin, mu, k)
 
 
 def exact_claims(spin: float, mu: float, rolls: float, end: float) -> Iterator[Claim]:
@@ -200,22 +189,17 @@ def deepest(played: Trajectory) -> float:
     return float(RADIUS - played.position[:, 0, 1].min())
 
 
-def slip_claims(spin: float, mu: float, k: int) -> Iterator[Claim]:
+def slip_claims(
+    motions: Mapping[str, Trajectory], spin: float, mu: float, k: int
+) -> Iterator[Claim]:
     """The slip that remains in Box2D."""
 
     def share(shown: Shown, name: str) -> float:
         return float(np.abs(shown.y(name, 1)[-1] / shown.y(name)[-1]))
 
-    def played(shown: Shown, name: str) -> Trajectory:
-        assert shown.film is not None
-        run = next(run for run in shown.film.runs if run.name == name)
-        assert run.trajectory is not None
-        return run.trajectory
-
-    def height(shown: Shown, name: str) -> float:
-        return float(played(shown, name).position[-1, 0, 1])
-
     exact = float(sliding(spin, mu).velocity[-1, 0])
+    height = float(motions[BOX2D].position[-1, 0, 1])
+    sunk = deepest(motions[BOX2D_V3])
     depth, end = depths_of_v3(spin, mu, k, True)
     level, straight = depths_of_v3(spin, mu, k, False)
 
@@ -224,8 +208,7 @@ def slip_claims(spin: float, mu: float, k: int) -> Iterator[Claim]:
         " the lever arm of friction is 2.5 mm too short, 1 % of the radius. Friction stops a"
         " point above the one that touches, which slips at 1 % of the velocity.",
         lambda shown: (
-            abs(share(shown, BOX2D) - 0.01) <= 5e-4
-            and abs(height(shown, BOX2D) - RADIUS - 0.005) <= 1e-4
+            abs(share(shown, BOX2D) - 0.01) <= 5e-4 and abs(height - RADIUS - 0.005) <= 1e-4
         ),
     )
     yield Claim(
@@ -235,7 +218,7 @@ def slip_claims(spin: float, mu: float, k: int) -> Iterator[Claim]:
         " ablated reference, which is not drawn here, sinks as deep and ends within 4 mm/s of"
         " its velocity. Without this mechanism it sinks by less than 0.1 mm.",
         lambda shown: (
-            abs(deepest(played(shown, BOX2D_V3)) - depth) <= 2e-6 + 2e-3 * depth
+            abs(sunk - depth) <= 2e-6 + 2e-3 * depth
             and level < min(depth, 1e-4)
             and abs(shown.y(BOX2D_V3)[-1] - end) <= 4e-3
         ),

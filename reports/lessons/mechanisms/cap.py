@@ -5,15 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.mechanisms.ablated import BOX2D
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    LessonChart,
-    Shown,
-    Simulation,
-    Slider,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider, time_step
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,

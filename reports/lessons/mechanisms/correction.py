@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from adapters.mechanisms.ablated import BOX2D
@@ -43,40 +45,38 @@ def show_position_correction(share: float, slop: float) -> Shown:
         [chart],
         played.film,
         [(f"{NO_CCD}, linear slop", own), *distances(chart, "mm")],
-        correction_claims(share, slop),
+        list(correction_claims(share, slop)),
     )
 
 
-def correction_claims(share: float, slop: float) -> list[Claim]:
+def correction_claims(share: float, slop: float) -> Iterator[Claim]:
     """The overlap that remains of 200 mm after a step, and in the end; slop in mm."""
     own = 2.5  # mm, the slop of Box2D in a scene of metres
     single = 1e3 * 72 * FLOAT32  # mm: 24 steps, three corrections each, of coordinates up to 1 m
     left = np.array(box2d_overlaps(200.0, own, 24))
-    return [
-        Claim(
-            "reference:exercise removes the overlap in the first step.",
-            lambda shown: shown.y(PLAIN)[0] > 199 and shown.y(PLAIN)[1:].max() <= 1e-3,
+    yield Claim(
+        "reference:exercise removes the overlap in the first step.",
+        lambda shown: shown.y(PLAIN)[0] > 199 and shown.y(PLAIN)[1:].max() <= 1e-3,
+    )
+    yield Claim(
+        "Box2D undoes 0.2 of what exceeds its slop of 2.5 mm, three times a step as long as the"
+        f" overlap is more than three slops, and once a step from then on: {number(left[1])} mm"
+        " are left after the first step, and in the end the slop and less than 0.1 mm more.",
+        lambda shown: (
+            np.abs(shown.y(NO_CCD) - left[: len(shown.y(NO_CCD))]).max() <= single
+            and own <= shown.y(NO_CCD)[-1] < own + 0.1
         ),
-        Claim(
-            "Box2D undoes 0.2 of what exceeds its slop of 2.5 mm, three times a step as long as the"
-            f" overlap is more than three slops, and once a step from then on: {number(left[1])} mm"
-            " are left after the first step, and in the end the slop and less than 0.1 mm more.",
-            lambda shown: (
-                np.abs(shown.y(NO_CCD) - left[: len(shown.y(NO_CCD))]).max() <= single
-                and own <= shown.y(NO_CCD)[-1] < own + 0.1
-            ),
+    )
+    yield Claim(
+        f"The ablated reference never goes below its slop of {number(slop)} mm."
+        if share
+        else "The ablated reference undoes no share of the overlap yet: it stays at 200 mm.",
+        lambda shown: (
+            (np.diff(shown.y(ABLATED)) <= 0).all()
+            and shown.y(ABLATED).min() >= (slop - 1e-9 if share else 200 - 1e-9)
         ),
-        Claim(
-            f"The ablated reference never goes below its slop of {number(slop)} mm."
-            if share
-            else "The ablated reference undoes no share of the overlap yet: it stays at 200 mm.",
-            lambda shown: (
-                (np.diff(shown.y(ABLATED)) <= 0).all()
-                and shown.y(ABLATED).min() >= (slop - 1e-9 if share else 200 - 1e-9)
-            ),
-        ),
-        lies_on(NO_CCD, (share, slop) == (0.2, own), single, "mm"),
-    ]
+    )
+    yield lies_on(NO_CCD, (share, slop) == (0.2, own), single, "mm")
 
 
 def box2d_overlaps(overlap: float, slop: float, steps: int) -> list[float]:

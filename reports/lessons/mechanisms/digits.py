@@ -6,15 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reports.lessons.lesson import (
-    Claim,
-    Curve,
-    Lesson,
-    LessonChart,
-    Shown,
-    Simulation,
-    Slider,
-)
+from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, asked, distances, lies_on
 from reports.page.style import TRUTH, number
 from scenarios.families.placing import lay_out

@@ -7,15 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from reports.lessons.lesson import (
-    Claim,
-    Curve,
-    Lesson,
-    LessonChart,
-    Shown,
-    Simulation,
-    Slider,
-)
+from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.planck import (
     BOX2D,
     COMMAND,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK
@@ -45,11 +47,11 @@ def show_gravity(order: str, k: int) -> Shown:
         [chart, LessonChart("How high it rises", "bounces so far", "m", heights)],
         played.film,
         distances(chart, "m"),
-        bounce_claims(scenario.scene, scenario.dt(k), order),
+        list(bounce_claims(scenario.scene, scenario.dt(k), order)),
     )
 
 
-def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
+def bounce_claims(scene: Scene, dt: float, order: str) -> Iterator[Claim]:
     """What each bounce adds to the height of the next."""
     start, radius = float(scene.position[0, 1]), float(scene.radius[0])
     g = float(np.hypot(*scene.gravity))
@@ -63,43 +65,36 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
         speed = np.sqrt(2 * g * (found[:-1] - radius))
         return bool((np.abs(np.diff(found) - speed * dt) <= 0.1 * speed * dt + 2 * seen).all())
 
-    def rises(shown: Shown) -> bool:
-        return bool(shown.y("box2d:matched").max() < shown.y(NO_CCD).max() - 2 * seen)
-
     fall = float(np.sqrt(2 * g * (start - radius)))
-    continuous = (
-        Claim(
+    yield Claim(
+        "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already changed. The"
+        " ball gains about |v| dt of height at each bounce, where v is its speed: some"
+        f" {number(1e3 * fall * dt, 2)} mm at the first, and more at each later one.",
+        lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
+    )
+    if round(1 / dt) == 240:
+        yield Claim(
             "At this dt box2d:matched, whose CCD is on, does the same.",
             lambda shown: shown.gap("box2d:matched", NO_CCD) <= single,
         )
-        if round(1 / dt) == 240
-        else Claim(
+    else:
+        yield Claim(
             "At this dt CCD (box2d:matched) acts in some bounces, and the ball rises less high than"
             " without it.",
-            rises,
+            lambda shown: shown.y("box2d:matched").max() < shown.y(NO_CCD).max() - 2 * seen,
         )
+    yield Claim(
+        "pymunk:matched reverses the velocity before gravity changes it. The ball rises as it"
+        " fell, and returns to the height it started from.",
+        lambda shown: np.abs(peaks(shown, "pymunk:matched") - start).max() <= seen + 1e-9,
     )
-    return [
-        Claim(
-            "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already changed. The"
-            " ball gains about |v| dt of height at each bounce, where v is its speed: some"
-            f" {number(1e3 * fall * dt, 2)} mm at the first, and more at each later one.",
-            lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
-        ),
-        continuous,
-        Claim(
-            "pymunk:matched reverses the velocity before gravity changes it. The ball rises as it"
-            " fell, and returns to the height it started from.",
-            lambda shown: np.abs(peaks(shown, "pymunk:matched") - start).max() <= seen + 1e-9,
-        ),
-        Claim(
-            "reference:exercise projects the ball back to the floor at each bounce; no bounce rises"
-            " higher than the start.",
-            lambda shown: peaks(shown, PLAIN).max() <= start,
-        ),
-        lies_on(NO_CCD, order == "aimed after gravity", single, "m"),
-        lies_on("pymunk:matched", order == "aimed before gravity", 1e-11, "m"),
-    ]
+    yield Claim(
+        "reference:exercise projects the ball back to the floor at each bounce; no bounce rises"
+        " higher than the start.",
+        lambda shown: peaks(shown, PLAIN).max() <= start,
+    )
+    yield lies_on(NO_CCD, order == "aimed after gravity", single, "m")
+    yield lies_on("pymunk:matched", order == "aimed before gravity", 1e-11, "m")
 
 
 def peaks(shown: Shown, name: str) -> Array:

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.lesson import (
-    Claim,
-    Curve,
-    Lesson,
-    LessonChart,
-    Shown,
-    Simulation,
-    Slider,
-)
+from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import PLAIN
 from reports.lessons.mechanisms.javascript_bounces import (
-    CLOSING,
     COMMAND,
     ENGINES,
     KEPT,
     RESTITUTIONS,
-    SECONDS,
     VERSIONS,
     name_in,
     ratios,
-    scene_of,
 )
+from reports.lessons.mechanisms.pairs import CLOSING, SECONDS, at_all_speeds
 from reports.lessons.mechanisms.recorded import made_with
 from reports.page.style import TRUTH, number
 
@@ -48,7 +38,7 @@ def show_javascript(e: float, off: str) -> Shown:
         curves,
         "x",
     )
-    return Shown([chart], Simulation.by(scene_of(e), (PLAIN,), 1).film, claims=claims)
+    return Shown([chart], Simulation.by(at_all_speeds(e), (PLAIN,), 1).film, claims=claims)
 
 
 def claim_of(e: float, curve: Curve) -> Claim:

@@ -12,16 +12,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from adapters.engines import row_of
 from adapters.run import Run
 from reports.lessons.lesson import run_of
-from reports.lessons.mechanisms.ablation import asked
-from reports.lessons.mechanisms.pairs import pairs, separation
+from reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
 from reports.lessons.mechanisms.recorded import keep, table_in
-from scenarios.model import Array, Scenario
+from scenarios.model import Array
 
 KEPT = Path(__file__).with_name("javascript_bounces.csv")
 COMMAND = "uv run --extra js python -m reports.lessons.mechanisms.javascript_bounces"
@@ -39,15 +37,6 @@ VERSIONS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 }
 CHANGED = "matter, changed"  # as shipped but for what is switched off
 RESTITUTIONS = (0.5, 0.9, 1.0)
-CLOSING = np.array(
-    [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]
-)  # m/s
-SECONDS = 0.5  # until the separation is read: they meet after 0.2 s
-
-
-def scene_of(e: float) -> Scenario:
-    """One pair for each closing speed."""
-    return asked(pairs(CLOSING, e), SECONDS)
 
 
 def name_in(engine: str, version: str) -> str:
@@ -61,7 +50,7 @@ def played(engine: str, version: str, e: float) -> Run:
     profile, options = VERSIONS[version]
     name = f"{engine}:{profile}"
     make = partial(row_of(name).make, **(options if engine == "matter" else {}))
-    return run_of(name, scene_of(e), 1, make)
+    return run_of(name, at_all_speeds(e), 1, make)
 
 
 def measured(engine: str, version: str, e: float) -> pd.DataFrame:

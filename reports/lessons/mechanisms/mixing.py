@@ -25,27 +25,20 @@ from reports.lessons.lesson import (
     run_of,
     swept,
 )
-from reports.lessons.mechanisms.ablation import (
-    ABLATED,
-    FLOAT32,
-    PLAIN,
-    asked,
-    distances,
-    lies_on,
-)
-from reports.lessons.mechanisms.pairs import pairs, separation, sideways
+from reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, PLAIN, asked, distances, lies_on
+from reports.lessons.mechanisms.pairs import SECONDS, pairs, separation, sideways
 from reports.page.style import TRUTH, number
 from scenarios.model import Scenario, Scene
 
 SHOWN = 0.5  # the number on the one disk, of the collision that is replayed
 STATED = np.linspace(0.0, 1.0, 11)
-CLOSING = np.array([2.0])  # m/s
+SPEED = np.array([2.0])  # m/s
 SPIN = 60.0  # rad/s: so fast that the surfaces slide all through the collision
 RESTITUTION, FRICTION = "restitution e", "friction µ"
 PYMUNK, BOX2D = "pymunk:shipped", "box2d:shipped"
 OTHERS = {"the same": None, "0.2": 0.2, "0.8": 0.8}  # of the other disk
 STEPS = 4  # of a sample interval
-READ: dict[str, Read] = {RESTITUTION: separation(CLOSING), FRICTION: sideways}
+READ: dict[str, Read] = {RESTITUTION: separation(SPEED), FRICTION: sideways}
 OWN_RULES = {
     PYMUNK: {RESTITUTION: "the product", FRICTION: "the product"},
     BOX2D: {RESTITUTION: "the larger", FRICTION: "the root of the product"},
@@ -85,8 +78,8 @@ class OneBox2D(Box2DEngine):
 def scene_of(what: str, value: float) -> Scenario:
     """A pair that meets with this coefficient; with friction it spins, and e is 0.5."""
     if what == RESTITUTION:
-        return asked(pairs(CLOSING, value), 0.5)
-    return asked(pairs(CLOSING, 0.5, value, SPIN), 0.5)
+        return asked(pairs(SPEED, value), SECONDS)
+    return asked(pairs(SPEED, 0.5, value, SPIN), SECONDS)
 
 
 def played_with(what: str, rule: str, one: float, other: float | None) -> Simulation:

@@ -8,15 +8,7 @@ from functools import cache
 import numpy as np
 
 from adapters.mechanisms.ablated import BOX2D, EXERCISE
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    LessonChart,
-    Shown,
-    Simulation,
-    Slider,
-    run_of,
-)
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider, run_of
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,

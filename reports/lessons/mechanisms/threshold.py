@@ -10,12 +10,11 @@ from reports.lessons.mechanisms.ablation import (
     FLOAT32,
     PLAIN,
     ablated,
-    asked,
     distances,
     lies_on,
     setting_rows,
 )
-from reports.lessons.mechanisms.pairs import pairs, separation
+from reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
 from reports.page.style import TRUTH, number
 
 NAMES = ("box2d:shipped", PLAIN, ABLATED)
@@ -23,19 +22,15 @@ NAMES = ("box2d:shipped", PLAIN, ABLATED)
 
 def show_threshold(threshold: float, e: float) -> Shown:
     """e of a collision against its closing speed."""
-    closing = np.array(
-        [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]
-    )
-    scenario = asked(pairs(closing, e), 0.5)
-    played = Simulation.by(scenario, NAMES, 4, ablated(threshold=threshold))
-    curves = played.curves(separation(closing), closing)
+    played = Simulation.by(at_all_speeds(e), NAMES, 4, ablated(threshold=threshold))
+    curves = played.curves(separation(CLOSING), CLOSING)
     chart = LessonChart(
         "Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x"
     )
     rounding = 8 * FLOAT32  # of a ratio of velocities that are rounded a few times
 
     def cut_below(shown: Shown, name: str, speed: float) -> bool:
-        return shown.follows(name, np.where(closing < speed, 0.0, e), rounding)
+        return shown.follows(name, np.where(speed > CLOSING, 0.0, e), rounding)
 
     claims = [
         Claim(

@@ -21,7 +21,7 @@ from reports.lessons.limits import SEEN, limits_of
 from reports.lessons.pages import FILES, answer_json, lesson_page
 from reports.page.style import TRUTH
 from reports.stability.limits import LIMIT, QUICK
-from tests.reports.page.browsing import opened
+from tests.reports.lessons.browsing import opened_lesson
 
 COSTLY = ("box", "crowd", "horizon", "limits")  # a second or more for each setting
 EVERY = [pytest.param(name, marks=pytest.mark.long if name in COSTLY else ()) for name in LESSONS]
@@ -133,8 +133,7 @@ def test_the_page_marks_a_sentence_that_its_curves_contradict(
     lesson = LESSONS["order"]
     path = tmp_path / "order.html"
     path.write_text(lesson_page(lesson, answer_json("order", lesson.start), FILES))
-    page, heard = opened(browser, path.as_uri())
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, path.as_uri())
     marked = page.locator(".claims b").all_inner_texts()
     page.context.close()
 

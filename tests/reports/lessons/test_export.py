@@ -22,6 +22,7 @@ from reports.lessons.lesson import Shown
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, index_page, linked, offline
 from reports.page.style import TRUTH
+from tests.reports.lessons.browsing import opened_lesson, wait_until_drawn
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -37,7 +38,7 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     )
     page, heard = opened(browser, path.as_uri())
     page.on("request", lambda request: heard.append(request.url))
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    wait_until_drawn(page)
     curves = (
         "[...document.querySelectorAll('.curve')].map((curve) => curve.getAttribute('d')).join()"
     )
@@ -64,8 +65,7 @@ def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, t
     path.write_text(
         offline(lesson, {places: answer_json("order", places) for places in lesson.grid})
     )
-    page, heard = opened(browser, path.as_uri(), accept_downloads=True)
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, path.as_uri(), accept_downloads=True)
     files = {}
     for kind in ("SVG", "CSV"):
         with page.expect_download() as download:
@@ -131,8 +131,7 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
     page, heard = opened(browser, (tmp_path / "all" / "index.html").as_uri())
     text = page.locator("#measured").inner_text()
     links = page.locator("a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
-    lesson, more = opened(browser, (tmp_path / "all" / "order.html").as_uri())
-    lesson.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    lesson, more = opened_lesson(browser, (tmp_path / "all" / "order.html").as_uri())
     around = lesson.locator(".crumbs a").evaluate_all(
         "all => all.map((a) => a.getAttribute('href'))"
     )

@@ -8,7 +8,6 @@ import pytest
 
 from adapters.npm_packages import missing, version_of
 from reports.lessons.mechanisms.javascript_bounces import (
-    CLOSING,
     ENGINES,
     KEPT,
     RESTITUTIONS,
@@ -17,6 +16,7 @@ from reports.lessons.mechanisms.javascript_bounces import (
     played,
     ratios,
 )
+from reports.lessons.mechanisms.pairs import CLOSING
 from reports.lessons.mechanisms.recorded import made_with, table_in
 
 LACKING = next(filter(None, map(missing, ("planck", "matter-js", "@dimforge/rapier2d-compat"))), "")
