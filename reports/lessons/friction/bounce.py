@@ -37,25 +37,36 @@ SINGLE = 1e-4
 SHORT = 0.02 / 3
 
 
-class Law(NamedTuple):
-    """Coulomb's law in this bounce: N s that end 1 m/s of slip, the normal impulse, N s, and the
-    edge of the cone, N s."""
+class FloorBounce(NamedTuple):
+    """The settings, N s that end 1 m/s of slip, and the exact normal impulse, N s."""
 
+    e: float
+    mu: float
+    angle: float
+    spin: float
     weight: float
     normal: float
-    edge: float
+
+    @property
+    def edge(self) -> float:
+        """N s, of the cone by Coulomb's law."""
+        return self.mu * self.normal
+
+    @property
+    def slip(self) -> float:
+        """m/s of the point that touches, before it."""
+        return float(slip_at(self.angle, self.spin))
 
 
 def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
     """The impulse in its cone; the friction impulse and the spin at every angle."""
     here = Simulation.by(thrown(speed_along(angle), spin, e, mu), NAMES, 1)
     scene, impulses = here.scenario.scene, taken_by(here)
-    normal = float(impulses[TRUTH].normal[0])
     weight = 1 / float(1 / scene.mass[0] + scene.radius[0] ** 2 / scene.inertia[0])
-    law = Law(weight, normal, mu * normal)
-    angles = angles_of(law, spin)
+    bounce = FloorBounce(e, mu, angle, spin, weight, float(impulses[TRUTH].normal[0]))
+    angles = angles_of(bounce)
     at_angles = taken_by(Simulation.by(thrown(speed_along(angles), spin, e, mu), NAMES, 1))
-    edges = [Curve(CONE, angles, np.full(len(angles), side * law.edge)) for side in (-1.0, 1.0)]
+    edges = [Curve(CONE, angles, np.full(len(angles), side * bounce.edge)) for side in (-1.0, 1.0)]
     frictions = [Curve(name, angles, each.along) for name, each in at_angles.items()]
     spins = [
         Curve(name, angles, spin + each.turning / scene.inertia[0])
@@ -64,7 +75,7 @@ def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
     incidence, mark = "angle of incidence from the normal in degrees", [("x", angle, "here")]
     return Shown(
         [
-            cone_chart(impulses, law),
+            cone_chart(impulses, bounce),
             LessonChart("Friction impulse", incidence, "Jₜ in N s", [*edges, *frictions], "", mark),
             LessonChart("Spin after the bounce", incidence, "ω in rad/s", spins, "", mark),
         ],
@@ -73,8 +84,8 @@ def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
             ("exact answer" if name == TRUTH else name, left_with(each, scene))
             for name, each in impulses.items()
         ],
-        list(bounce_claims(e, mu, angle, spin, law, angles)),
-        in_numbers(e, mu, angle, spin, law, float(impulses[TRUTH].along[0])),
+        list(bounce_claims(bounce, angles)),
+        in_numbers(bounce, float(impulses[TRUTH].along[0])),
     )
 
 
@@ -88,9 +99,10 @@ def slip_at(angle: Array | float, spin: float) -> Array:
     return speed_along(angle) + RADIUS * spin
 
 
-def angles_of(law: Law, spin: float) -> Array:
+def angles_of(bounce: FloorBounce) -> Array:
     """(k,) degrees from 0 to `STEEPEST`, among them those where sticking ends."""
-    limits = (np.array([-1.0, 1.0]) * law.edge / law.weight - RADIUS * spin) / FALL
+    ends = np.array([-1.0, 1.0]) * bounce.edge / bounce.weight  # m/s of slip
+    limits = (ends - RADIUS * bounce.spin) / FALL
     edges = np.degrees(np.arctan(limits))
     inside = edges[(edges > 0) & (edges < STEEPEST)]
     return np.unique(np.append(np.linspace(0.0, STEEPEST, 11), inside))
@@ -102,11 +114,10 @@ def taken_by(played: Simulation) -> dict[str, Taken]:
     return {name: taken(motion, scene) for name, motion in played.motions.items()}
 
 
-def cone_chart(impulses: Mapping[str, Taken], law: Law) -> LessonChart:
+def cone_chart(impulses: Mapping[str, Taken], bounce: FloorBounce) -> LessonChart:
     """The impulse of each as a line from the origin, between the edges of the cone."""
-    edges = Curve(
-        CONE, law.edge * np.array([-1.0, 0.0, 1.0]), law.normal * np.array([1.0, 0.0, 1.0])
-    )
+    x, y = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 0.0, 1.0])
+    edges = Curve(CONE, bounce.edge * x, bounce.normal * y)
     lines = [
         Curve(name, np.append(0.0, each.along), np.append(0.0, each.normal), dots=True)
         for name, each in impulses.items()
@@ -128,47 +139,49 @@ def left_with(each: Taken, scene: Scene) -> str:
     )
 
 
-def in_numbers(
-    e: float, mu: float, angle: float, spin: float, law: Law, friction: float
-) -> dict[str, str]:
+def in_numbers(bounce: FloorBounce, friction: float) -> dict[str, str]:
     """Slip, normal impulse, cone and friction impulse, with the numbers of this bounce."""
-    slip = float(slip_at(angle, spin))
-    along, slips, size, need, found = (
+    along, slip, size, need, found = (
         tidy(float(value), SINGLE, 4)
-        for value in (speed_along(angle), slip, abs(slip), abs(slip) * law.weight, friction)
+        for value in (
+            speed_along(bounce.angle),
+            bounce.slip,
+            abs(bounce.slip),
+            abs(bounce.slip) * bounce.weight,
+            friction,
+        )
     )
     return {
-        "Slip": f"vₜ + R ω = {along} + {number(RADIUS)} · {number(spin)} = {slips} m/s",
-        "Normal impulse": f"Jₙ = (1 + e) m vₙ = {number(1 + e)} · 1 · {number(FALL)} ="
-        f" {number(law.normal)} N s",
-        "To stick": f"|slip| / (1/m + R²/I) = {size} / {number(1 / law.weight)} = {need} N s would"
-        " end the slip",
-        "Cone": f"µ Jₙ = {number(mu)} · {number(law.normal)} = {number(law.edge)} N s",
+        "Slip": f"vₜ + R ω = {along} + {number(RADIUS)} · {number(bounce.spin)} = {slip} m/s",
+        "Normal impulse": f"Jₙ = (1 + e) m vₙ = {number(1 + bounce.e)} · 1 · {number(FALL)} ="
+        f" {number(bounce.normal)} N s",
+        "To stick": f"|slip| / (1/m + R²/I) = {size} / {number(1 / bounce.weight)} = {need} N s"
+        " would end the slip",
+        "Cone": f"µ Jₙ = {number(bounce.mu)} · {number(bounce.normal)} = {number(bounce.edge)} N s",
         "Friction impulse": f"the smaller of these two, against the slip: Jₜ = {found} N s; it"
         " changes vₜ by Jₜ/m and ω by R Jₜ/I",
     }
 
 
-def bounce_claims(
-    e: float, mu: float, angle: float, spin: float, law: Law, angles: Array
-) -> Iterator[Claim]:
+def bounce_claims(bounce: FloorBounce, angles: Array) -> Iterator[Claim]:
     """When the contact sticks, which engines have the exact answer, and what the others do."""
-    slips = slip_at(angles, spin)
-    exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
+    slips = slip_at(angles, bounce.spin)
+    exact = friction_kick(slips, 1 / bounce.weight, np.asarray(bounce.edge))
     yield Claim(
-        f"The normal impulse is (1 + e) m vₙ = {number(law.normal)} N s in every engine. At"
-        f" every angle the cone is equally wide, µ Jₙ = {number(law.edge)} N s to each side.",
+        f"The normal impulse is (1 + e) m vₙ = {number(bounce.normal)} N s in every engine. At"
+        f" every angle the cone is equally wide, µ Jₙ = {number(bounce.edge)} N s to each side.",
         lambda shown: (
-            all(abs(shown.y(name)[-1] - law.normal) <= SINGLE for name in (*NAMES, TRUTH))
+            all(abs(shown.y(name)[-1] - bounce.normal) <= SINGLE for name in (*NAMES, TRUTH))
             and np.ptp(shown.y(CONE, 1)) == 0.0
-            and abs(abs(shown.y(CONE, 1)[0]) - law.edge) <= DOUBLE
+            and abs(abs(shown.y(CONE, 1)[0]) - bounce.edge) <= DOUBLE
         ),
     )
-    yield from claims_here(float(slip_at(angle, spin)), spin, law)
+    yield claim_here(bounce)
     yield Claim(
         "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
-        f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in proportion"
-        " to the slip. Where the slip is larger the impulse stays on the edge of the cone.",
+        f" {number(bounce.edge / bounce.weight)} m/s. There the exact friction impulse is in"
+        " proportion to the slip. Where the slip is larger the impulse stays on the edge of the"
+        " cone.",
         lambda shown: shown.follows(TRUTH, exact, DOUBLE, chart=1),
     )
     yield Claim(
@@ -183,23 +196,22 @@ def bounce_claims(
         f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
         f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
         " friction impulse should change it.",
-        lambda shown: turned_short(shown, spin),
+        lambda shown: turned_short(shown, bounce.spin),
     )
-    yield cone_of_v3(e, mu)
+    yield cone_of_v3(bounce.e, bounce.mu)
 
 
-def claims_here(slip: float, spin: float, law: Law) -> Iterator[Claim]:
+def claim_here(bounce: FloorBounce) -> Claim:
     """Whether the contact of the replay sticks or slips."""
-    need = abs(slip) * law.weight
-    if need <= DOUBLE and not spin:
-        yield Claim(
+    need = abs(bounce.slip) * bounce.weight
+    if need <= DOUBLE and not bounce.spin:
+        return Claim(
             "Here the disk falls straight and does not spin: nothing slides, and no engine"
             " gives a friction impulse.",
             lambda shown: all(abs(shown.x(name)[-1]) <= SINGLE for name in (*NAMES, TRUTH)),
         )
-        return
     if need <= DOUBLE:
-        yield Claim(
+        return Claim(
             "Here the point that touches is at rest, as that of a wheel that rolls: the exact"
             f" friction impulse is 0. {BOX2D} gives one, because it takes the slip of a point"
             " above the one that touches, and that point moves.",
@@ -207,20 +219,18 @@ def claims_here(slip: float, spin: float, law: Law) -> Iterator[Claim]:
                 abs(shown.x(TRUTH)[-1]) <= DOUBLE and abs(shown.x(BOX2D)[-1]) > 100 * SINGLE
             ),
         )
-        return
-    if need <= law.edge:
-        yield Claim(
+    if need <= bounce.edge:
+        return Claim(
             f"Here the contact sticks: {number(need, 4)} N s end the slip, and the cone allows"
-            f" {number(law.edge, 4)} N s. The exact impulse lies within the cone.",
+            f" {number(bounce.edge, 4)} N s. The exact impulse lies within the cone.",
             lambda shown: (
                 abs(abs(shown.x(TRUTH)[-1]) - need) <= DOUBLE
                 and abs(shown.x(TRUTH)[-1]) <= shown.x(CONE)[-1] + DOUBLE
             ),
         )
-        return
-    yield Claim(
+    return Claim(
         f"Here the contact slips: {number(need, 4)} N s would end the slip, and the cone allows"
-        f" only {number(law.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
+        f" only {number(bounce.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
         lambda shown: abs(abs(shown.x(TRUTH)[-1]) - shown.x(CONE)[-1]) <= DOUBLE,
     )
 
