@@ -91,15 +91,20 @@ def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, t
 
 
 @pytest.mark.slow
-def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path: Path):
-    """A sheet of A4 sideways, with the longest answers; unbroken in larger letters they do not."""
+def test_the_conventions_of_all_engines_fit_on_a_screen_and_on_paper(
+    browser: Browser, tmp_path: Path
+):
+    """A window of 1280 px, and a sheet of A4 sideways, with the longest answers; unbroken in larger
+    letters they do not."""
     got = dict.fromkeys(ENGINES, ("not modelled", "keeps"))
     asked = [
         Convention("What friction acts in a bounce with e = 0, where 0.2 is stated?", "0", got)
     ]
     path = tmp_path / "index.html"
     path.write_text(index_page(FILES, asked), encoding="utf-8")
-    page, heard = opened(browser, path.as_uri(), viewport={"width": 1032, "height": 703})
+    page, heard = opened(browser, path.as_uri(), viewport={"width": 1280, "height": 800})
+    cut = page.locator(".scroll").evaluate("(table) => table.scrollWidth - table.clientWidth")
+    page.set_viewport_size({"width": 1032, "height": 703})
     page.emulate_media(media="print")
     end = "document.querySelector('.conventions').getBoundingClientRect().right - innerWidth"
     right = page.evaluate(end)
@@ -110,6 +115,7 @@ def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path:
     wide = page.evaluate(end)
     page.context.close()
 
+    assert cut <= 0
     assert right <= 1 < wide
     assert heard == []
 
