@@ -140,9 +140,9 @@ ADDED: dict[str, list[Added]] = {
         Added(
             "reports/lessons/toy.py",
             "from reports.lessons.lesson import LessonChart, Curve, Lesson, Shown\n\n\ndef"
-            ' show(settings):\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
+            ' show():\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
             ' return Shown([LessonChart("a toy", "x", "y", [curve])], None, [])\n\n\n'
-            'TOY = Lesson("toy", "9", "A toy lesson", "Is it here?", ["It is."], [],'
+            'TOY = Lesson("toy", "9", "A toy lesson", "Is it here?", "It is.", [],'
             ' ["toy:plain"], show)\n',
         ),
         Added("reports/lessons/toy.py", "import numpy as np\n\n", "from reports.lessons.lesson"),

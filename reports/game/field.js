@@ -136,13 +136,7 @@ class Field {
     marks.forEach((mark) => taken.push(this.drawLabel(pen, mark, taken)));
   }
 
-  within(pen, x, y, angle, paint) {
-    pen.save();
-    pen.translate(...this.pixel(x, y));
-    pen.rotate(-angle);
-    paint();
-    pen.restore();
-  }
+  within(pen, x, y, angle, paint) { this.withinPixels(pen, ...this.pixel(x, y), -angle, paint); }
 
   drawRock(pen, disk, x, y, angle) {
     const r = this.field.radius[disk] * this.scale, rock = this.rocks[disk];

@@ -17,6 +17,7 @@ from adapters.engines import ENGINES
 from adapters.first_collisions import weight_impulse
 from adapters.own_solver.engine import OwnSolver
 from adapters.runaway import RUNAWAY, fault_of, reach
+from reports.compare.laws import nearer_way
 from reports.game.divergence import (
     NEVER,
     WAIT,
@@ -326,7 +327,8 @@ class Flight:
         """Momentum kg m/s, energy with spin J, how far ship and farthest disk are from the solid
         one's m, collisions."""
         scene, state = self.scenario.scene, flyer.state
-        deviation = self.distances(self.solid.state.position, state.position)
+        gap = nearer_way(self.solid.state.position - state.position, scene)
+        deviation = np.hypot(*gap.T)
         moving = ~scene.static
         mass, inertia = scene.mass[moving], scene.inertia[moving]
         speed2 = (state.velocity[moving] ** 2).sum(axis=1)
@@ -337,15 +339,6 @@ class Flight:
             "deviation": float(deviation.max()),
             "collisions": flyer.touches.count,
         }
-
-    def distances(self, here: Array, there: Array) -> Array:
-        """(n,) m between the same disks, across the edge of the field where that is shorter."""
-        gap = here - there
-        if self.scenario.scene.wrap is not None:
-            span = self.scenario.scene.wrap[1] - self.scenario.scene.wrap[0]
-            gap = gap - span * np.round(gap / span)
-        distance: Array = np.hypot(*gap.T)
-        return distance
 
     def saved(self) -> Scenario:
         """The flight so far as a scenario, up to the frame before the ship first left: a scene has
@@ -359,13 +352,8 @@ class Flight:
         frames = self.frame if self.left_at < 0 else self.left_at
         if not frames:
             raise ValueError("nothing has been flown yet: fly first")
-        interval = self.scenario.sample_interval
-        thrusts = [
-            replace(thrust, stop=min(thrust.stop, frames * interval))
-            for thrust in self.pilot.thrusts(self.frame)
-            if thrust.start < frames * interval
-        ]
-        return replace(self.scenario, duration=frames * interval, thrusts=thrusts)
+        duration = frames * self.scenario.sample_interval
+        return replace(self.scenario, duration=duration, thrusts=self.pilot.thrusts(frames))
 
     def close(self) -> None:
         """Give every engine back."""

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
 from adapters.engine import ContactImpulse
 from adapters.engines import ENGINES
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    LessonChart,
-    Settings,
-    Shown,
-    Simulation,
-    Slider,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, tidy, time_step
 from reports.page.style import TRUTH, number
 from scenarios.families.lesson import falling_box
-from scenarios.model import Scenario, Trajectory
+from scenarios.model import Array, Scenario, Scene, State, Trajectory
 from scenarios.truth.exact import with_oracle
 
+SECONDS = 3.0
+EULER = {"reference:lesson": 1, "reference:exercise": -1}  # the sign of its gain in flight
+STEPPED, EVENTS = (*EULER, "pymunk:matched"), "event_driven:float64"
+NAMES = (*STEPPED, EVENTS)
 ROUNDING = 1e-11  # J, for each disk: some thousand steps, each of which rounds an energy in float64
 
 
@@ -38,55 +34,43 @@ def small_box(restitution: float, count: int) -> Scenario:
     return with_oracle(replace(base, scene=scene, truth=None, duration=SECONDS))
 
 
-SECONDS = 3.0
-EULER = {"reference:lesson": 1, "reference:exercise": -1}  # the sign of its gain in flight
-BOX_NAMES = ("reference:lesson", "reference:exercise", "pymunk:matched", "event_driven:float64")
-
-
-def show_box(settings: Settings) -> Shown:
+def show_box(e: float, n: int, k: int) -> Shown:
     """Energy over time, and how far from the exact answer as long as there is one."""
-    scenario = small_box(settings["e"], settings["n"])
-    shown = Simulation.by(scenario, BOX_NAMES, settings["k"])
-    assert shown.truth is not None
-    scene = scenario.scene
-
-    def energy(each: Trajectory) -> np.ndarray:
-        moving = (scene.mass * (each.velocity**2).sum(axis=2) / 2).sum(axis=1)
-        return np.asarray(moving - each.position @ scene.gravity @ scene.mass)
-
-    end = float(shown.truth.t[-1])
-    exact = float(energy(shown.truth)[0] - energy(shown.truth)[-1])
-    budgets = {
-        name: budget(name, settings["e"], settings["n"], settings["k"], end) for name in EULER
-    }
+    played = Simulation.by(small_box(e, n), NAMES, k)
+    of_disks = partial(energy, played.scenario.scene)
+    end, kept = float(played.truth.t[-1]), of_disks(played.truth)
+    exact = float(kept[0] - kept[-1])
+    budgets = {name: budget(name, e, n, k, end) for name in EULER}
     facts = [
         ("the exact answer ends at", f"{number(end)} s"),
-        (
-            "exact energy taken by collisions until then",
-            f"{number(exact) if exact > 1e-9 else '0'} J",
-        ),
+        ("exact energy taken by collisions until then", f"{tidy(exact, 1e-9)} J"),
         *((f"{name}, energy until then", each.in_words) for name, each in budgets.items()),
         *(
             (
-                f"collisions of {run.name} in {number(run.trajectory.t[-1])} s; a contact with an"
-                " impulse in every step counts once",
-                str(len(run.trajectory.collisions)),
+                f"collisions of {name} in {number(each.t[-1])} s; a contact with an impulse in"
+                " every step counts once",
+                str(len(each.collisions)),
             )
-            for run in shown.runs
-            if run.trajectory
+            for name, each in played.motions.items()
+            if name != TRUTH
         ),
     ]
+    claims = [*flight_claims(played), *collision_claims(played.scenario, budgets, end, exact)]
     return Shown(
         [
-            LessonChart("Kinetic and potential energy", "time in s", "J", shown.curves(energy)),
-            LessonChart(
-                "Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"
-            ),
+            played.over_time("Kinetic and potential energy", "J", of_disks),
+            played.errors_over_time(),
         ],
-        shown.film,
+        played.film,
         facts,
-        box_claims(shown, settings) + budget_claims(settings, budgets, end, exact),
+        claims,
     )
+
+
+def energy(scene: Scene, each: Trajectory | State) -> Array:
+    """J, kinetic and potential energy of all disks, at each sample or now."""
+    moving: Array = (scene.mass * (each.velocity**2).sum(axis=-1) / 2).sum(axis=-1)
+    return moving - each.position @ scene.gravity @ scene.mass
 
 
 class EnergyChange(NamedTuple):
@@ -102,8 +86,7 @@ class EnergyChange(NamedTuple):
     def in_words(self) -> str:
         """With signs."""
         flight, collisions, moved = (
-            number(part, 3) if abs(part) > 1e-9 else "0"
-            for part in (self.flight, self.collisions, self.moved)
+            tidy(part, 1e-9) for part in (self.flight, self.collisions, self.moved)
         )
         return f"flight {flight} J, collisions {collisions} J, moved apart {moved} J"
 
@@ -129,26 +112,59 @@ def budget(name: str, restitution: float, count: int, k: int, until: float) -> E
         before = engine.read()
         engine.step(steps)
         after, impulses = engine.read(), engine.collisions()
-    start, end = (
-        float((scene.mass * (each.velocity**2).sum(axis=1) / 2).sum())
-        - float(each.position @ scene.gravity @ scene.mass)
-        for each in (before, after)
-    )
+    gained = float(energy(scene, after) - energy(scene, before))
     flight = EULER[name] * float(scene.mass.sum() * (scene.gravity**2).sum()) * dt**2 / 2 * steps
     inverse = 1 / np.append(scene.mass, np.inf)  # the last is that of every wall
     taken = sum(
         each.impulse**2 * (inverse[each.i] + inverse[max(each.j, -1)]) / 2 for each in impulses
     )
     collisions = -(1 - restitution) / (1 + restitution) * float(taken)
-    return EnergyChange(flight, collisions, end - start - flight - collisions, impulses)
+    return EnergyChange(flight, collisions, gained - flight - collisions, impulses)
 
 
-def budget_claims(
-    settings: Settings, budgets: dict[str, EnergyChange], end: float, exact: float
-) -> list[Claim]:
+def flight_claims(played: Simulation) -> Iterator[Claim]:
+    """How the energy changes in flight, and how near an event-driven engine is."""
+    scene, dt = played.scenario.scene, played.runs[0].dt
+    flight = played.truth.t < played.first_collision
+    g = float(np.hypot(*scene.gravity))
+    gain = float(scene.mass.sum()) * g**2 * dt / 2  # W
+
+    def gains(shown: Shown, name: str, rate: float) -> bool:
+        gained = shown.y(name)[: len(flight)][flight] - shown.y(name)[0]
+        return bool(np.abs(gained - rate * played.truth.t[flight]).max() < ROUNDING * scene.n)
+
+    if flight.sum() > 1:  # else something collides before there is a second sample
+        yield Claim(
+            f"Until the first collision, at {number(played.first_collision + dt)} s, the exact"
+            " energy is constant. Explicit Euler (reference:lesson) gains m g² dt / 2 in a second,"
+            f" {number(gain)} J for all disks; symplectic Euler (reference:exercise) loses as much."
+            " Under a constant force neither is better. In a motion that repeats, such as an orbit"
+            " or a pendulum, the energy of symplectic Euler stays near its first value, and that of"
+            " explicit Euler grows (Hairer, Lubich and Wanner, Geometric Numerical Integration,"
+            " chapter I.1).",
+            lambda shown: (
+                gains(shown, TRUTH, 0.0)
+                and all(gains(shown, name, sign * gain) for name, sign in EULER.items())
+            ),
+        )
+    yield Claim(
+        "The event-driven engine takes every collision at its own time. As long as there is an"
+        " exact answer it is within 1 nm of it; the engines with steps are at least ten thousand"
+        " times farther away.",
+        lambda shown: (
+            shown.y(EVENTS, 1).max() < 1e-9
+            and min(shown.y(name, 1).max() for name in STEPPED) > 1e4 * shown.y(EVENTS, 1).max()
+        ),
+    )
+
+
+def collision_claims(
+    scenario: Scenario, budgets: dict[str, EnergyChange], end: float, exact: float
+) -> Iterator[Claim]:
     """What becomes of the energy after the first collision; end: s, of the exact answer; exact: J
     that its collisions take."""
     lesson, exercise = (budgets[name] for name in EULER)
+    elastic = scenario.scene.restitution == 1.0
 
     def adds_up(shown: Shown) -> bool:
         return all(
@@ -156,35 +172,43 @@ def budget_claims(
             for name, each in budgets.items()
         )
 
-    claims = [
-        Claim(
-            "What the two methods gain and lose in flight goes on after the first collision:"
-            f" {number(lesson.flight)} J each until {number(end)} s. reference:exercise moves disks"
-            " out of the walls and apart, and lifts them by it:"
-            f" {number(exercise.moved)} J. reference:lesson leaves them in the walls.",
+    if elastic:
+        yield Claim(
+            "With e = 1 the exact energy stays constant through every collision.",
+            lambda shown: np.ptp(shown.y(TRUTH)) < 1e-9 * shown.y(TRUTH)[0],
+        )
+    else:
+        yield Claim(
+            "The exact energy falls at collisions and never rises.",
             lambda shown: (
-                adds_up(shown)
-                and lesson.flight == -exercise.flight > 0
-                and exercise.moved > max(lesson.moved, 0.0)
+                (np.diff(shown.y(TRUTH)) < 1e-9 * shown.y(TRUTH)[0]).all()
+                and shown.y(TRUTH)[-1] < shown.y(TRUTH)[0]
             ),
         )
-    ]
-    if settings["e"] == 1.0:
-        claims.append(
-            Claim(
-                "With e = 1 a collision takes nothing: the energy of reference:lesson rises by what"
-                " it gains in flight, and that of reference:exercise falls by its loss less what"
-                " moving gives back.",
-                lambda shown: (
-                    adds_up(shown)
-                    and abs(lesson.whole - lesson.flight) < 0.01 * lesson.flight
-                    and exercise.whole < 0
-                ),
-            )
+    yield Claim(
+        "What the two methods gain and lose in flight goes on after the first collision:"
+        f" {number(lesson.flight)} J each until {number(end)} s. reference:exercise moves disks"
+        f" out of the walls and apart, and lifts them by it: {number(exercise.moved)} J."
+        " reference:lesson leaves them in the walls.",
+        lambda shown: (
+            adds_up(shown)
+            and lesson.flight == -exercise.flight > 0
+            and exercise.moved > max(lesson.moved, 0.0)
+        ),
+    )
+    if elastic:
+        yield Claim(
+            "With e = 1 a collision takes nothing: the energy of reference:lesson rises by what it"
+            " gains in flight, and that of reference:exercise falls by its loss less what moving"
+            " gives back.",
+            lambda shown: (
+                adds_up(shown)
+                and abs(lesson.whole - lesson.flight) < 0.01 * lesson.flight
+                and exercise.whole < 0
+            ),
         )
-        return claims
-    claims.append(
-        Claim(
+    else:
+        yield Claim(
             f"Collisions take {number(-lesson.collisions)} J of reference:lesson and"
             f" {number(-exercise.collisions)} J of reference:exercise until then, and the exact"
             f" ones {number(exact)} J. Once one is detected late, the disks meet elsewhere and at"
@@ -195,19 +219,17 @@ def budget_claims(
                 and abs(shown.y(TRUTH)[0] - shown.y(TRUTH)[-1] - exact) < 1e-6
             ),
         )
-    )
-    if settings["e"] == 0.5 and end == SECONDS:
-        claims.append(resting_claim(settings, budgets))
-    return claims
+    if scenario.scene.restitution == 0.5 and end == SECONDS:
+        yield resting_claim(scenario, budgets)
 
 
-def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim:
+def resting_claim(scenario: Scenario, budgets: dict[str, EnergyChange]) -> Claim:
     """Why the two count so many and so few collisions once the disks lie on the floor."""
-    steps = round(SECONDS * 60 * settings["k"])
+    steps = scenario.intervals * scenario.substeps[0]
 
     def last(name: str) -> float:
         late = sum(each.step >= steps - 60 for each in budgets[name].impulses)
-        return float(late / 60 / settings["n"])
+        return float(late / 60 / scenario.scene.n)
 
     return Claim(
         "In the end the disks lie on the floor. reference:exercise puts each back in every step and"
@@ -222,98 +244,27 @@ def resting_claim(settings: Settings, budgets: dict[str, EnergyChange]) -> Claim
     )
 
 
-def box_claims(played: Simulation, settings: Settings) -> list[Claim]:
-    """How the energy changes in flight and at collisions, and how near an event-driven engine
-    is."""
-    assert played.truth is not None
-    scene, dt = played.scenario.scene, played.scenario.dt(settings["k"])
-    flight = played.truth.t < played.first_collision
-    g = float(np.hypot(*scene.gravity))
-    gain = float(scene.mass.sum()) * g**2 * dt / 2  # W
-    claims = [
-        Claim(
-            "The event-driven engine takes every collision at its own time. As long as there is an"
-            " exact answer it is within 1 nm of it; the engines with steps are at least ten"
-            " thousand times farther away.",
-            lambda shown: (
-                max(shown.y("event_driven:float64", 1)) < 1e-9
-                and min(max(shown.y(name, 1)) for name in BOX_NAMES[:3])
-                > 1e4 * max(shown.y("event_driven:float64", 1))
-            ),
-        ),
-    ]
-    if flight.sum() > 1:  # else something collides before there is a second sample
-        claims.insert(
-            0,
-            Claim(
-                f"Until the first collision, at {number(played.first_collision + dt)} s, the exact"
-                " energy is constant. Explicit Euler"
-                f" (reference:lesson) gains m g² dt / 2 in a second, {number(gain)} J for all"
-                " disks; symplectic Euler (reference:exercise) loses as much. Under a constant"
-                " force neither is better. In a motion that repeats, such as an orbit or a"
-                " pendulum, the energy of symplectic Euler stays near its first value, and that of"
-                " explicit Euler grows (Hairer, Lubich and Wanner, Geometric Numerical Integration,"
-                " chapter I.1).",
-                lambda shown: all(
-                    np.abs(
-                        shown.y(name)[: len(flight)][flight]
-                        - shown.y(name)[0]
-                        - rate * played.truth.t[flight]  # type: ignore[union-attr]
-                    ).max()
-                    < ROUNDING * scene.n
-                    for name, rate in (
-                        (TRUTH, 0.0),
-                        ("reference:lesson", gain),
-                        ("reference:exercise", -gain),
-                    )
-                ),
-            ),
-        )
-    if settings["e"] == 1.0:
-        claims.append(
-            Claim(
-                "With e = 1 the exact energy stays constant through every collision.",
-                lambda shown: np.ptp(shown.y(TRUTH)) < 1e-9 * shown.y(TRUTH)[0],
-            )
-        )
-    else:
-        claims.append(
-            Claim(
-                "The exact energy falls at collisions and never rises.",
-                lambda shown: (
-                    (np.diff(shown.y(TRUTH)) < 1e-9 * shown.y(TRUTH)[0]).all()
-                    and shown.y(TRUTH)[-1] < shown.y(TRUTH)[0]
-                ),
-            )
-        )
-    return claims
-
-
 BOX = Lesson(
     name="box",
     number="3",
     title="A box of small disks",
     asks="Where does the energy go?",
-    text=(
-        (
-            "Small disks start from random positions with random velocities and fall. In a"
-            " collision of a disk with a wall, or with another disk, the relative velocity along"
-            " the normal <code>u</code> becomes <code>u' = −e u</code>, which leaves"
-            " <code>e²</code> of the energy of this part of the motion. Nothing else may take"
-            " energy. Between two collisions the sum of <code>m v²/2 + m g y</code> must stay"
-            " constant."
-        ),
-        (
-            "The exact answer ends where float64 can no longer follow the motion, or where a disk"
-            " comes to rest; the engines go on. [horizon] explains it."
-        ),
-    ),
+    text="""
+    Small disks start from random positions with random velocities and fall. In a collision of a
+    disk with a wall, or with another disk, the relative velocity along the normal
+    <code>u</code> becomes <code>u' = −e u</code>, which leaves <code>e²</code> of the energy of
+    this part of the motion. Nothing else may take energy. Between two collisions the sum of
+    <code>m v²/2 + m g y</code> must stay constant.
+
+    The exact answer ends where float64 can no longer follow the motion, or where a disk comes
+    to rest; the engines go on. [horizon] explains it.
+    """,
     sliders=(
         Slider("e", "Restitution e", (0.5, 0.8, 0.95, 1.0), 2),
         Slider("n", "Disks", (1, 5, 30), 1),
         # From 8.3 ms on a step is longer than the radius of the fastest disk, which then tunnels.
         time_step(1 / 60, (32, 16, 8, 4), 3),
     ),
-    names=(*BOX_NAMES, TRUTH),
+    names=(*NAMES, TRUTH),
     show=show_box,
 )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from reports.lessons.box import BOX
-from reports.lessons.crowd import COST, HORIZON
+from reports.lessons.crowd import COST
 from reports.lessons.friction.bounce import BOUNCE
 from reports.lessons.friction.cone import CONE
 from reports.lessons.friction.lever import LEVER
 from reports.lessons.friction.rolling import ROLLING
+from reports.lessons.horizon import HORIZON
 from reports.lessons.lesson import Lesson
 from reports.lessons.limits import LIMITS
 from reports.lessons.mechanisms.cap import CAP

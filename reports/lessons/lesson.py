@@ -12,17 +12,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
-from adapters.engines import ENGINES
+from adapters.engine import Engine
+from adapters.engines import row_of
 from adapters.play import play_once
 from adapters.run import Run
 from reports.compare.comparison import Comparison
 from reports.compare.laws import deviation
-from reports.compare.view import cut
 from reports.page.replay import name_of, pack_layers, played, ratio_of
 from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scenario, Trajectory
+from scenarios.model import Array, Scenario, Scene, Trajectory
 from scenarios.no_truth import answered
 
 POINTS = 400  # of a curve, at most: more than a chart has pixels for
@@ -30,7 +29,8 @@ POINTS = 400  # of a curve, at most: more than a chart has pixels for
 BEFORE_A_UNIT = re.compile(
     r"(?<=[\d∞⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:[mµnk]?[ms]|kg|rad|Hz|kHz|J|N|%)(?:[/²³·]\S*)?(?:\W|$))"
 )
-Settings = Mapping[str, Any]
+Read = Callable[[Trajectory], Array]  # what a curve shows of a motion
+Makes = Mapping[str, Callable[[], Engine]]  # name -> how that engine is made
 
 
 @dataclass(frozen=True)
@@ -77,20 +77,19 @@ class Curve:
     """
 
     name: str
-    x: ArrayLike
-    y: ArrayLike
+    x: Array
+    y: Array
     dots: bool = False
     faint: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """For JSON: thinned out and rounded to what can be seen; what is not finite is left out."""
-        x, y = np.asarray(self.x, float), np.asarray(self.y, float)
-        kept = np.linspace(0, len(x) - 1, min(POINTS, len(x))).round().astype(int)
-        kept = kept[np.isfinite(x[kept]) & np.isfinite(y[kept])]
+        kept = np.linspace(0, len(self.x) - 1, min(POINTS, len(self.x))).round().astype(int)
+        kept = kept[np.isfinite(self.x[kept]) & np.isfinite(self.y[kept])]
         return {
             "name": self.name,
-            "x": rounded(x[kept]),
-            "y": rounded(y[kept]),
+            "x": rounded(self.x[kept]),
+            "y": rounded(self.y[kept]),
             "dots": self.dots,
             "faint": self.faint,
         }
@@ -114,6 +113,23 @@ class LessonChart:
     log: str = ""
     guides: Sequence[tuple[str, float, str]] = ()
     reverse: bool = False
+
+    def curve(self, name: str) -> Curve:
+        """The curve of that name.
+
+        Raises:
+            KeyError: if there is none.
+        """
+        for curve in self.curves:
+            if curve.name == name:
+                return curve
+        raise KeyError(f"{name}: not in the chart {self.title}")
+
+    def gap(self, name: str, other: str = TRUTH) -> float:
+        """The largest distance of two curves over the points that both have."""
+        pair = self.curve(name).y, self.curve(other).y
+        k = min(map(len, pair))
+        return float(np.nanmax(np.abs(pair[0][:k] - pair[1][:k])))
 
     def to_json(self) -> dict[str, Any]:
         """For JSON."""
@@ -149,7 +165,7 @@ class Shown:
         film: what is replayed, or None.
         facts: (what, number and unit) of this run.
         claims: every number and every trend that the page states in words about its curves.
-        steps: paragraphs with the numbers of this run filled in.
+        steps: title -> a paragraph with the numbers of this run filled in.
         opening: how the film opens, as `more` of `pack_layers`.
         said: slider -> what it means here, where that depends on the others.
     """
@@ -158,34 +174,29 @@ class Shown:
     film: Comparison | None = None
     facts: Sequence[tuple[str, str]] = ()
     claims: Sequence[Claim] = ()
-    steps: Sequence[tuple[str, str]] = ()
+    steps: Mapping[str, str] = field(default_factory=dict)
     opening: Mapping[str, Any] = field(default_factory=dict)
     said: Mapping[str, str] = field(default_factory=dict)
 
     def curve(self, name: str, chart: int = 0) -> Curve:
-        """The curve of that name in a chart.
-
-        Raises:
-            KeyError: if the chart has none.
-        """
-        for curve in self.charts[chart].curves:
-            if curve.name == name:
-                return curve
-        raise KeyError(f"{name}: not in the chart {self.charts[chart].title}")
+        """The curve of that name in a chart; raises `KeyError` if the chart has none."""
+        return self.charts[chart].curve(name)
 
     def x(self, name: str, chart: int = 0) -> Array:
         """(k,) the abscissas of the curve, in the unit of the chart."""
-        return np.asarray(self.curve(name, chart).x, float)
+        return self.curve(name, chart).x
 
     def y(self, name: str, chart: int = 0) -> Array:
         """(k,) the ordinates of the curve, in the unit of the chart."""
-        return np.asarray(self.curve(name, chart).y, float)
+        return self.curve(name, chart).y
 
     def gap(self, name: str, other: str = TRUTH, chart: int = 0) -> float:
         """The largest distance of two curves over the points that both have."""
-        pair = self.y(name, chart), self.y(other, chart)
-        k = min(map(len, pair))
-        return float(np.nanmax(np.abs(pair[0][:k] - pair[1][:k])))
+        return self.charts[chart].gap(name, other)
+
+    def follows(self, name: str, law: Array | float, bound: float, chart: int = 0) -> bool:
+        """Whether a curve is `law`, a number or (k,) ordinates, within `bound`."""
+        return bool(np.abs(self.y(name, chart) - law).max() <= bound)
 
     def drawn(self) -> list[str]:
         """The names with a curve in a chart, or with disks in the replay."""
@@ -216,7 +227,7 @@ class Shown:
             "drawn": self.drawn(),
             "facts": [(what, unbroken(text)) for what, text in (*self.facts, *self.refusals())],
             "claims": [[unbroken(claim.text), bool(claim.holds(self))] for claim in self.claims],
-            "steps": [(title, unbroken(text)) for title, text in self.steps],
+            "steps": [(title, unbroken(text)) for title, text in self.steps.items()],
             "said": {key: unbroken(text) for key, text in self.said.items()},
         }
 
@@ -229,11 +240,12 @@ class Lesson:
         name: for address and file.
         number: "1", "6.3".
         title, asks: the heading, and the question it answers.
-        text: paragraphs, HTML written here and nowhere else; `[order]` becomes a link to the lesson
-            of that name. What is stated in numbers or as a trend is a claim of `show`, not text.
+        text: paragraphs with an empty line between them, HTML written here and nowhere else;
+            `[order]` becomes a link to the lesson of that name. What is stated in numbers or as a
+            trend is a claim of `show`, not text.
         sliders: what can be changed.
         names: who may be drawn, in the order of the legend.
-        show: settings (key -> value) -> what is shown.
+        show: what is shown where the sliders have these values; its arguments are their keys.
         recorded: whose numbers are not of a run of now, and when and with what they were made; a
             sentence, or "".
     """
@@ -242,11 +254,16 @@ class Lesson:
     number: str
     title: str
     asks: str
-    text: Sequence[str]
+    text: str
     sliders: Sequence[Slider]
     names: Sequence[str]
-    show: Callable[[Settings], Shown]
+    show: Callable[..., Shown]
     recorded: str = ""
+
+    @property
+    def paragraphs(self) -> list[str]:
+        """Those of the text, each in one line."""
+        return [" ".join(paragraph.split()) for paragraph in self.text.split("\n\n")]
 
     def at(self, places: Sequence[int]) -> Shown:
         """What is shown with the sliders at these indices.
@@ -262,7 +279,7 @@ class Lesson:
                     f"{slider.key} = {place}: must be from 0 to {len(slider.values) - 1}"
                 )
         return self.show(
-            {slider.key: slider.values[place] for slider, place in zip(self.sliders, places)}
+            **{slider.key: slider.values[place] for slider, place in zip(self.sliders, places)}
         )
 
     @property
@@ -278,58 +295,117 @@ class Lesson:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A scenario played by some engines in one step size, and its truth where it has one."""
+    """A scenario played by some engines in one step size."""
 
-    scenario: Scenario
+    scenario: Scenario  # its step sizes are this one only
     runs: Sequence[Run]
-    truth: Trajectory | None
 
     @staticmethod
-    def by(scenario: Scenario, names: Sequence[str], substeps: int) -> Simulation:
-        """Play it; the ladder of the scenario that is kept has this step only."""
-        scenario, truth = answered(replace(scenario, substeps=(substeps,)))
-        return Simulation(scenario, [run_of(name, scenario, substeps) for name in names], truth)
+    def by(
+        scenario: Scenario, names: Sequence[str], substeps: int, makes: Makes | None = None
+    ) -> Simulation:
+        """Play it; `makes`: how those of `names` are made that are not made as their row says."""
+        runs = [run_of(name, scenario, substeps, (makes or {}).get(name)) for name in names]
+        return Simulation(replace(scenario, substeps=(substeps,)), runs)
+
+    @cached_property
+    def answered(self) -> tuple[Scenario, Trajectory | None]:
+        """The scenario and its exact answer; if it has none, the scenario says why."""
+        return answered(self.scenario)
+
+    @property
+    def truth(self) -> Trajectory:
+        """The exact answer of a scenario that has one."""
+        _, truth = self.answered
+        assert truth is not None
+        return truth
 
     @cached_property
     def film(self) -> Comparison:
         """What the player of the page shows."""
-        return Comparison(self.scenario, self.truth, self.runs, pd.DataFrame())
+        return Comparison(*self.answered, self.runs, pd.DataFrame())
+
+    @cached_property
+    def motions(self) -> dict[str, Trajectory]:
+        """The trajectory of every engine that played, and the exact answer if there is one: it
+        comes last, so that its curve lies on top."""
+        _, truth = self.answered
+        played = {run.name: run.trajectory for run in self.runs if run.trajectory is not None}
+        return played | ({TRUTH: truth} if truth is not None else {})
 
     @property
     def first_collision(self) -> float:
         """s, up to when nothing collides, in the exact answer and in any engine."""
-        assert self.truth is not None
-        motions = [self.truth, *(run.trajectory for run in self.runs if run.trajectory)]
-        return min(float(each.collisions.t[0]) for each in motions) - self.runs[0].dt
+        starts = [float(each.collisions.t[0]) for each in self.motions.values()]
+        return min(starts) - self.runs[0].dt
 
-    def curves(self, read: Callable[[Trajectory], Array]) -> list[Curve]:
-        """`read` of every trajectory over time; the truth last, so that it lies on top."""
-        found = [
-            Curve(run.name, run.trajectory.t, read(run.trajectory))
-            for run in self.runs
-            if run.trajectory
+    def curves(self, read: Read, x: Array | None = None) -> list[Curve]:
+        """`read` of every motion: over time, or against `x`, where the points of the engines are
+        marked."""
+        return [
+            Curve(name, each.t if x is None else x, read(each), x is not None and name != TRUTH)
+            for name, each in self.motions.items()
         ]
-        return found + (
-            [Curve(TRUTH, self.truth.t, read(self.truth))] if self.truth is not None else []
-        )
+
+    def over_time(
+        self,
+        title: str,
+        y: str,
+        read: Read,
+        log: str = "",
+        guides: Sequence[tuple[str, float, str]] = (),
+    ) -> LessonChart:
+        """`read` of every motion over time."""
+        return LessonChart(title, "time in s", y, self.curves(read), log, guides)
+
+    def error(self, name: str, motion: Trajectory) -> Curve:
+        """m, the distance of the farthest disk from the exact answer over time, while there is
+        one."""
+        distances = farthest(motion, self.truth, self.scenario.scene)
+        return Curve(name, motion.t[: len(distances)], distances)
 
     def errors(self) -> list[Curve]:
-        """m, the largest distance of any disk from the truth over time, while there is one."""
-        assert self.truth is not None
-        curves = []
-        for run in self.runs:
+        """m, the error of every engine."""
+        return [self.error(*each) for each in self.motions.items() if each[0] != TRUTH]
+
+    def errors_over_time(
+        self, *others: Curve, guides: Sequence[tuple[str, float, str]] = ()
+    ) -> LessonChart:
+        """The error of every engine, and other errors."""
+        curves = [*self.errors(), *others]
+        title = "Farthest disk from the exact answer"
+        return LessonChart(title, "time in s", "m", curves, "y", guides)
+
+
+def run_of(
+    name: str, scenario: Scenario, substeps: int, make: Callable[[], Engine] | None = None
+) -> Run:
+    """One run of one engine: of the row of that name, or made by `make`."""
+    return play_once(make or row_of(name).make, name, scenario, scenario.dt(substeps))
+
+
+def farthest(one: Trajectory, other: Trajectory, scene: Scene) -> Array:
+    """(k,) m, the largest distance of any disk between two motions, as long as both last."""
+    distances: Array = deviation(one, other, scene).max(axis=1)
+    return distances
+
+
+def swept(
+    x: Array, played: Sequence[Simulation], read: Callable[[Trajectory, Scene], float]
+) -> list[Curve]:
+    """A curve for each engine, with a point for each simulation: `read` of its motion there."""
+    found: dict[str, list[float]] = {}
+    for one in played:
+        for run in one.runs:
             if run.trajectory is not None:
-                k = min(len(run.trajectory), len(self.truth))
-                distances = deviation(
-                    cut(run.trajectory, k), cut(self.truth, k), self.scenario.scene
-                )
-                curves.append(Curve(run.name, self.truth.t[:k], distances.max(axis=1)))
-        return curves
+                point = read(run.trajectory, one.scenario.scene)
+                found.setdefault(run.name, []).append(float(point))
+    return [Curve(name, x, np.array(points), dots=True) for name, points in found.items()]
 
 
-def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
-    """One run of one engine, by the name of its row."""
-    return play_once(ENGINES[name].make, name, scenario, scenario.dt(substeps))
+def tidy(value: float, rounding: float, digits: int = 3) -> str:
+    """To so many digits; what is 0 but for `rounding` is shown as 0."""
+    return number(value, digits) if abs(value) > rounding else "0"
 
 
 def unbroken(text: str) -> str:

@@ -3,25 +3,23 @@ with the run that fails."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from adapters.engines import DISTINCT
-from adapters.run import Run
-from reports.compare.comparison import Comparison
 from reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
     LessonChart,
-    Settings,
+    Read,
     Shown,
+    Simulation,
     Slider,
 )
 from reports.page.style import TRUTH, number
@@ -31,7 +29,6 @@ from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, eng
 from reports.stability.overview import bracket, why
 from reports.stability.search import LimitSearch
 from reports.stability.variants import DRIVEN_ENGINES
-from scenarios.model import Array, Scenario, Trajectory
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest
 SECONDS = 4.0  # that a replay lasts
@@ -44,7 +41,7 @@ class Seen(NamedTuple):
     case: str
     what: str
     unit: str
-    read: Callable[[Trajectory], Array]
+    read: Read
     harshest: float | None = None
 
     def value(self, place: int) -> float:
@@ -53,36 +50,30 @@ class Seen(NamedTuple):
         return float(f"{first * (last / first) ** (place / HARSHNESS[-1]):.3g}")
 
 
-def way(each: Trajectory) -> Array:
-    """(k,) m that the first disk has gone along x."""
-    way: Array = each.position[:, 0, 0] - each.position[0, 0, 0]
-    return way
+def gone(axis: int) -> Read:
+    """(k,) m that the first disk has gone along an axis."""
+    return lambda each: each.position[:, 0, axis] - each.position[0, 0, axis]
 
 
-def aside(each: Trajectory) -> Array:
-    """(k,) m that it has been deflected."""
-    way: Array = each.position[:, 0, 1] - each.position[0, 0, 1]
-    return way
-
-
+ALONG = "Displacement along x"
 SEEN = {
-    "a fast disk meets another": Seen("tunnelling_head_on", "Displacement along x", "m", way),
-    "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", "Displacement along x", "m", way),
-    "a slow collision": Seen("slow_collision", "Displacement of the first disk", "m", way),
-    "a near miss": Seen("near_miss", "Deflection of the first disk", "m", aside),
-    "a scene made smaller": Seen("scale_down", "Displacement of the first disk", "m", way),
+    "a fast disk meets another": Seen("tunnelling_head_on", ALONG, "m", gone(0)),
+    "a fast disk meets a thin wall": Seen("tunnelling_thin_wall", ALONG, "m", gone(0)),
+    "a slow collision": Seen("slow_collision", "Displacement of the first disk", "m", gone(0)),
+    "a near miss": Seen("near_miss", "Deflection of the first disk", "m", gone(1)),
+    "a scene made smaller": Seen("scale_down", "Displacement of the first disk", "m", gone(0)),
     # A replay keeps seven digits of a place: farther out they are too few for a disk.
-    "far from the origin": Seen("far_from_origin", "Displacement along x", "m", way, harshest=1e5),
+    "far from the origin": Seen("far_from_origin", ALONG, "m", gone(0), harshest=1e5),
     "a fast spin": Seen("spin", "Angle", "rad", lambda each: each.angle[:, 0]),
 }
 
 # What is changed in the engines of these cases whose names have a +.
-CHANGES = {
-    name.partition("+")[2]: DRIVEN_ENGINES[name].change
+CHANGES = dict.fromkeys(
+    f"<code>+{name.partition('+')[2]}</code>, {DRIVEN_ENGINES[name].change}"
     for seen in SEEN.values()
     for name in CASES[seen.case].also
     if DRIVEN_ENGINES[name].change
-}
+)
 
 
 @cache
@@ -96,79 +87,73 @@ def limits_of(name: str) -> list[Limit]:
         return limits
     # The share of runs that fail is drawn; the search stops at the first one.
     whole = {search.engine: search for search in searches if search.engine in DISTINCT}
-    return [
-        replace(
-            limit,
-            trials=tuple(whole[limit.engine].trial(t.value, to_the_end=True) for t in limit.trials),
-        )
-        if limit.engine in whole
-        else limit
-        for limit in limits
-    ]
+
+    def to_the_end(limit: Limit) -> Limit:
+        if limit.engine not in whole:
+            return limit
+        trials = (whole[limit.engine].trial(t.value, to_the_end=True) for t in limit.trials)
+        return replace(limit, trials=tuple(trials))
+
+    return list(map(to_the_end, limits))
 
 
-def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Scenario, Run]:
+def run_at(case: Case, engine: str, value: float) -> tuple[Trial, Simulation]:
     """All runs of an engine at a value, and of them the first that fails, or the first, which has
     the worst phase."""
     search = LimitSearch(case, engine, QUICK)
     trial = search.trial(value, to_the_end=True)
-    return trial, *(
-        search.seen.get(value) or case.play(DRIVEN_ENGINES[engine], case.scene(value, 0))
-    )
+    played = search.seen.get(value) or case.play(DRIVEN_ENGINES[engine], case.scene(value, 0))
+    scenario, run = played
+    return trial, Simulation(scenario, [run])
 
 
-def show_limits(settings: Settings) -> Shown:
+def show_limits(case: str, engine: str, place: int) -> Shown:
     """The run at this value beside the exact answer, and the readings of all engines up to their
     limits."""
-    seen, engine = SEEN[settings["case"]], settings["engine"]
-    case, value, limits = CASES[seen.case], seen.value(settings["place"]), limits_of(seen.case)
-    trial, scenario, run = run_at(case, engine, value)
-    assert scenario.truth is not None
-    truth = scenario.truth(scenario.times)
-    drawn = [(engine, run.trajectory), (TRUTH, truth)]
-    curves = [Curve(name, each.t, seen.read(each)) for name, each in drawn if each is not None]
+    seen = SEEN[case]
+    asked, value, limits = CASES[seen.case], seen.value(place), limits_of(seen.case)
+    trial, played = run_at(asked, engine, value)
     found = next(limit for limit in limits if limit.engine == engine)
     return Shown(
         [
-            LessonChart(seen.what, "time in s", seen.unit, curves),
-            readings(case, limits, engine, value),
+            played.over_time(seen.what, seen.unit, seen.read),
+            readings(asked, limits, engine, value),
         ],
-        Comparison(scenario, truth, [run], pd.DataFrame()),
-        [(limit.engine, in_words(limit, case)) for limit in limits if limit.engine in DISTINCT],
-        limit_claims(case, found),
-        in_numbers(case, trial, found),
-        {"pace": scenario.duration / SECONDS} | event_of(trial),
-        {"place": with_unit(f"{case.parameter} = {number(value)}", case)},
+        played.film,
+        [(limit.engine, in_words(limit, asked)) for limit in limits if limit.engine in DISTINCT],
+        [limit_claim(asked, found)],
+        in_numbers(asked, trial, found),
+        {"pace": played.scenario.duration / SECONDS} | event_of(trial),
+        {"place": with_unit(f"{asked.parameter} = {number(value)}", asked)},
     )
 
 
-def limit_claims(case: Case, limit: Limit) -> list[Claim]:
+def limit_claim(case: Case, limit: Limit) -> Claim:
     """That the readings of an engine pass the line of failing once, and stay beyond it."""
     most = case.predicate.bound or 0.0  # without a bound the share of runs that fail is drawn
 
-    def fails_from_the_limit_on(shown: Shown) -> bool:
-        x = case.harsher * shown.x(limit.engine, 1)
-        fails = ~(shown.y(limit.engine, 1) <= most)  # what was refused has no reading
-        if limit.verdict == NEVER_FAILS:
-            return not fails.any()
-        return bool(fails.any() and x[fails].min() > x[~fails].max(initial=-np.inf))
+    def fails(shown: Shown) -> np.ndarray:
+        return ~(shown.y(limit.engine, 1) <= most)  # what was refused has no reading
 
-    text = (
-        f"{limit.engine} works at every value that was tried."
-        if limit.verdict == NEVER_FAILS
-        else f"{limit.engine} works at every value tried before its limit, and fails or refuses at"
-        " it."
+    def fails_from_the_limit_on(shown: Shown) -> bool:
+        x, beyond = case.harsher * shown.x(limit.engine, 1), fails(shown)
+        return bool(beyond.any() and x[beyond].min() > x[~beyond].max(initial=-np.inf))
+
+    if limit.verdict == NEVER_FAILS:
+        return Claim(
+            f"{limit.engine} works at every value that was tried.",
+            lambda shown: not fails(shown).any(),
+        )
+    return Claim(
+        f"{limit.engine} works at every value tried before its limit, and fails or refuses at it.",
+        fails_from_the_limit_on,
     )
-    return [Claim(text, fails_from_the_limit_on)]
 
 
 def event_of(trial: Trial) -> dict[str, Any]:
     """What the replay marks: when and at which disk it fails."""
-    return (
-        {}
-        if trial.works or not isfinite(trial.at)
-        else {"event": {"t": trial.at, "disk": trial.disk}}
-    )
+    fails = not trial.works and isfinite(trial.at)
+    return {"event": {"t": trial.at, "disk": trial.disk}} if fails else {}
 
 
 def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> LessonChart:
@@ -177,7 +162,6 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
     Where a run can only fail or not, the share of runs that fail.
     """
     bound = case.predicate.bound
-    unit = "" if case.predicate.unit == "1" else case.predicate.unit
 
     def read(trial: Trial) -> float:
         return abs(trial.worst) if bound else trial.failed / trial.runs
@@ -185,8 +169,8 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
     curves = [
         Curve(
             each.engine,
-            [t.value for t in each.trials],
-            [read(t) for t in each.trials],
+            np.array([t.value for t in each.trials]),
+            np.array([read(t) for t in each.trials]),
             mine,
             not mine,
         )
@@ -194,16 +178,13 @@ def readings(case: Case, limits: Sequence[Limit], engine: str, value: float) -> 
         for each in limits
         if each.engine in DISTINCT and mine == (each.engine == engine)
     ]
-    guides = [("x", value, "here"), *([("y", bound, "fails above")] if bound else [])]
     axis = case.parameter if case.unit == "1" else f"{case.parameter} in {case.unit}"
-    what = (
-        (case.predicate.name.capitalize(), unit, "xy")
-        if bound
-        else ("Runs that fail", "share", "x")
-    )
-    return LessonChart(
-        what[0], axis, what[1], curves, what[2], guides, case.values[0] > case.values[-1]
-    )
+    here, harsh_left = ("x", value, "here"), case.values[0] > case.values[-1]
+    if not bound:
+        return LessonChart("Runs that fail", axis, "share", curves, "x", [here], harsh_left)
+    title, unit = case.predicate.name.capitalize(), case.predicate.unit.removesuffix("1")
+    guides = [here, ("y", bound, "fails above")]
+    return LessonChart(title, axis, unit, curves, "xy", guides, harsh_left)
 
 
 def with_unit(text: str, case: Case) -> str:
@@ -221,22 +202,22 @@ def in_words(limit: Limit, case: Case) -> str:
     )
 
 
-def in_numbers(case: Case, trial: Trial, limit: Limit) -> list[tuple[str, str]]:
+def in_numbers(case: Case, trial: Trial, limit: Limit) -> dict[str, str]:
     """What failing means, what these runs do, the engine's bracket and the reason, with how that
     was tested."""
     bound, read = "", trial.event
     if case.predicate.bound:
         bound = f", by more than {measured(case, case.predicate.bound)}"
         read = read or f"off by {measured(case, trial.worst)}"
-    facts = [
-        ("Failing means", f"{case.predicate.means}{bound}."),
-        ("Here", f"{counted(trial)}{f': {read}' if read else ''}."),
-        (limit.engine, f"{in_words(limit, case)}."),
-    ]
+    facts = {
+        "Failing means": f"{case.predicate.means}{bound}.",
+        "Here": f"{counted(trial)}{f': {read}' if read else ''}.",
+        limit.engine: f"{in_words(limit, case)}.",
+    }
     if limit.verdict != NEVER_FAILS:
         tested = f" Tested: {limit.tested}." if limit.tested else ""
         source = f" Source: {limit.source}." if limit.source else ""
-        facts.append(("Why", f"{why(limit)}{tested}{source}"))
+        facts["Why"] = f"{why(limit)}{tested}{source}"
     return facts
 
 
@@ -261,36 +242,28 @@ LIMITS = Lesson(
     number="8",
     title="Where methods fail",
     asks="How harsh may a scene be before a method breaks?",
-    text=(
-        (
-            "Every method works in gentle scenes. If one parameter gets harsher, such as a speed, a"
-            " distance or a size, a method may <b>fail</b> from some value on: it misses a"
-            " collision, limits a spin, or loses a position to rounding. The search tries values"
-            " from gentle to harsh, with the collision at several moments of its step. It stops at"
-            " the first value that fails. Then it halves the gap to the last value that works until"
-            f" the two are at most {QUICK.ratio - 1:.0%} apart."
-        ),
-        (
-            "In the names of the cases and in the reasons v is a speed, R a radius, b the distance"
-            " of the centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force,"
-            " its angular frequency, and h the duration of a substep."
-        ),
-        (
-            "A reason counts as tested if the limit follows from it, or if an engine that differs"
-            " in this one thing gets farther; else it is called likely. The command"
-            " <code>crosscheck stability</code> searches all cases; these are the quick ones."
-            " [threshold] and [digits] explain two of the reasons."
-        ),
-        (
-            "<b>Continuous collision detection</b> (CCD) looks for a contact along the whole path"
-            " of a disk in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a"
-            " disk against walls and static disks, and against moving disks only if it is marked as"
-            " a <b>bullet</b>. As matched, Box2D 3.1 plays without CCD, as does Box2D 2.3 where"
-            " e = 1 and there is no gravity. A name with a + is an engine with one change: "
-            + "; ".join(f"<code>+{name}</code>, {change}" for name, change in CHANGES.items())
-            + "."
-        ),
-    ),
+    text=f"""
+    Every method works in gentle scenes. If one parameter gets harsher, such as a speed, a distance
+    or a size, a method may <b>fail</b> from some value on: it misses a collision, limits a spin, or
+    loses a position to rounding. The search tries values from gentle to harsh, with the collision
+    at several moments of its step. It stops at the first value that fails. Then it halves the gap
+    to the last value that works until the two are at most {QUICK.ratio - 1:.0%} apart.
+
+    In the names of the cases and in the reasons v is a speed, R a radius, b the distance of the
+    centre lines of two disks, w a spin in rad/s (ω in lesson 9) or, of a force, its angular
+    frequency, and h the duration of a substep.
+
+    A reason counts as tested if the limit follows from it, or if an engine that differs in this one
+    thing gets farther; else it is called likely. The command <code>crosscheck stability</code>
+    searches all cases; these are the quick ones. [threshold] and [digits] explain two of the
+    reasons.
+
+    <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a disk
+    in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk against walls and
+    static disks, and against moving disks only if it is marked as a <b>bullet</b>. As matched,
+    Box2D 3.1 plays without CCD, as does Box2D 2.3 where e = 1 and there is no gravity. A name with
+    a + is an engine with one change: {"; ".join(CHANGES)}.
+    """,
     sliders=(
         Slider("case", "Case", tuple(SEEN)),
         Slider("engine", "Engine", tuple(DISTINCT), list(DISTINCT).index("box2d:matched")),

@@ -3,29 +3,18 @@ collision."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
 from adapters.box2d import MATCHED
 from adapters.engines import ENGINES, changed
-from adapters.play import play_once
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    LessonChart,
-    Settings,
-    Shown,
-    Simulation,
-    Slider,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, tidy, time_step
 from reports.page.style import TRUTH, number
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario, Scene, State
-from scenarios.no_truth import answered
 from scenarios.truth.exact import with_oracle
 
 ROUNDING = 1e-12  # of float64, over some dozen operations on numbers of the order of 1
@@ -76,7 +65,7 @@ def overlap_found(scene: Scene, dt: float) -> float:
     return float(scene.radius.sum() - np.hypot(*(x[0] - x[1])))
 
 
-def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
+def in_numbers(scene: Scene, dt: float) -> dict[str, str]:
     """Detection, projection, impulse and momentum, each with the numbers of this collision."""
     before, after, reported = collision_of_the_reference(scene, dt)
     (m1, m2), e = scene.mass, scene.restitution
@@ -89,47 +78,22 @@ def in_numbers(scene: Scene, dt: float) -> list[tuple[str, str]]:
     impulse = -(1 + e) * closing / (1 / m1 + 1 / m2)
     separating = float((after.velocity[0] - after.velocity[1]) @ n)
     start, end = scene.mass @ before.velocity, scene.mass @ after.velocity
-    return [
-        (
-            "Detect",
-            (
-                f"|x₁ − x₂| = {number(distance)} m < R₁ + R₂ = {number(reach)} m: they overlap by δ"
-                f" = {number(1e3 * overlap)} mm, detected at the end of a step, up to dt ="
-                f" {number(1e3 * dt)} ms late"
-            ),
-        ),
-        (
-            "Project",
-            (
-                f"n = (x₁ − x₂)/|x₁ − x₂| = {pair(n)}; x₁ moves by (1/m₁)/(1/m₁ + 1/m₂) δ = "
-                f"{number(1e3 * overlap * share)} mm along n, "
-                f"x₂ by {number(1e3 * overlap * (1 - share))} mm against it"
-            ),
-        ),
-        (
-            "Impulse",
-            (
-                f"v₁ − v₂ along n is {number(closing)} m/s; J = −(1 + e)(v₁ − v₂)·n / (1/m₁ + 1/m₂)"
-                f" = {number(1 + e)} · {number(-closing)} / {number(1 / m1 + 1 / m2)} ="
-                f" {number(impulse)} N s; the solver reports {number(reported)} N s"
-            ),
-        ),
-        (
-            "Update",
-            (
-                f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, "
-                f"v₂' = v₂ − J n/m₂ = {pair(after.velocity[1])} m/s; "
-                f"separation over approach speed: {or_rounding(-separating / closing, 6)}"
-            ),
-        ),
-        (
-            "Momentum",
-            (
-                f"m₁v₁ + m₂v₂ = {pair(start)} before and {pair(end)} kg m/s after: off by "
-                f"{or_rounding(float(np.abs(end - start).max()), 2)}"
-            ),
-        ),
-    ]
+    return {
+        "Detect": f"|x₁ − x₂| = {number(distance)} m < R₁ + R₂ = {number(reach)} m: they overlap by"
+        f" δ = {number(1e3 * overlap)} mm, detected at the end of a step, up to dt ="
+        f" {number(1e3 * dt)} ms late",
+        "Project": f"n = (x₁ − x₂)/|x₁ − x₂| = {pair(n)}; x₁ moves by (1/m₁)/(1/m₁ + 1/m₂) δ ="
+        f" {number(1e3 * overlap * share)} mm along n, x₂ by"
+        f" {number(1e3 * overlap * (1 - share))} mm against it",
+        "Impulse": f"v₁ − v₂ along n is {number(closing)} m/s; J = −(1 + e)(v₁ − v₂)·n / (1/m₁ +"
+        f" 1/m₂) = {number(1 + e)} · {number(-closing)} / {number(1 / m1 + 1 / m2)} ="
+        f" {number(impulse)} N s; the solver reports {number(reported)} N s",
+        "Update": f"v₁' = v₁ + J n/m₁ = {pair(after.velocity[0])} m/s, v₂' = v₂ − J n/m₂ ="
+        f" {pair(after.velocity[1])} m/s; separation over approach speed:"
+        f" {or_rounding(-separating / closing, 6)}",
+        "Momentum": f"m₁v₁ + m₂v₂ = {pair(start)} before and {pair(end)} kg m/s after: off by"
+        f" {or_rounding(float(np.abs(end - start).max()), 2)}",
+    }
 
 
 @cache
@@ -138,12 +102,11 @@ def box2d_with_ccd(
 ) -> float:
     """m/s that the first disk is off along x in the end, in Box2D as matched but with CCD at every
     e, and with its lengths in `length_unit` of the smallest radius."""
-    scenario, truth = answered(replace(two(restitution, ratio, offset), substeps=(k,)))
-    assert truth is not None
     on = {"elastic_continuous": True, "elastic_bullet": True, "length_unit": length_unit}
-    run = play_once(partial(changed, NAMES[2], **on), NAMES[2], scenario, scenario.dt(k))
-    assert run.trajectory is not None
-    return float(abs(run.trajectory.velocity[-1, 0, 0] - truth.velocity[-1, 0, 0]))
+    makes = {NAMES[2]: partial(changed, NAMES[2], **on)}
+    played = Simulation.by(two(restitution, ratio, offset), NAMES[2:3], k, makes)
+    ends = [each.velocity[-1, 0, 0] for each in played.motions.values()]
+    return float(abs(ends[0] - ends[1]))
 
 
 def or_rounding(value: float, digits: int) -> str:
@@ -153,36 +116,29 @@ def or_rounding(value: float, digits: int) -> str:
 
 def pair(vector: Array) -> str:
     """(x, y) to four digits; what is 0 but for rounding is 0."""
-    x, y = (number(float(each), 4) if abs(each) > ROUNDING else "0" for each in vector)
+    x, y = (tidy(float(each), ROUNDING, 4) for each in vector)
     return f"({x}, {y})"
 
 
-def show_meeting(settings: Settings) -> Shown:
+def show_meeting(e: float, ratio: float, offset: float, k: int) -> Shown:
     """The collision, drawn and in numbers."""
-    scenario = two(settings["e"], settings["ratio"], settings["offset"])
-    shown = Simulation.by(scenario, NAMES, settings["k"])
-    assert shown.truth is not None
+    scenario = two(e, ratio, offset)
+    played = Simulation.by(scenario, NAMES, k)
     return Shown(
         [
-            LessonChart(
-                "Velocity of the first disk along x",
-                "time in s",
-                "m/s",
-                shown.curves(lambda each: each.velocity[:, 0, 0]),
+            played.over_time(
+                "Velocity of the first disk along x", "m/s", lambda each: each.velocity[:, 0, 0]
             ),
-            LessonChart(
-                "Farthest disk from the exact answer", "time in s", "m", shown.errors(), log="y"
-            ),
+            played.errors_over_time(),
         ],
-        shown.film,
-        claims=meeting_claims(settings),
-        steps=in_numbers(scenario.scene, shown.scenario.dt(settings["k"])),
+        played.film,
+        claims=list(meeting_claims(e, ratio, offset, k)),
+        steps=in_numbers(scenario.scene, scenario.dt(k)),
     )
 
 
-def meeting_claims(settings: Settings) -> list[Claim]:
+def meeting_claims(e: float, ratio: float, offset: float, k: int) -> Iterator[Claim]:
     """Off the centre line a late normal is wrong; on the centre line every normal is the same."""
-    offset = settings["offset"]
     # A velocity below 3 m/s that is rounded a few times: by Box2D in float32, by the others in
     # float64.
     single, double = 3e-7, 4e-15
@@ -196,29 +152,26 @@ def meeting_claims(settings: Settings) -> list[Claim]:
         ),
     )
     if offset == 0.0:
-        return [
-            Claim(
-                "On the centre line the normal is the same whenever it is read: every engine leaves"
-                " with the exact velocity, to rounding (Box2D rounds to single precision).",
-                lambda shown: all(
-                    off(shown, name) <= (single if "box2d" in name else double) for name in NAMES
-                ),
+        yield Claim(
+            "On the centre line the normal is the same whenever it is read: every engine leaves"
+            " with the exact velocity, to rounding (Box2D rounds to single precision).",
+            lambda shown: all(
+                off(shown, name) <= (single if "box2d" in name else double) for name in NAMES
             ),
-            exact,
-        ]
-    return [
-        Claim(
-            "Off the centre line the normal turns while the disks overlap. The engines that read it"
-            " at the end of a step leave with a wrong velocity; reference:exercise and"
-            " pymunk:matched read it at the same time and leave with the same one.",
-            lambda shown: (
-                all(off(shown, name) > 1e-5 for name in NAMES[:3])
-                and abs(shown.y(NAMES[0])[-1] - shown.y(NAMES[1])[-1]) <= double
-            ),
+        )
+        yield exact
+        return
+    yield Claim(
+        "Off the centre line the normal turns while the disks overlap. The engines that read it"
+        " at the end of a step leave with a wrong velocity; reference:exercise and"
+        " pymunk:matched read it at the same time and leave with the same one.",
+        lambda shown: (
+            all(off(shown, name) > 1e-5 for name in NAMES[:3])
+            and abs(shown.y(NAMES[0])[-1] - shown.y(NAMES[1])[-1]) <= double
         ),
-        *box2d_claims(settings),
-        exact,
-    ]
+    )
+    yield from box2d_claims(e, ratio, offset, k)
+    yield exact
 
 
 def off(shown: Shown, name: str) -> float:
@@ -226,9 +179,8 @@ def off(shown: Shown, name: str) -> float:
     return float(abs(shown.y(name)[-1] - shown.y(TRUTH)[-1]))
 
 
-def box2d_claims(settings: Settings) -> list[Claim]:
+def box2d_claims(e: float, ratio: float, offset: float, k: int) -> Iterator[Claim]:
     """When Box2D reads the normal, and which of its mechanisms decides that."""
-    restitution, ratio, offset, k = (settings[key] for key in ("e", "ratio", "offset", "k"))
     early = Claim(
         "With this long step box2d:matched leaves with a velocity at least five times nearer to"
         " the exact one than pymunk:matched: its continuous collision detection (CCD) stops the"
@@ -241,31 +193,29 @@ def box2d_claims(settings: Settings) -> list[Claim]:
         " errors of velocity differ by less than a hundredth.",
         lambda shown: abs(off(shown, NAMES[2]) / off(shown, NAMES[1]) - 1) < 0.01,
     )
-    if k == 1 and restitution < 1.0:
-        return [early]
+    if k == 1 and e < 1.0:
+        yield early
+        return
     if k == 1:
-        on = box2d_with_ccd(restitution, ratio, offset, k, MATCHED["length_unit"])
-        return [
-            late,
-            Claim(
-                "That is not because of e: the profile switches CCD off where e = 1 and there is"
-                f" no gravity. With CCD on it would be {number(on)} m/s off, less than a fifth.",
-                lambda shown: on < off(shown, NAMES[2]) / 5,
-            ),
-        ]
-    deep = overlap_found(two(restitution, ratio, offset).scene, INTERVAL / k)
-    off_too = ", and at e = 1 the profile switches CCD off" if restitution == 1.0 else ""
-    finer = box2d_with_ccd(restitution, ratio, offset, k, MATCHED["length_unit"] / 10)
-    return [
-        late,
-        Claim(
-            f"CCD has nothing to do here: it lets disks overlap by {number(1e3 * STOPPED)} mm,"
-            f" three times the slop of Box2D, and this step finds them {number(1e3 * deep)} mm"
-            f" deep{off_too}. With CCD on and a tenth of that slop the error would be"
-            f" {number(finer)} m/s, at most two thirds.",
-            lambda shown: deep < STOPPED and finer < off(shown, NAMES[2]) * 2 / 3,
-        ),
-    ]
+        on = box2d_with_ccd(e, ratio, offset, k, MATCHED["length_unit"])
+        yield late
+        yield Claim(
+            "That is not because of e: the profile switches CCD off where e = 1 and there is"
+            f" no gravity. With CCD on it would be {number(on)} m/s off, less than a fifth.",
+            lambda shown: on < off(shown, NAMES[2]) / 5,
+        )
+        return
+    deep = overlap_found(two(e, ratio, offset).scene, INTERVAL / k)
+    off_too = ", and at e = 1 the profile switches CCD off" if e == 1.0 else ""
+    finer = box2d_with_ccd(e, ratio, offset, k, MATCHED["length_unit"] / 10)
+    yield late
+    yield Claim(
+        f"CCD has nothing to do here: it lets disks overlap by {number(1e3 * STOPPED)} mm,"
+        f" three times the slop of Box2D, and this step finds them {number(1e3 * deep)} mm"
+        f" deep{off_too}. With CCD on and a tenth of that slop the error would be"
+        f" {number(finer)} m/s, at most two thirds.",
+        lambda shown: deep < STOPPED and finer < off(shown, NAMES[2]) * 2 / 3,
+    )
 
 
 MEETING = Lesson(
@@ -273,19 +223,14 @@ MEETING = Lesson(
     number="4",
     title="Two disks meet",
     asks="What happens in a collision, in numbers?",
-    text=(
-        (
-            "At the end of a step two disks overlap. <b>Detect</b> the overlap. <b>Project</b> the"
-            " disks apart along the line of centres until they touch in a point; no velocity"
-            " changes. Find the <b>impulse</b> that makes them separate with e times the speed of"
-            " approach. <b>Update</b> both velocities with this one impulse, so that momentum is"
-            " conserved."
-        ),
-        (
-            "The normal is the line of centres when the collision is detected, not when the disks"
-            " touch."
-        ),
-    ),
+    text="""
+    At the end of a step two disks overlap. <b>Detect</b> the overlap. <b>Project</b> the disks
+    apart along the line of centres until they touch in a point; no velocity changes. Find the
+    <b>impulse</b> that makes them separate with e times the speed of approach. <b>Update</b>
+    both velocities with this one impulse, so that momentum is conserved.
+
+    The normal is the line of centres when the collision is detected, not when the disks touch.
+    """,
     sliders=(
         Slider("e", "Restitution e", (0.0, 0.5, 0.9, 1.0), 2),
         Slider("ratio", "Mass of the second disk", (0.1, 1.0, 10.0), 1, "kg"),

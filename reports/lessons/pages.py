@@ -18,8 +18,8 @@ from starlette.routing import BaseRoute, Route
 from adapters.engines import ENGINES, FETCHED
 from reports.lessons.catalogue import LESSONS
 from reports.lessons.conventions import Convention, table
-from reports.lessons.crowd import ROUNDED
 from reports.lessons.friction.bounce import CONE as EDGES
+from reports.lessons.horizon import ROUNDED
 from reports.lessons.lesson import Lesson, unbroken
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.mechanisms.float32 import BETWEEN
@@ -38,12 +38,13 @@ GROUPS = {
     "Spin and friction": "9",
 }
 MEASURING = Lock()  # two pages that ask at once get one measurement
+GREY = look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3))
 OWN = {  # who plays in lessons only
     ABLATED: look("reference")._replace(light="#b3123f", dark="#ff7a93", dash=(7, 5)),
-    EDGES: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
-    BETWEEN: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
+    EDGES: GREY,
+    BETWEEN: GREY,
     CHANGED: look("matter", "shipped")._replace(dash=(3, 3)),
-    ROUNDED: look("reference")._replace(light="#8a8f98", dark="#7f8690", dash=(3, 3)),
+    ROUNDED: GREY,
 }
 
 
@@ -96,7 +97,7 @@ def lesson_page(
         looks=looks_of(lesson),
         connects=not grid,
         lesson=lesson,
-        text=[linked(paragraph, links) for paragraph in lesson.text],
+        text=[linked(paragraph, links) for paragraph in lesson.paragraphs],
         grid=grid,
         around=around,
         links=links,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,14 +10,13 @@ import numpy as np
 
 from reports.lessons.lesson import (
     Claim,
-    Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
-    run_of,
+    farthest,
+    swept,
     time_step,
 )
 from reports.page.style import TRUTH, number
@@ -42,26 +41,24 @@ def bouncing(speed: float, gravity: float) -> Scenario:
     )
 
 
-def show_particle(settings: Settings) -> Shown:
+def show_particle(part: str, k: int) -> Shown:
     """Height over time, and the error against the step."""
-    speed, gravity, claims = PARTS[settings["part"]]
+    speed, gravity, claims = PARTS[part]
     scenario = bouncing(speed, gravity)
-    played = Simulation.by(scenario, METHODS, settings["k"])
-    steps = np.array([scenario.dt(k) for k in STEPS])
-    errors = []
-    for name in METHODS:
-        runs = [Simulation(scenario, [run_of(name, scenario, k)], played.truth) for k in STEPS]
-        errors.append(
-            Curve(name, 1e3 * steps, [np.max(run.errors()[0].y) for run in runs], dots=True)
-        )
-    dt, radius = scenario.dt(settings["k"]), float(scenario.scene.radius[0])
-    height = played.curves(lambda each: each.position[:, 0, 1])
+    played = Simulation.by(scenario, METHODS, k)
+    steps = np.array([scenario.dt(each) for each in STEPS])
+    errors = swept(
+        1e3 * steps,
+        [Simulation.by(scenario, METHODS, each) for each in STEPS],
+        lambda each, scene: farthest(each, played.truth, scene).max(),
+    )
+    dt, radius = scenario.dt(k), float(scenario.scene.radius[0])
     guides = [("x", 1e3 * dt, "here")]
     if speed * scenario.dt(STEPS[-1]) > radius:
         guides.append(("x", 1e3 * radius / speed, "v dt = R"))
     return Shown(
         [
-            LessonChart("Height", "time in s", "y in m", height),
+            played.over_time("Height", "y in m", lambda each: each.position[:, 0, 1]),
             LessonChart("Distance from the exact answer", "time in s", "m", played.errors()),
             LessonChart(
                 f"Largest error in {number(scenario.duration)} s, against the step",
@@ -81,7 +78,7 @@ def show_particle(settings: Settings) -> Shown:
                 for curve in played.errors()
             ),
         ],
-        claims(played),
+        list(claims(played)),
     )
 
 
@@ -90,102 +87,93 @@ def way_of(played: Simulation) -> float:
     return float(np.hypot(*played.scenario.scene.velocity[0])) * played.runs[0].dt
 
 
-def without_force(played: Simulation) -> list[Claim]:
+def without_force(played: Simulation) -> Iterator[Claim]:
     """Exact flight, and a bounce that is found up to one step late."""
-    assert played.truth is not None
     way = way_of(played)
     bounces = np.searchsorted(played.truth.collisions.t, played.truth.t, side="right")
     speed = float(np.hypot(*played.scenario.scene.velocity[0]))
     mm = number(1e3 * way)
-    return [
-        Claim(
-            f"Here v = {number(speed)} m/s. Until the first bounce both methods are exact: without"
-            " a force, v dt is the whole motion of a step.",
-            lambda shown: all(shown.y(name, 1)[bounces == 0].max() < ROUNDING for name in METHODS),
+    yield Claim(
+        f"Here v = {number(speed)} m/s. Until the first bounce both methods are exact: without"
+        " a force, v dt is the whole motion of a step.",
+        lambda shown: all(shown.y(name, 1)[bounces == 0].max() < ROUNDING for name in METHODS),
+    )
+    yield Claim(
+        "A bounce is found at the end of a step, up to dt late. reference:exercise then moves"
+        f" the particle back to the wall and loses up to v dt = {mm} mm at each bounce."
+        " reference:lesson does not move it back and loses up to 2 v dt.",
+        lambda shown: all(
+            (shown.y(name, 1) <= each * way * bounces + ROUNDING).all()
+            for name, each in (("reference:exercise", 1), ("reference:lesson", 2))
         ),
-        Claim(
-            "A bounce is found at the end of a step, up to dt late. reference:exercise then moves"
-            f" the particle back to the wall and loses up to v dt = {mm} mm at each bounce."
-            " reference:lesson does not move it back and loses up to 2 v dt.",
-            lambda shown: all(
-                (shown.y(name, 1) <= each * way * bounces + ROUNDING).all()
-                for name, each in (("reference:exercise", 1), ("reference:lesson", 2))
-            ),
-        ),
-        Claim(
-            "A smaller step has a smaller error, with both methods.",
-            lambda shown: all((np.diff(shown.y(name, 2)) > 0).all() for name in METHODS),
-        ),
-    ]
+    )
+    yield Claim(
+        "A smaller step has a smaller error, with both methods.",
+        lambda shown: all((np.diff(shown.y(name, 2)) > 0).all() for name in METHODS),
+    )
 
 
-def with_gravity(played: Simulation) -> list[Claim]:
+def with_gravity(played: Simulation) -> Iterator[Claim]:
     """Two orders of the same two lines."""
-    assert played.truth is not None
     g = float(np.hypot(*played.scenario.scene.gravity))
     gain = g * played.runs[0].dt  # m/s in a step
     flight = played.truth.t < played.first_collision
     offset = gain * played.truth.t[flight] / 2
     late = 1e3 * offset[-1]
-    return [
-        Claim(
-            f"Here g = {number(g)} m/s². Until the first bounce explicit Euler (reference:lesson)"
-            f" is g dt t / 2 above the exact parabola, {number(late)} mm at t ="
-            f" {number(float(played.truth.t[flight][-1]))} s, the last sample before it. Symplectic"
-            " Euler (reference:exercise) is as far below it.",
-            lambda shown: all(
-                np.abs(above(shown, name)[flight] - sign * offset).max() < ROUNDING
-                for name, sign in (("reference:lesson", 1), ("reference:exercise", -1))
-            ),
+    yield Claim(
+        f"Here g = {number(g)} m/s². Until the first bounce explicit Euler (reference:lesson)"
+        f" is g dt t / 2 above the exact parabola, {number(late)} mm at t ="
+        f" {number(float(played.truth.t[flight][-1]))} s, the last sample before it. Symplectic"
+        " Euler (reference:exercise) is as far below it.",
+        lambda shown: all(
+            np.abs(above(shown, name)[flight] - sign * offset).max() < ROUNDING
+            for name, sign in (("reference:lesson", 1), ("reference:exercise", -1))
         ),
-        Claim(
-            "Explicit Euler rises higher than the exact answer, symplectic Euler less high.",
-            lambda shown: (
-                shown.y("reference:lesson").max()
-                > shown.y(TRUTH).max()
-                > shown.y("reference:exercise").max()
-            ),
+    )
+    yield Claim(
+        "Explicit Euler rises higher than the exact answer, symplectic Euler less high.",
+        lambda shown: (
+            shown.y("reference:lesson").max()
+            > shown.y(TRUTH).max()
+            > shown.y("reference:exercise").max()
         ),
-        Claim(
-            f"From the largest step to the smallest, {STEPS[0] // STEPS[-1]} times smaller, both"
-            " errors fall to less than a tenth. Not every halving of the step reduces the error,"
-            " because the detection delay of a bounce depends on where in a step it happens.",
-            lambda shown: (
-                all(10 * shown.y(name, 2)[0] < shown.y(name, 2)[-1] for name in METHODS)
-                and any((np.diff(shown.y(name, 2)) < 0).any() for name in METHODS)
-            ),
+    )
+    yield Claim(
+        f"From the largest step to the smallest, {STEPS[0] // STEPS[-1]} times smaller, both"
+        " errors fall to less than a tenth. Not every halving of the step reduces the error,"
+        " because the detection delay of a bounce depends on where in a step it happens.",
+        lambda shown: (
+            all(10 * shown.y(name, 2)[0] < shown.y(name, 2)[-1] for name in METHODS)
+            and any((np.diff(shown.y(name, 2)) < 0).any() for name in METHODS)
         ),
-    ]
+    )
 
 
-def tunnelling(played: Simulation) -> list[Claim]:
+def tunnelling(played: Simulation) -> Iterator[Claim]:
     """A wall acts on what overlaps it at the end of a step."""
     way, radius = way_of(played), float(played.scenario.scene.radius[0])
     apart = f"A step moves the particle by v dt = {number(way)} m; its radius is R = {radius} m."
     low, high = 1 - radius, 11 + radius  # m, where the walls are
     if way <= radius:
-        return [
-            Claim(
-                f"{apart} No step can carry the centre from outside the reach of a wall to behind"
-                " it, and both methods stay between the walls.",
-                lambda shown: all(
-                    low < shown.y(name).min() and shown.y(name).max() < high for name in METHODS
-                ),
-            )
-        ]
-    return [
-        Claim(
-            f"{apart} A step can carry the centre across a wall without an end of a step at which"
-            " the wall is touched from inside. That is tunnelling: both methods leave the box.",
+        yield Claim(
+            f"{apart} No step can carry the centre from outside the reach of a wall to behind"
+            " it, and both methods stay between the walls.",
             lambda shown: all(
-                shown.y(name).min() < low or shown.y(name).max() > high for name in METHODS
+                low < shown.y(name).min() and shown.y(name).max() < high for name in METHODS
             ),
+        )
+        return
+    yield Claim(
+        f"{apart} A step can carry the centre across a wall without an end of a step at which"
+        " the wall is touched from inside. That is tunnelling: both methods leave the box.",
+        lambda shown: all(
+            shown.y(name).min() < low or shown.y(name).max() > high for name in METHODS
         ),
-        Claim(
-            "The exact answer stays between the walls.",
-            lambda shown: low < shown.y(TRUTH).min() and shown.y(TRUTH).max() < high,
-        ),
-    ]
+    )
+    yield Claim(
+        "The exact answer stays between the walls.",
+        lambda shown: low < shown.y(TRUTH).min() and shown.y(TRUTH).max() < high,
+    )
 
 
 def above(shown: Shown, name: str) -> Array:
@@ -198,7 +186,7 @@ class Part(NamedTuple):
 
     speed: float
     gravity: float
-    claims: Callable[[Simulation], list[Claim]]
+    claims: Callable[[Simulation], Iterator[Claim]]
 
 
 PARTS = {
@@ -213,20 +201,16 @@ PARTICLE = Lesson(
     number="1",
     title="A particle and its step",
     asks="How wrong does a particle get when time goes in steps?",
-    text=(
-        (
-            "A particle is a position, a velocity and a radius. A step of <code>dt</code> moves it"
-            " by <code>v dt</code>. The particle bounces between two walls: at a wall its velocity"
-            " is reversed."
-        ),
-        (
-            "Then a force acts. <b>Explicit Euler</b> (<code>reference:lesson</code>) moves with"
-            " the old velocity and then changes it. <b>Symplectic Euler</b>"
-            " (<code>reference:exercise</code>) changes the velocity first and moves with the new"
-            " one. In the last part a step may be longer than the radius of the particle. Then it"
-            " may pass through a wall: this is <b>tunnelling</b>."
-        ),
-    ),
+    text="""
+    A particle is a position, a velocity and a radius. A step of <code>dt</code> moves it by
+    <code>v dt</code>. The particle bounces between two walls: at a wall its velocity is
+    reversed.
+
+    Then a force acts. <b>Explicit Euler</b> (<code>reference:lesson</code>) moves with the old
+    velocity and then changes it. <b>Symplectic Euler</b> (<code>reference:exercise</code>)
+    changes the velocity first and moves with the new one. In the last part a step may be longer
+    than the radius of the particle. Then it may pass through a wall: this is <b>tunnelling</b>.
+    """,
     sliders=(
         Slider("part", "Part of the lesson", tuple(PARTS)),
         time_step(1 / 8, STEPS, STEPS.index(4)),

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from adapters.engines import ENGINES
-from reports.lessons.lesson import (
-    Claim,
-    Lesson,
-    LessonChart,
-    Settings,
-    Shown,
-    Simulation,
-    Slider,
-    time_step,
-)
+from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, time_step
 from reports.page.style import TRUTH, number
 from scenarios.families.exercise import ship_thrust
 from scenarios.model import Scenario, Thrust, Trajectory
@@ -40,7 +31,7 @@ def thrust_ship(acceleration: float) -> Scenario:
     )
 
 
-THRUST_NAMES = (
+NAMES = (
     "reference:exercise",
     "reference:lesson",
     "pymunk:matched",
@@ -50,93 +41,80 @@ THRUST_NAMES = (
 )
 
 
-def show_thrust(settings: Settings) -> Shown:
+def show_thrust(k: int, a: float) -> Shown:
     """Which engines are ahead of the parabola and which are behind, and the formula for it."""
-    acceleration = settings["a"]
-    scenario = thrust_ship(acceleration)
-    shown = Simulation.by(scenario, THRUST_NAMES, settings["k"])
-    assert shown.truth is not None
-    exact, dt = shown.truth, shown.scenario.dt(settings["k"])
+    scenario = thrust_ship(a)
+    played = Simulation.by(scenario, NAMES, k)
+    exact, dt = played.truth, scenario.dt(k)
 
     def ahead(each: Trajectory) -> np.ndarray:
         return 1e3 * (each.position[:, 0, 0] - exact.position[: len(each), 0, 0])
 
     seconds = min(exact.t[-1], STOP) - START
     laws = {
-        run.name: 1e3 * (ENGINES[run.name].alpha - 0.5) * acceleration * dt * seconds
-        for run in shown.runs
+        run.name: 1e3 * (ENGINES[run.name].alpha - 0.5) * a * dt * seconds
+        for run in played.runs
         if run.status == "ok"
     }
     return Shown(
         [
-            LessonChart("Ahead of the exact answer", "time in s", "mm", shown.curves(ahead)),
-            LessonChart(
-                "Velocity", "time in s", "m/s", shown.curves(lambda each: each.velocity[:, 0, 0])
-            ),
+            played.over_time("Ahead of the exact answer", "mm", ahead),
+            played.over_time("Velocity", "m/s", lambda each: each.velocity[:, 0, 0]),
         ],
-        shown.film,
+        played.film,
         [
             (f"{name}, α = {number(ENGINES[name].alpha)}", f"(α − ½) a dt T = {number(law)} mm")
             for name, law in laws.items()
         ],
-        thrust_claims(laws),
+        list(thrust_claims(laws)),
     )
 
 
-def thrust_claims(laws: Mapping[str, float]) -> list[Claim]:
+def thrust_claims(laws: Mapping[str, float]) -> Iterator[Claim]:
     """The effect of the order of a step on the position, and none on the velocity; laws: engine ->
     mm that it ends ahead."""
     # Box2D's float32 rounds a place of up to 16 m by 1 um in each of up to 1024 steps, and seldom
     # up as often as down.
     place, speed = 0.2, 3e-5  # mm, m/s
 
-    def coasts(shown: Shown, name: str) -> bool:
-        after = shown.y(name)[shown.x(name) >= STOP]
-        return bool(np.ptp(after) <= place)
+    def grows_and_stays(shown: Shown, name: str, law: float) -> bool:
+        t, y = shown.x(name), shown.y(name)
+        middle = y[np.searchsorted(t, (START + STOP) / 2)]  # half of what the law says
+        return bool(
+            np.abs(y[t <= START]).max() <= place
+            and abs(middle - law / 2) <= place + 1e-3 * abs(law)
+            and np.ptp(y[t >= STOP]) <= place
+        )
 
-    return [
-        Claim(
-            "After a thrust of T seconds every engine that plays to the end is (α − ½) a dt T"
-            " ahead of the exact answer, or behind it where this is negative. The table below has"
-            " the numbers. Box2D, which computes in single precision, agrees with this formula"
-            f" within {place} mm, all others to rounding.",
-            lambda shown: all(
-                abs(shown.y(name)[-1] - law) <= (place if "box2d" in name else 1e-9)
-                for name, law in laws.items()
-            ),
+    yield Claim(
+        "After a thrust of T seconds every engine that plays to the end is (α − ½) a dt T ahead of"
+        " the exact answer, or behind it where this is negative. The table below has the numbers."
+        " Box2D, which computes in single precision, agrees with this formula within"
+        f" {place} mm, all others to rounding.",
+        lambda shown: all(
+            abs(shown.y(name)[-1] - law) <= (place if "box2d" in name else 1e-9)
+            for name, law in laws.items()
         ),
-        Claim(
-            "The offset grows while the force acts, from 0.5 s to 2.5 s. Then the ship coasts and"
-            " the offset stays.",
-            lambda shown: all(
-                abs(shown.y(name)[shown.x(name) <= START]).max() <= place
-                and coasts(shown, name)
-                and grows(shown, name, law)
-                for name, law in laws.items()
-                if law
-            ),
+    )
+    yield Claim(
+        "The offset grows while the force acts, from 0.5 s to 2.5 s. Then the ship coasts and the"
+        " offset stays.",
+        lambda shown: all(grows_and_stays(shown, name, law) for name, law in laws.items() if law),
+    )
+    yield Claim(
+        f"All engines agree on the velocity, within {number(speed)} m/s.",
+        lambda shown: all(shown.gap(name, chart=1) <= speed for name in laws),
+    )
+    yield Claim(
+        "The engines with α = 1 end ahead of the exact answer. Those with α = 0 end as far behind"
+        " it.",
+        lambda shown: all(
+            abs(shown.y(name)[-1] + (1 - 2 * ENGINES[name].alpha) * abs(law)) <= place
+            and np.sign(shown.y(name)[-1]) == np.sign(law)
+            for name, law in laws.items()
+            if ENGINES[name].alpha in (0.0, 1.0)
         ),
-        Claim(
-            f"All engines agree on the velocity, within {number(speed)} m/s.",
-            lambda shown: all(shown.gap(name, chart=1) <= speed for name in laws),
-        ),
-        Claim(
-            "The engines with α = 1 end ahead of the exact answer. Those with α = 0 end as far"
-            " behind it.",
-            lambda shown: all(
-                abs(shown.y(name)[-1] + (1 - 2 * ENGINES[name].alpha) * abs(law)) <= place
-                and np.sign(shown.y(name)[-1]) == np.sign(law)
-                for name, law in laws.items()
-                if ENGINES[name].alpha in (0.0, 1.0)
-            ),
-        ),
-    ]
-
-
-def grows(shown: Shown, name: str, law: float) -> bool:
-    """Whether the offset is half of what the law says in the middle of the thrust."""
-    middle = shown.y(name)[np.searchsorted(shown.x(name), (START + STOP) / 2)]
-    return bool(abs(middle - law / 2) <= 0.2 + 1e-3 * abs(law))
+    )
 
 
 THRUST = Lesson(
@@ -144,18 +122,16 @@ THRUST = Lesson(
     number="2",
     title="Force and thrust",
     asks="Does a force move the ship equally far in every engine?",
-    text=(
-        (
-            "A force changes the velocity by <code>F/m dt</code> in a step. How far the ship moves"
-            " depends on the order of updates in a step. Write the step as <code>x' = x + v dt + α"
-            " a dt²</code>: velocity first is <code>α = 1</code>, position first is <code>α ="
-            " 0</code>, the exact parabola is <code>α = ½</code>. [order] shows this for gravity."
-        ),
-    ),
+    text="""
+    A force changes the velocity by <code>F/m dt</code> in a step. How far the ship moves
+    depends on the order of updates in a step. Write the step as <code>x' = x + v dt + α a
+    dt²</code>: velocity first is <code>α = 1</code>, position first is <code>α = 0</code>, the
+    exact parabola is <code>α = ½</code>. [order] shows this for gravity.
+    """,
     sliders=(
         time_step(1 / 16, (16, 8, 4, 2, 1), 3),
         Slider("a", "Acceleration a", (0.25, 1.0, 4.0), 0, "m/s²"),
     ),
-    names=(*THRUST_NAMES, TRUTH),
+    names=(*NAMES, TRUTH),
     show=show_thrust,
 )

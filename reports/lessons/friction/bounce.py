@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +13,10 @@ from reports.lessons.lesson import (
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Simulation,
     Slider,
+    tidy,
 )
 from reports.page.style import TRUTH, number
 from scenarios.model import Array, Scene
@@ -37,39 +37,55 @@ SINGLE = 1e-4
 SHORT = 0.02 / 3
 
 
-class Law(NamedTuple):
-    """Coulomb's law in this bounce: N s that end 1 m/s of slip, the normal impulse, N s, and the
-    edge of the cone, N s."""
+class FloorBounce(NamedTuple):
+    """The settings, N s that end 1 m/s of slip, and the exact normal impulse, N s."""
 
+    e: float
+    mu: float
+    angle: float
+    spin: float
     weight: float
     normal: float
-    edge: float
+
+    @property
+    def edge(self) -> float:
+        """N s, of the cone by Coulomb's law."""
+        return self.mu * self.normal
+
+    @property
+    def slip(self) -> float:
+        """m/s of the point that touches, before it."""
+        return float(slip_at(self.angle, self.spin))
 
 
-def show_bounce(settings: Settings) -> Shown:
+def show_bounce(e: float, mu: float, angle: float, spin: float) -> Shown:
     """The impulse in its cone; the friction impulse and the spin at every angle."""
-    e, mu, spin = settings["e"], settings["mu"], settings["spin"]
-    along = speed_along(settings["angle"])
-    here = Simulation.by(thrown(along, spin, e, mu), NAMES, 1)
+    here = Simulation.by(thrown(speed_along(angle), spin, e, mu), NAMES, 1)
     scene, impulses = here.scenario.scene, taken_by(here)
-    normal = float(impulses[TRUTH].normal[0])
     weight = 1 / float(1 / scene.mass[0] + scene.radius[0] ** 2 / scene.inertia[0])
-    law = Law(weight, normal, mu * normal)
-    angles = angles_of(law, spin)
-    swept = taken_by(Simulation.by(thrown(speed_along(angles), spin, e, mu), NAMES, 1))
+    bounce = FloorBounce(e, mu, angle, spin, weight, float(impulses[TRUTH].normal[0]))
+    angles = angles_of(bounce)
+    at_angles = taken_by(Simulation.by(thrown(speed_along(angles), spin, e, mu), NAMES, 1))
+    edges = [Curve(CONE, angles, np.full(len(angles), side * bounce.edge)) for side in (-1.0, 1.0)]
+    frictions = [Curve(name, angles, each.along) for name, each in at_angles.items()]
+    spins = [
+        Curve(name, angles, spin + each.turning / scene.inertia[0])
+        for name, each in at_angles.items()
+    ]
+    incidence, mark = "angle of incidence from the normal in degrees", [("x", angle, "here")]
     return Shown(
         [
-            cone_chart(impulses, law),
-            friction_chart(angles, swept, law, settings["angle"]),
-            spin_chart(angles, swept, spin, float(scene.inertia[0]), settings["angle"]),
+            cone_chart(impulses, bounce),
+            LessonChart("Friction impulse", incidence, "Jₜ in N s", [*edges, *frictions], "", mark),
+            LessonChart("Spin after the bounce", incidence, "ω in rad/s", spins, "", mark),
         ],
         here.film,
         [
             ("exact answer" if name == TRUTH else name, left_with(each, scene))
             for name, each in impulses.items()
         ],
-        bounce_claims(settings, law, angles),
-        in_numbers(settings, law, float(impulses[TRUTH].along[0])),
+        list(bounce_claims(bounce, angles)),
+        in_numbers(bounce, float(impulses[TRUTH].along[0])),
     )
 
 
@@ -83,9 +99,10 @@ def slip_at(angle: Array | float, spin: float) -> Array:
     return speed_along(angle) + RADIUS * spin
 
 
-def angles_of(law: Law, spin: float) -> Array:
+def angles_of(bounce: FloorBounce) -> Array:
     """(k,) degrees from 0 to `STEEPEST`, among them those where sticking ends."""
-    limits = (np.array([-1.0, 1.0]) * law.edge / law.weight - RADIUS * spin) / FALL
+    ends = np.array([-1.0, 1.0]) * bounce.edge / bounce.weight  # m/s of slip
+    limits = (ends - RADIUS * bounce.spin) / FALL
     edges = np.degrees(np.arctan(limits))
     inside = edges[(edges > 0) & (edges < STEEPEST)]
     return np.unique(np.append(np.linspace(0.0, STEEPEST, 11), inside))
@@ -93,17 +110,16 @@ def angles_of(law: Law, spin: float) -> Array:
 
 def taken_by(played: Simulation) -> dict[str, Taken]:
     """What each engine gave the disks; the exact values come last."""
-    assert played.truth is not None
     scene = played.scenario.scene
-    found = {run.name: taken(run.trajectory, scene) for run in played.runs if run.trajectory}
-    return found | {TRUTH: taken(played.truth, scene)}
+    return {name: taken(motion, scene) for name, motion in played.motions.items()}
 
 
-def cone_chart(impulses: Mapping[str, Taken], law: Law) -> LessonChart:
+def cone_chart(impulses: Mapping[str, Taken], bounce: FloorBounce) -> LessonChart:
     """The impulse of each as a line from the origin, between the edges of the cone."""
-    edges = Curve(CONE, [-law.edge, 0.0, law.edge], [law.normal, 0.0, law.normal])
+    x, y = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 0.0, 1.0])
+    edges = Curve(CONE, bounce.edge * x, bounce.normal * y)
     lines = [
-        Curve(name, [0.0, each.along[0]], [0.0, each.normal[0]], dots=True)
+        Curve(name, np.append(0.0, each.along), np.append(0.0, each.normal), dots=True)
         for name, each in impulses.items()
     ]
     return LessonChart(
@@ -114,154 +130,109 @@ def cone_chart(impulses: Mapping[str, Taken], law: Law) -> LessonChart:
     )
 
 
-def friction_chart(angles: Array, swept: Mapping[str, Taken], law: Law, here: float) -> LessonChart:
-    """The friction impulse at every angle, between the edges of the cone."""
-    edges = [Curve(CONE, angles, np.full(len(angles), side * law.edge)) for side in (-1.0, 1.0)]
-    return LessonChart(
-        "Friction impulse",
-        "angle of incidence from the normal in degrees",
-        "Jₜ in N s",
-        [*edges, *(Curve(name, angles, each.along) for name, each in swept.items())],
-        guides=[("x", here, "here")],
-    )
-
-
-def spin_chart(
-    angles: Array, swept: Mapping[str, Taken], spin: float, inertia: float, here: float
-) -> LessonChart:
-    """The spin after the bounce at every angle."""
-    return LessonChart(
-        "Spin after the bounce",
-        "angle of incidence from the normal in degrees",
-        "ω in rad/s",
-        [Curve(name, angles, spin + each.turning / inertia) for name, each in swept.items()],
-        guides=[("x", here, "here")],
-    )
-
-
 def left_with(each: Taken, scene: Scene) -> str:
     """Velocity along the floor and spin after the bounce."""
     along = scene.velocity[0, 0] + each.along[0] / scene.mass[0]
     spin = scene.angular_velocity[0] + each.turning[0] / scene.inertia[0]
-    return f"leaves at {tidy(along)} m/s along the floor with {tidy(spin)} rad/s"
+    return (
+        f"leaves at {tidy(along, SINGLE, 4)} m/s along the floor with {tidy(spin, SINGLE, 4)} rad/s"
+    )
 
 
-def tidy(value: float) -> str:
-    """To four digits; a number that is 0 except for rounding is shown as 0."""
-    return number(value, 4) if abs(value) > SINGLE else "0"
-
-
-def in_numbers(settings: Settings, law: Law, friction: float) -> list[tuple[str, str]]:
+def in_numbers(bounce: FloorBounce, friction: float) -> dict[str, str]:
     """Slip, normal impulse, cone and friction impulse, with the numbers of this bounce."""
-    along, spin = float(speed_along(settings["angle"])), settings["spin"]
-    slip = float(slip_at(settings["angle"], spin))
-    return [
-        (
-            "Slip",
-            f"vₜ + R ω = {tidy(along)} + {number(RADIUS)} · {number(spin)} = {tidy(slip)} m/s",
-        ),
-        (
-            "Normal impulse",
-            f"Jₙ = (1 + e) m vₙ = {number(1 + settings['e'])} · 1 · {number(FALL)} ="
-            f" {number(law.normal)} N s",
-        ),
-        (
-            "To stick",
-            f"|slip| / (1/m + R²/I) = {tidy(abs(slip))} / {number(1 / law.weight)} ="
-            f" {tidy(abs(slip) * law.weight)} N s would end the slip",
-        ),
-        (
-            "Cone",
-            f"µ Jₙ = {number(settings['mu'])} · {number(law.normal)} = {number(law.edge)} N s",
-        ),
-        (
-            "Friction impulse",
-            f"the smaller of these two, against the slip: Jₜ = {tidy(friction)} N s; it changes"
-            " vₜ by Jₜ/m and ω by R Jₜ/I",
-        ),
-    ]
-
-
-def bounce_claims(settings: Settings, law: Law, angles: Array) -> list[Claim]:
-    """When the contact sticks, which engines have the exact answer, and what the others do."""
-    slips = slip_at(angles, settings["spin"])
-    exact = friction_kick(slips, 1 / law.weight, np.asarray(law.edge))
-    return [
-        Claim(
-            f"The normal impulse is (1 + e) m vₙ = {number(law.normal)} N s in every engine. At"
-            f" every angle the cone is equally wide, µ Jₙ = {number(law.edge)} N s to each side.",
-            lambda shown: (
-                all(abs(shown.y(name)[-1] - law.normal) <= SINGLE for name in (*NAMES, TRUTH))
-                and np.ptp(shown.y(CONE, 1)) == 0.0
-                and abs(abs(shown.y(CONE, 1)[0]) - law.edge) <= DOUBLE
-            ),
-        ),
-        *claims_here(float(slip_at(settings["angle"], settings["spin"])), settings["spin"], law),
-        Claim(
-            "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
-            f" {number(law.edge / law.weight)} m/s. There the exact friction impulse is in"
-            " proportion to the slip. Where the slip is larger the impulse stays on the edge of"
-            " the cone.",
-            lambda shown: np.abs(shown.y(TRUTH, 1) - exact).max() <= DOUBLE,
-        ),
-        Claim(
-            f"{', '.join(EXACT[:-1])} and {EXACT[-1]} have the exact friction impulse and the exact"
-            " spin at every angle, to rounding.",
-            lambda shown: all(
-                shown.gap(name, chart=1) <= DOUBLE and shown.gap(name, chart=2) <= 32 * DOUBLE
-                for name in EXACT
-            ),
-        ),
-        Claim(
-            f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
-            f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
-            " friction impulse should change it.",
-            lambda shown: turned_short(shown, settings["spin"]),
-        ),
-        cone_of_v3(settings["e"], settings["mu"]),
-    ]
-
-
-def claims_here(slip: float, spin: float, law: Law) -> list[Claim]:
-    """Whether the contact of the replay sticks or slips."""
-    need = abs(slip) * law.weight
-    if need <= DOUBLE and not spin:
-        return [
-            Claim(
-                "Here the disk falls straight and does not spin: nothing slides, and no engine"
-                " gives a friction impulse.",
-                lambda shown: all(abs(shown.x(name)[-1]) <= SINGLE for name in (*NAMES, TRUTH)),
-            )
-        ]
-    if need <= DOUBLE:
-        return [
-            Claim(
-                "Here the point that touches is at rest, as that of a wheel that rolls: the exact"
-                f" friction impulse is 0. {BOX2D} gives one, because it takes the slip of a point"
-                " above the one that touches, and that point moves.",
-                lambda shown: (
-                    abs(shown.x(TRUTH)[-1]) <= DOUBLE and abs(shown.x(BOX2D)[-1]) > 100 * SINGLE
-                ),
-            )
-        ]
-    if need <= law.edge:
-        return [
-            Claim(
-                f"Here the contact sticks: {number(need, 4)} N s end the slip, and the cone allows"
-                f" {number(law.edge, 4)} N s. The exact impulse lies within the cone.",
-                lambda shown: (
-                    abs(abs(shown.x(TRUTH)[-1]) - need) <= DOUBLE
-                    and abs(shown.x(TRUTH)[-1]) <= shown.x(CONE)[-1] + DOUBLE
-                ),
-            )
-        ]
-    return [
-        Claim(
-            f"Here the contact slips: {number(need, 4)} N s would end the slip, and the cone allows"
-            f" only {number(law.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
-            lambda shown: abs(abs(shown.x(TRUTH)[-1]) - shown.x(CONE)[-1]) <= DOUBLE,
+    along, slip, size, need, found = (
+        tidy(float(value), SINGLE, 4)
+        for value in (
+            speed_along(bounce.angle),
+            bounce.slip,
+            abs(bounce.slip),
+            abs(bounce.slip) * bounce.weight,
+            friction,
         )
-    ]
+    )
+    return {
+        "Slip": f"vₜ + R ω = {along} + {number(RADIUS)} · {number(bounce.spin)} = {slip} m/s",
+        "Normal impulse": f"Jₙ = (1 + e) m vₙ = {number(1 + bounce.e)} · 1 · {number(FALL)} ="
+        f" {number(bounce.normal)} N s",
+        "To stick": f"|slip| / (1/m + R²/I) = {size} / {number(1 / bounce.weight)} = {need} N s"
+        " would end the slip",
+        "Cone": f"µ Jₙ = {number(bounce.mu)} · {number(bounce.normal)} = {number(bounce.edge)} N s",
+        "Friction impulse": f"the smaller of these two, against the slip: Jₜ = {found} N s; it"
+        " changes vₜ by Jₜ/m and ω by R Jₜ/I",
+    }
+
+
+def bounce_claims(bounce: FloorBounce, angles: Array) -> Iterator[Claim]:
+    """When the contact sticks, which engines have the exact answer, and what the others do."""
+    slips = slip_at(angles, bounce.spin)
+    exact = friction_kick(slips, 1 / bounce.weight, np.asarray(bounce.edge))
+    yield Claim(
+        f"The normal impulse is (1 + e) m vₙ = {number(bounce.normal)} N s in every engine. At"
+        f" every angle the cone is equally wide, µ Jₙ = {number(bounce.edge)} N s to each side.",
+        lambda shown: (
+            all(abs(shown.y(name)[-1] - bounce.normal) <= SINGLE for name in (*NAMES, TRUTH))
+            and np.ptp(shown.y(CONE, 1)) == 0.0
+            and abs(abs(shown.y(CONE, 1)[0]) - bounce.edge) <= DOUBLE
+        ),
+    )
+    yield claim_here(bounce)
+    yield Claim(
+        "The contact sticks where |vₜ + R ω| is at most (1 + m R²/I) µ (1 + e) vₙ ="
+        f" {number(bounce.edge / bounce.weight)} m/s. There the exact friction impulse is in"
+        " proportion to the slip. Where the slip is larger the impulse stays on the edge of the"
+        " cone.",
+        lambda shown: shown.follows(TRUTH, exact, DOUBLE, chart=1),
+    )
+    yield Claim(
+        f"{', '.join(EXACT[:-1])} and {EXACT[-1]} have the exact friction impulse and the exact"
+        " spin at every angle, to rounding.",
+        lambda shown: all(
+            shown.gap(name, chart=1) <= DOUBLE and shown.gap(name, chart=2) <= 32 * DOUBLE
+            for name in EXACT
+        ),
+    )
+    yield Claim(
+        f"{BOX2D} turns the disk as if friction acted {number(1e3 * SHORT, 2)} mm above the"
+        f" floor: its spin changes by {number(100 * SHORT / RADIUS, 2)} % less than its own"
+        " friction impulse should change it.",
+        lambda shown: turned_short(shown, bounce.spin),
+    )
+    yield cone_of_v3(bounce.e, bounce.mu)
+
+
+def claim_here(bounce: FloorBounce) -> Claim:
+    """Whether the contact of the replay sticks or slips."""
+    need = abs(bounce.slip) * bounce.weight
+    if need <= DOUBLE and not bounce.spin:
+        return Claim(
+            "Here the disk falls straight and does not spin: nothing slides, and no engine"
+            " gives a friction impulse.",
+            lambda shown: all(abs(shown.x(name)[-1]) <= SINGLE for name in (*NAMES, TRUTH)),
+        )
+    if need <= DOUBLE:
+        return Claim(
+            "Here the point that touches is at rest, as that of a wheel that rolls: the exact"
+            f" friction impulse is 0. {BOX2D} gives one, because it takes the slip of a point"
+            " above the one that touches, and that point moves.",
+            lambda shown: (
+                abs(shown.x(TRUTH)[-1]) <= DOUBLE and abs(shown.x(BOX2D)[-1]) > 100 * SINGLE
+            ),
+        )
+    if need <= bounce.edge:
+        return Claim(
+            f"Here the contact sticks: {number(need, 4)} N s end the slip, and the cone allows"
+            f" {number(bounce.edge, 4)} N s. The exact impulse lies within the cone.",
+            lambda shown: (
+                abs(abs(shown.x(TRUTH)[-1]) - need) <= DOUBLE
+                and abs(shown.x(TRUTH)[-1]) <= shown.x(CONE)[-1] + DOUBLE
+            ),
+        )
+    return Claim(
+        f"Here the contact slips: {number(need, 4)} N s would end the slip, and the cone allows"
+        f" only {number(bounce.edge, 4)} N s. The exact impulse lies on the edge of the cone.",
+        lambda shown: abs(abs(shown.x(TRUTH)[-1]) - shown.x(CONE)[-1]) <= DOUBLE,
+    )
 
 
 def turned_short(shown: Shown, spin: float) -> bool:
@@ -300,23 +271,19 @@ BOUNCE = Lesson(
     number="9.1",
     title="Spin and friction in a bounce",
     asks="What does friction do to speed and spin in a bounce?",
-    text=(
-        (
-            "A disk meets a floor. The normal passes through its centre, so the normal impulse"
-            " <code>Jₙ</code> does not turn the disk. The friction impulse <code>Jₜ</code> acts"
-            " along the floor and does not change how fast the disk leaves it. The two decouple:"
-            " <code>Jₙ = (1 + e) m vₙ</code> is that of a bounce without friction, and friction"
-            " acts on the <b>slip</b> <code>vₜ + R ω</code>, the velocity of the point that"
-            " touches."
-        ),
-        (
-            "Friction acts against the slip. An impulse of <code>|slip| / (1/m + R²/I)</code> ends"
-            " it: the contact <b>sticks</b>. Coulomb's law allows at most <code>µ Jₙ</code>, the"
-            " edge of the <b>friction cone</b>. If that does not end the slip, the contact"
-            " <b>slips</b> until the disk leaves. See [cone] and [lever] for why Box2D differs, and"
-            " [rolling] for a contact that lasts."
-        ),
-    ),
+    text="""
+    A disk meets a floor. The normal passes through its centre, so the normal impulse
+    <code>Jₙ</code> does not turn the disk. The friction impulse <code>Jₜ</code> acts along the
+    floor and does not change how fast the disk leaves it. The two decouple: <code>Jₙ = (1 + e)
+    m vₙ</code> is that of a bounce without friction, and friction acts on the <b>slip</b>
+    <code>vₜ + R ω</code>, the velocity of the point that touches.
+
+    Friction acts against the slip. An impulse of <code>|slip| / (1/m + R²/I)</code> ends it:
+    the contact <b>sticks</b>. Coulomb's law allows at most <code>µ Jₙ</code>, the edge of the
+    <b>friction cone</b>. If that does not end the slip, the contact <b>slips</b> until the disk
+    leaves. See [cone] and [lever] for why Box2D differs, and [rolling] for a contact that
+    lasts.
+    """,
     sliders=(
         Slider("e", "Restitution e", (0.0, 0.5, 1.0), 2),
         Slider("mu", "Friction µ", (0.1, 0.2, 0.5), 0),

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from reports.lessons.friction.thrown import FALL, ROUGH, ablated_runs, taken, thrown
+from reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
 from reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Slider,
+    swept,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import ABLATED, distances, filmed, lies_on
+from reports.lessons.mechanisms.ablation import ABLATED, distances, lies_on
 from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scene
+from scenarios.model import Array, Scene, Trajectory
 
 BOX2D_V3 = "box2d_v3:shipped"
 LIMITS = {"µ × whole impulse": True, "µ × impulse before restitution": False}
@@ -34,35 +34,34 @@ CARRIED = 2e-3
 FORESEEN, SUBSTEPS = 0.02, 4
 
 
-def show_cone(settings: Settings) -> Shown:
+def show_cone(limit: str, mu: float, k: int) -> Shown:
     """Friction over normal impulse, and the normal impulse, against e."""
-    mu, whole = settings["mu"], LIMITS[settings["limit"]]
-    found: dict[str, list[tuple[float, float]]] = {}
-    for e in STATED:
-        scenario = thrown(ALONG, 0.0, float(e), mu)
-        runs = ablated_runs(BOX2D_V3, {"rub_restituted": whole}, scenario, settings["k"])
-        for run in runs:
-            if run.trajectory is not None:
-                each = taken(run.trajectory, scenario.scene)
-                ratio = float(np.abs(each.along[0] / each.normal[0]))
-                found.setdefault(run.name, []).append((ratio, float(each.normal[0])))
-    exact = {TRUTH: [(mu, (1 + float(e)) * FALL) for e in STATED]}
-    curves = [
-        [
-            Curve(name, STATED, [row[part] for row in rows], dots=name != TRUTH)
-            for name, rows in (found | exact).items()
-        ]
-        for part in (0, 1)
+    whole = LIMITS[limit]
+    played = [
+        ablated_beside(BOX2D_V3, {"rub_restituted": whole}, thrown(ALONG, 0.0, float(e), mu), k)
+        for e in STATED
     ]
-    return Shown(
-        [
-            LessonChart("Friction over normal impulse", "restitution e", "Jₜ / Jₙ", curves[0]),
-            LessonChart("Normal impulse", "restitution e", "Jₙ in N s", curves[1]),
-        ],
-        filmed(scenario, runs),
-        [("replayed: e", number(float(STATED[-1]))), *distances(runs[:1], curves[0], "")],
-        cone_claims(mu, whole, scenario.dt(settings["k"]), scenario.scene),
+    chart = LessonChart(
+        "Friction over normal impulse",
+        "restitution e",
+        "Jₜ / Jₙ",
+        [*swept(STATED, played, friction_share), Curve(TRUTH, STATED, np.full(len(STATED), mu))],
     )
+    exact = Curve(TRUTH, STATED, (1 + STATED) * FALL)
+    normal = swept(STATED, played, lambda each, scene: taken(each, scene).normal[0])
+    last = played[-1]
+    return Shown(
+        [chart, LessonChart("Normal impulse", "restitution e", "Jₙ in N s", [*normal, exact])],
+        last.film,
+        [("replayed: e", number(float(STATED[-1]))), *distances(chart)],
+        list(cone_claims(mu, whole, last.runs[0].dt, last.scenario.scene)),
+    )
+
+
+def friction_share(played: Trajectory, scene: Scene) -> float:
+    """The friction impulse over the normal impulse."""
+    each = taken(played, scene)
+    return float(np.abs(each.along[0] / each.normal[0]))
 
 
 def share_of_v3(dt: float, scene: Scene) -> float:
@@ -77,7 +76,7 @@ def share_of_v3(dt: float, scene: Scene) -> float:
     return 1 - left / substep if left < substep and step + left < FORESEEN else 1.0
 
 
-def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> list[Claim]:
+def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> Iterator[Claim]:
     """The normal impulse, and the friction that each engine gives."""
     share = share_of_v3(dt, scene)
     narrow = mu / (1 + STATED) * np.where(STATED > 0, share, 1.0)
@@ -86,30 +85,28 @@ def cone_claims(mu: float, whole: bool, dt: float, scene: Scene) -> list[Claim]:
     def gives(name: str, law: Array) -> Callable[[Shown], np.bool_]:
         return lambda shown: np.abs(shown.y(name) / law - 1).max() <= CARRIED
 
-    return [
-        Claim(
-            "The normal impulse is right in every engine: (1 + e) m vₙ.",
-            lambda shown: all(
-                shown.gap(name, chart=1) <= 10 * SINGLE for name in (BOX2D_V3, ROUGH, ABLATED)
-            ),
+    yield Claim(
+        "The normal impulse is right in every engine: (1 + e) m vₙ.",
+        lambda shown: all(
+            shown.gap(name, chart=1) <= 10 * SINGLE for name in (BOX2D_V3, ROUGH, ABLATED)
         ),
-        Claim(
-            f"The exact friction impulse is µ = {number(mu)} of the normal impulse at every e."
-            f" {ROUGH} gives it.",
-            # Velocities of 8 m/s that float64 rounds a few times.
-            lambda shown: shown.gap(ROUGH) <= 1e-13 and np.ptp(shown.y(TRUTH)) == 0.0,
-        ),
-        foreseen_claim(gives(BOX2D_V3, narrow), share, dt),
-        Claim(
-            "The ablated reference has all other mechanisms of Box2D 3.1, and gives the exact"
-            " friction at every e."
-            if whole
-            else "The ablated reference now gives what Box2D 3.1 gives: that friction does not act"
-            " after restitution is the whole cause.",
-            gives(ABLATED, ablated),
-        ),
-        lies_on(BOX2D_V3, not whole, SINGLE),
-    ]
+    )
+    yield Claim(
+        f"The exact friction impulse is µ = {number(mu)} of the normal impulse at every e."
+        f" {ROUGH} gives it.",
+        # Velocities of 8 m/s that float64 rounds a few times.
+        lambda shown: shown.gap(ROUGH) <= 1e-13 and np.ptp(shown.y(TRUTH)) == 0.0,
+    )
+    yield foreseen_claim(gives(BOX2D_V3, narrow), share, dt)
+    yield Claim(
+        "The ablated reference has all other mechanisms of Box2D 3.1, and gives the exact"
+        " friction at every e."
+        if whole
+        else "The ablated reference now gives what Box2D 3.1 gives: that friction does not act"
+        " after restitution is the whole cause.",
+        gives(ABLATED, ablated),
+    )
+    yield lies_on(BOX2D_V3, not whole, SINGLE)
 
 
 def foreseen_claim(holds: Callable[[Shown], np.bool_], share: float, dt: float) -> Claim:
@@ -139,20 +136,17 @@ CONE = Lesson(
     number="9.2",
     title="Friction before restitution",
     asks="Why does Box2D 3.1 give half of the friction at e = 1?",
-    text=(
-        (
-            "Box2D 3.1 solves a step in two parts. In the first a contact stops the approach, and"
-            " friction acts up to <code>µ</code> times the normal impulse of this part,"
-            " <code>m vₙ</code>. In the second part, restitution adds <code>e m vₙ</code>, and"
-            " friction does not act again. The friction cone is that of a collision with"
-            " <code>e = 0</code>. See [friction] for what the cone is."
-        ),
-        (
-            "The ablated reference plays with the mechanisms of Box2D 3.1. Choose what limits its"
-            " friction. The disk is so fast along the floor that the contact slips at every setting"
-            " here. If the contact sticks within the narrower cone, the order does not matter."
-        ),
-    ),
+    text="""
+    Box2D 3.1 solves a step in two parts. In the first a contact stops the approach, and
+    friction acts up to <code>µ</code> times the normal impulse of this part, <code>m vₙ</code>.
+    In the second part, restitution adds <code>e m vₙ</code>, and friction does not act again.
+    The friction cone is that of a collision with <code>e = 0</code>. See [friction] for what
+    the cone is.
+
+    The ablated reference plays with the mechanisms of Box2D 3.1. Choose what limits its
+    friction. The disk is so fast along the floor that the contact slips at every setting here.
+    If the contact sticks within the narrower cone, the order does not matter.
+    """,
     sliders=(
         Slider("limit", "Friction limit", tuple(LIMITS), 0),
         Slider("mu", "Friction µ", (0.05, 0.1, 0.2), 1),

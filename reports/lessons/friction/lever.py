@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import ceil
 
 import numpy as np
 
-from reports.lessons.friction.thrown import FALL, ROUGH, ablated_runs, taken, thrown
+from reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
 from reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
     LessonChart,
-    Settings,
     Shown,
     Slider,
+    swept,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import (
-    ABLATED,
-    FLOAT32,
-    distances,
-    filmed,
-    follows,
-    lies_on,
-)
+from reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, distances, lies_on
 from reports.page.style import TRUTH, number
 from scenarios.model import Scene
 
@@ -37,28 +31,27 @@ SKIN = 0.01  # m, of a wall: b2_polygonRadius, two slops of 5 mm
 SINGLE = 1e-6
 
 
-def show_lever(settings: Settings) -> Shown:
+def show_lever(where: str, k: int) -> Shown:
     """The lever arm over the radius, against the radius."""
-    share, k = WHERE[settings["where"]], settings["k"]
-    found: dict[str, list[float]] = {}
-    for radius in RADII:
-        scenario = thrown(8.0, 0.0, 0.5, 0.1, float(radius))
-        runs = ablated_runs(BOX2D, {"lever": share}, scenario, k)
-        for run in runs:
-            if run.trajectory is not None:
-                arm = float(taken(run.trajectory, scenario.scene).arm[0])
-                found.setdefault(run.name, []).append(arm / float(radius))
-        if radius == REPLAYED:
-            film = filmed(scenario, runs)
-    curves = [
-        *(Curve(name, RADII, ratios, dots=True) for name, ratios in found.items()),
-        Curve(TRUTH, RADII, np.ones(len(RADII))),
+    share = WHERE[where]
+    played = [
+        ablated_beside(BOX2D, {"lever": share}, thrown(8.0, 0.0, 0.5, 0.1, float(radius)), k)
+        for radius in RADII
     ]
+    ratios = swept(RADII, played, lambda each, scene: taken(each, scene).arm[0] / scene.radius[0])
     chart = LessonChart(
-        "Lever arm over radius", "radius of the disk in m", "lever arm / R", curves, "x"
+        "Lever arm over radius",
+        "radius of the disk in m",
+        "lever arm / R",
+        [*ratios, Curve(TRUTH, RADII, np.ones(len(RADII)))],
+        "x",
     )
-    facts = [("replayed: radius", f"{number(REPLAYED)} m"), *distances(runs[:1], curves, "")]
-    return Shown([chart], film, facts, lever_claims(share, scenario.dt(k), scenario.scene))
+    return Shown(
+        [chart],
+        played[RADII.tolist().index(REPLAYED)].film,
+        [("replayed: radius", f"{number(REPLAYED)} m"), *distances(chart)],
+        list(lever_claims(share, played[-1].runs[0].dt, played[-1].scenario.scene)),
+    )
 
 
 def overlap(dt: float, scene: Scene) -> float:
@@ -68,32 +61,30 @@ def overlap(dt: float, scene: Scene) -> float:
     return ceil(gap / (FALL * dt)) * FALL * dt - gap
 
 
-def lever_claims(share: float, dt: float, scene: Scene) -> list[Claim]:
+def lever_claims(share: float, dt: float, scene: Scene) -> Iterator[Claim]:
     """The length by which each lever arm is too short."""
     deep = overlap(dt, scene)
     half = 1 - deep / 2 / RADII
     # Every step rounds a height of up to 2 m; the smallest radius shows it most.
     flown = SINGLE + scene.position[0, 1] / (FALL * dt) * 2 * FLOAT32 / RADII[0]
-    return [
-        Claim(
-            f"{ROUGH} has the lever arm R at every radius.",
-            follows(ROUGH, np.ones(len(RADII)), 1e-12),  # float64, at the smallest impulses
-        ),
-        Claim(
-            f"With this step {BOX2D} finds the contact when the disk overlaps the skin by"
-            f" {number(1e3 * deep)} mm. Its lever arm is half of that too short at every radius, by"
-            f" {number(1e3 * deep / 2)} mm: {number(100 * (1 - half[0]))} % of the smallest radius,"
-            f" {number(100 * (1 - half[-1]))} % of the largest.",
-            follows(BOX2D, half, flown),
-        ),
-        Claim(
-            f"The lever arm of the ablated reference is {number(1e3 * share * deep)} mm too short."
-            if share
-            else "The ablated reference has the lever arm R, too.",
-            follows(ABLATED, 1 - share * deep / RADII, flown),
-        ),
-        lies_on(BOX2D, share == 0.5, SINGLE),
-    ]
+    yield Claim(
+        f"{ROUGH} has the lever arm R at every radius.",
+        lambda shown: shown.follows(ROUGH, 1.0, 1e-12),  # float64, at the smallest impulses
+    )
+    yield Claim(
+        f"With this step {BOX2D} finds the contact when the disk overlaps the skin by"
+        f" {number(1e3 * deep)} mm. Its lever arm is half of that too short at every radius, by"
+        f" {number(1e3 * deep / 2)} mm: {number(100 * (1 - half[0]))} % of the smallest radius,"
+        f" {number(100 * (1 - half[-1]))} % of the largest.",
+        lambda shown: shown.follows(BOX2D, half, flown),
+    )
+    yield Claim(
+        f"The lever arm of the ablated reference is {number(1e3 * share * deep)} mm too short."
+        if share
+        else "The ablated reference has the lever arm R, too.",
+        lambda shown: shown.follows(ABLATED, 1 - share * deep / RADII, flown),
+    )
+    yield lies_on(BOX2D, share == 0.5, SINGLE)
 
 
 LEVER = Lesson(
@@ -101,19 +92,15 @@ LEVER = Lesson(
     number="9.3",
     title="The lever arm of friction",
     asks="Why does Box2D 2.3 turn a disk less than its friction should?",
-    text=(
-        (
-            "A friction impulse at the surface of a disk turns it with the lever arm"
-            " <code>R</code>. A wall of Box2D 2.3 has a <b>skin</b> of 10 mm. A contact is found at"
-            " the end of a step, when disk and skin overlap, and friction acts in the middle of the"
-            " overlap, within the disk. The skin is a length in the units of the scene: it matters"
-            " most for a small disk."
-        ),
-        (
-            "The middle of the overlap has another slip than the surface. When a disk rolls, its"
-            " surface does not slip, but this point does, and friction acts on it: see [rolling]."
-        ),
-    ),
+    text="""
+    A friction impulse at the surface of a disk turns it with the lever arm <code>R</code>. A
+    wall of Box2D 2.3 has a <b>skin</b> of 10 mm. A contact is found at the end of a step, when
+    disk and skin overlap, and friction acts in the middle of the overlap, within the disk. The
+    skin is a length in the units of the scene: it matters most for a small disk.
+
+    The middle of the overlap has another slip than the surface. When a disk rolls, its surface
+    does not slip, but this point does, and friction acts on it: see [rolling].
+    """,
     sliders=(
         Slider("where", "Friction acts at", tuple(WHERE), 0),
         time_step(1 / 60, (16, 8, 1), 2),

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.mechanisms.table import FRICTION, Mechanism, mechanisms_of, with_mechanisms
-from adapters.play import play
-from adapters.run import Run
-from reports.lessons.lesson import run_of
-from reports.lessons.mechanisms.ablation import ABLATED
+from adapters.mechanisms.table import FRICTION, Mechanism
+from reports.lessons.lesson import Simulation
+from reports.lessons.mechanisms.ablation import ablated_as
 from scenarios.families.friction import bounce_on_floor
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 FALL = 5.0  # m/s towards the floor, of every disk that is thrown
 ROUGH = "reference:coulomb"
-
-
 APART = 0.6  # m, of disks that fly side by side, the faster ones ahead
 
 
@@ -63,13 +60,11 @@ def taken(played: Trajectory, scene: Scene) -> Taken:
     return Taken(along, normal, turning)
 
 
-def ablated_runs(
+def ablated_beside(
     engine: str, rubs: Mapping[str, Any], scenario: Scenario, substeps: int
-) -> list[Run]:
+) -> Simulation:
     """The engine, the reference with friction, and the reference with all mechanisms of the engine,
     in which `rubs` are the parameters of its friction that are other than the engine's."""
-    dt = scenario.dt(substeps)
-    runs = [run_of(name, scenario, substeps) for name in (engine, ROUGH)]
-    mechanisms = mechanisms_of(engine, runs[0].settings, scenario.scene, dt)
-    ablated = with_mechanisms([*mechanisms, Mechanism(FRICTION, rubs)])
-    return [*runs, play(ablated, ABLATED, scenario, dt)]
+    played = Simulation.by(scenario, (engine, ROUGH), substeps)
+    ablated = ablated_as(played.runs[0], scenario, Mechanism(FRICTION, rubs))
+    return replace(played, runs=[*played.runs, ablated])

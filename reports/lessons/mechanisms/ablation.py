@@ -3,76 +3,53 @@ coincide."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
-import numpy as np
-
+from adapters.engines import changed
 from adapters.mechanisms.ablated import AblatedReference
-from adapters.play import play
+from adapters.mechanisms.table import Mechanism, mechanisms_of, with_mechanisms
 from adapters.run import Run
-from reports.lessons.lesson import (
-    Claim,
-    Curve,
-    Lesson,
-    LessonChart,
-    Settings,
-    Shown,
-    Simulation,
-    Slider,
-    run_of,
-)
+from reports.lessons.lesson import Claim, LessonChart, Makes, run_of
 from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.no_truth import answered
+from scenarios.model import Scenario, Scene
 from scenarios.truth.exact import with_oracle
 
 ABLATED, PLAIN, NO_CCD = "reference:ablated", "reference:exercise", "box2d:matched+no_ccd"
 ROUNDING = 1e-13  # of float64, in any unit of these pages
 FLOAT32 = 2.0**-24  # half of the distance of two neighbours, relative
-Read = Callable[[Trajectory], Array]
 
 
 def asked(scene: Scene, duration: float) -> Scenario:
     """A scene of this lesson."""
-    return Scenario("mechanism", "Where does the engine differ?", "", scene, duration, 1 / 60)
+    asks = "Where does the engine differ?"
+    return with_oracle(Scenario("mechanism", asks, "", scene, duration, 1 / 60))
 
 
-def runs_of(
-    names: Sequence[str],
-    on: AblatedReference,
-    scenario: Scenario,
-    substeps: int,
-    plain: str = PLAIN,
-) -> list[Run]:
-    """The engines, the reference as it is, and the reference with what is enabled."""
-    runs = [run_of(name, scenario, substeps) for name in (*names, plain)]
-    return [*runs, play(on, ABLATED, scenario, scenario.dt(substeps))]
+def ablated(**parameters: Any) -> Makes:
+    """How the ablated reference is made with what is enabled."""
+    return {ABLATED: partial(AblatedReference, **parameters)}
 
 
-def over_time(runs: Sequence[Run], read: Read) -> list[Curve]:
-    """`read` of every run that was played."""
-    return [
-        Curve(run.name, run.trajectory.t, read(run.trajectory))
-        for run in runs
-        if run.trajectory is not None
-    ]
+def unswept(**parameters: Any) -> Makes:
+    """How Box2D as matched is made without CCD."""
+    off = {"continuous": False, "bullet": False}
+    return {NO_CCD: partial(changed, "box2d:matched", **off, **parameters)}
 
 
-def over(x: Array, runs: Sequence[Run], read: Read) -> list[Curve]:
-    """`read` of every run against `x`."""
-    return [
-        Curve(run.name, x, read(run.trajectory), dots=True)
-        for run in runs
-        if run.trajectory is not None
-    ]
+def ablated_as(run: Run, scenario: Scenario, change: Mechanism) -> Run:
+    """The ablated reference with all mechanisms of the engine that made `run`, and `change`."""
+    own = mechanisms_of(run.name, run.settings, scenario.scene, run.dt)
+    substeps = round(scenario.sample_interval / run.dt)
+    return run_of(ABLATED, scenario, substeps, lambda: with_mechanisms([*own, change]))
 
 
-def lies_on(engine: str, own: bool, bound: float, unit: str = "") -> Claim:
+def lies_on(engine: str, own: bool, bound: float, unit: str = "", off: float = 300.0) -> Claim:
     """Whether the ablated reference, with its current settings, moves as the engine does.
 
-    own: whether it is set as the engine is; bound: what the rounding of both may add up to.
+    own: whether it is set as the engine is; bound: what the rounding of both may add up to; off:
+    how many bounds they are apart at least, if it is not.
     """
     if own:
         rounding = f"up to rounding, which is at most {number(bound, 2)} {unit}".rstrip()
@@ -83,29 +60,27 @@ def lies_on(engine: str, own: bool, bound: float, unit: str = "") -> Claim:
         )
     return Claim(
         f"With this setting the ablated reference does not lie on {engine}.",
-        lambda shown: shown.gap(ABLATED, engine) > 300 * bound,
+        lambda shown: shown.gap(ABLATED, engine) > off * bound,
     )
 
 
-def follows(name: str, law: Array, bound: float) -> Callable[[Shown], np.bool_]:
-    """Whether a curve is `law`, within `bound`."""
-    return lambda shown: np.abs(shown.y(name) - law).max() <= bound
-
-
-def distances(runs: Sequence[Run], curves: Sequence[Curve], unit: str) -> list[tuple[str, str]]:
+def distances(chart: LessonChart, unit: str = "") -> list[tuple[str, str]]:
     """The largest difference between the curve of the ablated reference and that of each engine."""
-    shown = Shown([LessonChart("", "", "", curves)])
+    engines = [
+        curve.name
+        for curve in chart.curves
+        if curve.name != TRUTH and not curve.name.startswith("reference:")
+    ]
     return [
         (
-            f"largest difference of the ablated reference from {run.name}",
+            f"largest difference of the ablated reference from {engine}",
             (
                 f"{number(gap)} {unit}".strip()
-                if not 0 < (gap := shown.gap(ABLATED, run.name)) < ROUNDING
+                if not 0 < (gap := chart.gap(ABLATED, engine)) < ROUNDING
                 else "0 to rounding"
             ),
         )
-        for run in runs
-        if run.name not in (PLAIN, ABLATED)
+        for engine in engines
     ]
 
 
@@ -116,28 +91,3 @@ def setting_rows(runs: Sequence[Run], setting: str) -> list[tuple[str, str]]:
         for run in runs
         if setting in run.settings
     ]
-
-
-def filmed(scenario: Scenario, runs: Sequence[Run]) -> Any:
-    """What the player of the page shows: the runs at the step of the scenario, and the exact answer
-    if there is one."""
-    seen = replace(scenario, substeps=(round(scenario.sample_interval / runs[0].dt),))
-    seen, truth = answered(seen if seen.truth else with_oracle(seen))
-    return Simulation(seen, runs, truth).film
-
-
-def page(
-    part: int,
-    name: str,
-    title: str,
-    asks: str,
-    text: str | tuple[str, ...],
-    names: Sequence[str],
-    show: Callable[[Settings], Shown],
-    *sliders: Slider,
-) -> Lesson:
-    """A page of this lesson; text: its paragraph, or several."""
-    paragraphs = (text,) if isinstance(text, str) else text
-    exact = () if name == "correction" else (TRUTH,)  # disks that overlap have no exact answer
-    drawn = (*names, PLAIN, ABLATED, *exact)
-    return Lesson(name, f"6.{part}", title, asks, paragraphs, sliders, drawn, show)

@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
 
-from reports.lessons.lesson import (
-    Claim,
-    Curve,
-    Lesson,
-    LessonChart,
-    Settings,
-    Shown,
-    Simulation,
-    Slider,
-)
+from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.planck import (
     BOX2D,
     COMMAND,
+    KEPT,
     LADDER,
     PLANCK,
     PROFILES,
     SCENES,
-    kept,
     known,
     largest_deviation,
-    recorded,
-    run_of,
+    played,
     whole,
 )
+from reports.lessons.mechanisms.recorded import made_with, table_in
 from reports.page.style import TRUTH, number
 from scenarios.model import Array
 
@@ -38,23 +29,20 @@ BETWEEN = "between the two"
 ALIKE = 0.02  # of an error: where float32 changes none of a scene by more, one sentence says so
 
 
-def show_float32(settings: Settings) -> Shown:
+def show_float32(scene: str, profile: str) -> Shown:
     """The error of both at every step size, and float32's share of it in every scene."""
-    name, profile = settings["scene"], settings["profile"]
-    scene, truth = known(name)
+    scenario, _ = known(scene)
     box2d = f"{BOX2D}:{profile}"
-    rows = kept().set_index(["scenario", "profile"]).loc[(name, profile)]
-    rows = rows[rows.substeps.isin(LADDER)]
-    ms = 1e3 * scene.sample_interval / rows.substeps.to_numpy(float)
+    table = table_in(KEPT)
+    mine = (table.scenario == scene) & (table.profile == profile)
+    rows = table[mine & table.substeps.isin(LADDER)]
+    ms = 1e3 * scenario.sample_interval / rows.substeps.to_numpy(float)
     curves = [
         Curve(f"{PLANCK}:{profile}", ms, rows.planck_radii.to_numpy(float), dots=True),
-        Curve(box2d, ms, errors_of_box2d(name, profile), dots=True),
+        Curve(box2d, ms, errors_of_box2d(scene, profile), dots=True),
         Curve(BETWEEN, ms, rows.deviation_radii.to_numpy(float), dots=True),
     ]
-    middle = scene.middle_substeps
-    film = Simulation(
-        replace(scene, substeps=(middle,)), [run_of(BOX2D, profile, name, middle)], truth
-    ).film
+    middle = scenario.middle_substeps
     shares = shares_of(profile)
     percent = 100 * np.abs(list(shares.values()))
     return Shown(
@@ -65,30 +53,30 @@ def show_float32(settings: Settings) -> Shown:
                 "radii",
                 curves,
                 "xy",
-                guides=[("x", 1e3 * scene.dt(middle), "middle")],
+                guides=[("x", 1e3 * scenario.dt(middle), "middle")],
             ),
             LessonChart(
                 "Share of float32 in the error, all scenes",
                 "scenes, from the smallest share",
                 "%, without its sign",
-                [Curve(box2d, np.arange(1, len(percent) + 1), percent, dots=True)],
+                [Curve(box2d, np.arange(1.0, len(percent) + 1), percent, dots=True)],
                 "y",
                 guides=[("y", 1.0, "1 %")],
             ),
         ],
-        film,
+        Simulation.by(scenario, (box2d,), middle).film,
         [
             (f"share of float32 in the error of {box2d}", "below 0: float32 makes it smaller"),
             *((each, f"{number(100 * share, 2)} %") for each, share in reversed(shares.items())),
         ],
-        [*claims_of(name, profile, curves, LADDER.index(middle)), claim_of_all(profile, percent)],
+        [*claims_of(scene, profile, curves, LADDER.index(middle)), claim_of_all(profile, percent)],
     )
 
 
 @cache
 def errors_of_box2d(name: str, profile: str) -> Array:
     """Radii, at each step size of `LADDER`, on this machine."""
-    runs = [run_of(BOX2D, profile, name, substeps) for substeps in LADDER]
+    runs = [played(BOX2D, profile, name, substeps) for substeps in LADDER]
     return np.array([largest_deviation(whole(run), known(name)[1], name) for run in runs])
 
 
@@ -97,7 +85,7 @@ def shares_of(profile: str) -> dict[str, float]:
     """Scene -> the error of Box2D less that of planck, over that of Box2D, at the middle step size;
     from the smallest share to the largest. A scene in which Box2D is exact has none."""
     found: dict[str, float] = {}
-    for row in kept().to_dict("records"):
+    for row in table_in(KEPT).to_dict("records"):
         name = str(row["scenario"])
         usual = row["substeps"] == known(name)[0].middle_substeps
         if row["profile"] == profile and usual and row["box2d_radii"]:
@@ -105,11 +93,11 @@ def shares_of(profile: str) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda one: abs(one[1])))
 
 
-def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list[Claim]:
+def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> Iterator[Claim]:
     """What the errors of a scene show; `middle`: the place of the middle step size."""
     planck, box2d = f"{PLANCK}:{profile}", f"{BOX2D}:{profile}"
-    p, b, between = (np.asarray(curve.y, float) for curve in curves)
-    ms = np.asarray(curves[0].x, float)
+    p, b, between = (curve.y for curve in curves)
+    ms = curves[0].x
 
     def share(shown: Shown) -> Array:
         return 1 - shown.y(planck) / shown.y(box2d)
@@ -124,57 +112,46 @@ def claims_of(name: str, profile: str, curves: list[Curve], middle: int) -> list
         if usual >= 0
         else f"without float32 the error would be {part} larger"
     )
-    claims = [
-        Claim(
-            f"At the middle step size, {number(ms[middle])} ms, {planck} is"
-            f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: {effect}.",
-            lambda shown: abs(share(shown)[middle] - usual) <= 1e-9,
-        )
-    ]
+    yield Claim(
+        f"At the middle step size, {number(ms[middle])} ms, {planck} is"
+        f" {number(p[middle], 4)} radii off and {box2d} {number(b[middle], 4)}: {effect}.",
+        lambda shown: abs(share(shown)[middle] - usual) <= 1e-9,
+    )
     if name == "free_fall":
-        claims.append(
-            Claim(
-                f"Half the step gives half the error of {planck}, at every step size.",
-                lambda shown: np.abs(shown.y(planck)[:-1] / shown.y(planck)[1:] - 2).max() < 1e-3,
-            )
+        yield Claim(
+            f"Half the step gives half the error of {planck}, at every step size.",
+            lambda shown: np.abs(shown.y(planck)[:-1] / shown.y(planck)[1:] - 2).max() < 1e-3,
         )
     worst = float(np.abs(1 - p / b).max())
     if worst <= ALIKE:
-        claims.append(
-            Claim(
-                "Float32 matters little here: at no step size does it change the error by more"
-                f" than {number(100 * worst, 2)} %.",
-                lambda shown: np.abs(share(shown)).max() <= worst * (1 + 1e-9),
-            )
+        yield Claim(
+            "Float32 matters little here: at no step size does it change the error by more"
+            f" than {number(100 * worst, 2)} %.",
+            lambda shown: np.abs(share(shown)).max() <= worst * (1 + 1e-9),
         )
-        return claims
+        return
     best = int(np.argmin(b))
     times = float(b[-1] / p[-1])
-    claims.append(
-        Claim(
-            f"{box2d} is nearest to the exact answer at {number(ms[best], 2)} ms. Smaller steps"
-            f" make its error larger: at {number(ms[-1], 2)} ms it is {number(times, 2)} times"
-            f" that of {planck}.",
-            lambda shown: (
-                int(np.argmin(shown.y(box2d))) == best < len(ms) - 1
-                and abs(shown.y(box2d)[-1] / shown.y(planck)[-1] / times - 1) <= 1e-9
-            ),
-        )
+    yield Claim(
+        f"{box2d} is nearest to the exact answer at {number(ms[best], 2)} ms. Smaller steps"
+        f" make its error larger: at {number(ms[-1], 2)} ms it is {number(times, 2)} times"
+        f" that of {planck}.",
+        lambda shown: (
+            int(np.argmin(shown.y(box2d))) == best < len(ms) - 1
+            and abs(shown.y(box2d)[-1] / shown.y(planck)[-1] / times - 1) <= 1e-9
+        ),
     )
     growth = ends(between)
     if growth > 1:
-        claims.append(
-            Claim(
-                "The distance between the two grows with the number of steps:"
-                f" {LADDER[-1]} times as many steps make it {number(growth, 2)} times as large.",
-                lambda shown: (
-                    abs(ends(shown.y(BETWEEN)) / growth - 1) <= 1e-9
-                    and ends(shown.x(BETWEEN)) == 1 / LADDER[-1]
-                    and np.polyfit(np.log(shown.x(BETWEEN)), np.log(shown.y(BETWEEN)), 1)[0] < -0.5
-                ),
-            )
+        yield Claim(
+            "The distance between the two grows with the number of steps:"
+            f" {LADDER[-1]} times as many steps make it {number(growth, 2)} times as large.",
+            lambda shown: (
+                abs(ends(shown.y(BETWEEN)) / growth - 1) <= 1e-9
+                and ends(shown.x(BETWEEN)) == 1 / LADDER[-1]
+                and np.polyfit(np.log(shown.x(BETWEEN)), np.log(shown.y(BETWEEN)), 1)[0] < -0.5
+            ),
         )
-    return claims
 
 
 def claim_of_all(profile: str, percent: Array) -> Claim:
@@ -208,18 +185,15 @@ SINGLE = Lesson(
     number="6.10",
     title="planck against Box2D 2.3: what float32 costs",
     asks="How much of an error is the rounding of float32?",
-    text=(
-        (
-            "Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which"
-            " computes in float64. Both have the same settings here, so they differ only by"
-            " rounding. The error of Box2D minus that of planck is the <b>share of float32</b>. A"
-            " share below 0 means that float32 makes the error smaller."
-        ),
-        (
-            "A smaller step makes the error of the method smaller. It also makes more steps, and"
-            " each step rounds. See [digits] for what rounding does far from the origin."
-        ),
-    ),
+    text="""
+    Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which
+    computes in float64. Both have the same settings here, so they differ only by rounding. The
+    error of Box2D minus that of planck is the <b>share of float32</b>. A share below 0 means
+    that float32 makes the error smaller.
+
+    A smaller step makes the error of the method smaller. It also makes more steps, and each
+    step rounds. See [digits] for what rounding does far from the origin.
+    """,
     sliders=(
         Slider("scene", "Scene", SCENES, 0),
         Slider("profile", "Profile", PROFILES, 0),
@@ -232,6 +206,6 @@ SINGLE = Lesson(
     show=show_float32,
     recorded=(
         "The numbers of planck, the distance between the two and the share of float32 in all scenes"
-        f" were recorded on {recorded()}, by {COMMAND}."
+        f" were recorded on {made_with(KEPT)}, by {COMMAND}."
     ),
 )

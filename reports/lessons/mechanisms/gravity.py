@@ -2,62 +2,56 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Iterator
 
 import numpy as np
 
-from adapters.engines import changed
-from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK, AblatedReference
-from adapters.play import play_once
-from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider, time_step
+from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK
+from reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+    time_step,
+)
 from reports.lessons.mechanisms.ablation import (
+    ABLATED,
     FLOAT32,
     NO_CCD,
     PLAIN,
+    ablated,
     distances,
-    filmed,
     lies_on,
-    over_time,
-    page,
-    runs_of,
+    unswept,
 )
 from reports.page.style import TRUTH, number
 from scenarios.families.walls import bouncing_ball_e1
 from scenarios.model import Array, Scene
 
+NAMES = (NO_CCD, "box2d:matched", "pymunk:matched", PLAIN, ABLATED)
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}
 
 
-def show_gravity(settings: Settings) -> Shown:
+def show_gravity(order: str, k: int) -> Shown:
     """The height of a ball that should bounce for ever."""
-    scenario, k = bouncing_ball_e1(), settings["k"]
-    names = ["box2d:matched", "pymunk:matched"]
-    ablated = AblatedReference(order=ORDERS[settings["order"]])
-    without = partial(changed, "box2d:matched", continuous=False, bullet=False)
-    dt = scenario.dt(k)
-    runs = [play_once(without, NO_CCD, scenario, dt), *runs_of(names, ablated, scenario, k)]
-    curves = over_time(runs, lambda each: each.position[:, 0, 1])
-    facts = distances(runs, curves, "m")
-    assert scenario.truth is not None
-    curves.append(Curve(TRUTH, scenario.times, scenario.truth(scenario.times).position[:, 0, 1]))
-    start = float(scenario.scene.position[0, 1])
-    turns = [[start, *turned(np.asarray(curve.y, float))] for curve in curves]
-    heights = [
-        Curve(curve.name, np.arange(len(found)), found, dots=True)
-        for curve, found in zip(curves, turns)
-    ]
+    scenario = bouncing_ball_e1()
+    makes = {**unswept(), **ablated(order=ORDERS[order])}
+    played = Simulation.by(scenario, NAMES, k, makes)
+    chart = played.over_time("Height of the centre", "m", lambda each: each.position[:, 0, 1])
+    turns = [(curve.name, np.append(curve.y[0], turned(curve.y))) for curve in chart.curves]
+    heights = [Curve(name, np.arange(float(len(found))), found, dots=True) for name, found in turns]
     return Shown(
-        [
-            LessonChart("Height of the centre", "time in s", "m", curves),
-            LessonChart("How high it rises", "bounces so far", "m", heights),
-        ],
-        filmed(scenario, runs),
-        facts,
-        bounce_claims(scenario.scene, dt, settings["order"]),
+        [chart, LessonChart("How high it rises", "bounces so far", "m", heights)],
+        played.film,
+        distances(chart, "m"),
+        list(bounce_claims(scenario.scene, scenario.dt(k), order)),
     )
 
 
-def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
+def bounce_claims(scene: Scene, dt: float, order: str) -> Iterator[Claim]:
     """What each bounce adds to the height of the next."""
     start, radius = float(scene.position[0, 1]), float(scene.radius[0])
     g = float(np.hypot(*scene.gravity))
@@ -71,44 +65,36 @@ def bounce_claims(scene: Scene, dt: float, order: str) -> list[Claim]:
         speed = np.sqrt(2 * g * (found[:-1] - radius))
         return bool((np.abs(np.diff(found) - speed * dt) <= 0.1 * speed * dt + 2 * seen).all())
 
-    def rises(shown: Shown) -> bool:
-        return bool(shown.y("box2d:matched").max() < shown.y(NO_CCD).max() - 2 * seen)
-
     fall = float(np.sqrt(2 * g * (start - radius)))
-    continuous = (
-        Claim(
+    yield Claim(
+        "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already changed. The"
+        " ball gains about |v| dt of height at each bounce, where v is its speed: some"
+        f" {number(1e3 * fall * dt, 2)} mm at the first, and more at each later one.",
+        lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
+    )
+    if round(1 / dt) == 240:
+        yield Claim(
             "At this dt box2d:matched, whose CCD is on, does the same.",
             lambda shown: shown.gap("box2d:matched", NO_CCD) <= single,
         )
-        if round(1 / dt) == 240
-        else Claim(
+    else:
+        yield Claim(
             "At this dt CCD (box2d:matched) acts in some bounces, and the ball rises less high than"
             " without it.",
-            rises,
+            lambda shown: shown.y("box2d:matched").max() < shown.y(NO_CCD).max() - 2 * seen,
         )
+    yield Claim(
+        "pymunk:matched reverses the velocity before gravity changes it. The ball rises as it"
+        " fell, and returns to the height it started from.",
+        lambda shown: np.abs(peaks(shown, "pymunk:matched") - start).max() <= seen + 1e-9,
     )
-    return [
-        Claim(
-            "Box2D without CCD (+no_ccd) reverses a velocity that gravity has already"
-            " changed. The ball gains about |v| dt of height at each bounce, where v is"
-            f" its speed: some {number(1e3 * fall * dt, 2)} mm at the first, and more at each later"
-            " one.",
-            lambda shown: gains(shown) and (np.diff(peaks(shown, NO_CCD)) > 0).all(),
-        ),
-        continuous,
-        Claim(
-            "pymunk:matched reverses the velocity before gravity changes it. The ball rises as it"
-            " fell, and returns to the height it started from.",
-            lambda shown: np.abs(peaks(shown, "pymunk:matched") - start).max() <= seen + 1e-9,
-        ),
-        Claim(
-            "reference:exercise projects the ball back to the floor at each bounce; no bounce rises"
-            " higher than the start.",
-            lambda shown: peaks(shown, PLAIN).max() <= start,
-        ),
-        lies_on(NO_CCD, order == "aimed after gravity", single, "m"),
-        lies_on("pymunk:matched", order == "aimed before gravity", 1e-11, "m"),
-    ]
+    yield Claim(
+        "reference:exercise projects the ball back to the floor at each bounce; no bounce rises"
+        " higher than the start.",
+        lambda shown: peaks(shown, PLAIN).max() <= start,
+    )
+    yield lies_on(NO_CCD, order == "aimed after gravity", single, "m")
+    yield lies_on("pymunk:matched", order == "aimed before gravity", 1e-11, "m")
 
 
 def peaks(shown: Shown, name: str) -> Array:
@@ -121,18 +107,22 @@ def turned(y: Array) -> Array:
     return y[1:-1][(y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])]
 
 
-GRAVITY = page(
-    4,
-    "gravity",
-    "Impulse before or after gravity",
-    "Why does a ball in Box2D bounce ever higher?",
-    "A bounce reverses the velocity with which a ball meets the floor. If gravity has already"
-    " changed this velocity in the step, the change is reversed, too."
-    " <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a"
-    " disk in a step, not only at its end. Box2D plays twice, with CCD and without it"
-    " (<code>+no_ccd</code>), because CCD hides the effect at some step sizes.",
-    [NO_CCD, "box2d:matched", "pymunk:matched"],
-    show_gravity,
-    Slider("order", "Velocity that is reversed", tuple(ORDERS), 0),
-    time_step(1 / 60, (8, 4, 2, 1), 1),
+GRAVITY = Lesson(
+    name="gravity",
+    number="6.4",
+    title="Impulse before or after gravity",
+    asks="Why does a ball in Box2D bounce ever higher?",
+    text="""
+    A bounce reverses the velocity with which a ball meets the floor. If gravity has already
+    changed this velocity in the step, the change is reversed, too. <b>Continuous collision
+    detection</b> (CCD) looks for a contact along the whole path of a disk in a step, not only
+    at its end. Box2D plays twice, with CCD and without it (<code>+no_ccd</code>), because CCD
+    hides the effect at some step sizes.
+    """,
+    sliders=(
+        Slider("order", "Velocity that is reversed", tuple(ORDERS), 0),
+        time_step(1 / 60, (8, 4, 2, 1), 1),
+    ),
+    names=(*NAMES, TRUTH),
+    show=show_gravity,
 )

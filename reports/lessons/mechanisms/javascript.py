@@ -4,45 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.lesson import (
-    Claim,
-    Curve,
-    Lesson,
-    LessonChart,
-    Settings,
-    Shown,
-    Slider,
-    run_of,
-)
-from reports.lessons.mechanisms.ablation import PLAIN, filmed
+from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
+from reports.lessons.mechanisms.ablation import PLAIN
 from reports.lessons.mechanisms.javascript_bounces import (
-    CLOSING,
     COMMAND,
     ENGINES,
+    KEPT,
     RESTITUTIONS,
-    SECONDS,
     VERSIONS,
     name_in,
     ratios,
-    recorded,
-    scene_of,
 )
+from reports.lessons.mechanisms.pairs import CLOSING, SECONDS, at_all_speeds
+from reports.lessons.mechanisms.recorded import made_with
 from reports.page.style import TRUTH, number
 
 KEPT_E = 1e-3  # by how much e may be off for a sentence to say that it is kept
 STUCK = 0.25  # of e: a collision that gives less is called cut, one that gives more is not
 
 
-def show_javascript(settings: Settings) -> Shown:
+def show_javascript(e: float, off: str) -> Shown:
     """e of a collision against its closing speed."""
-    e, version = settings["e"], settings["off"]
     curves = [
-        Curve(name_in(engine, version), CLOSING, ratios(engine, version, e), dots=True)
+        Curve(name_in(engine, off), CLOSING, ratios(engine, off, e), dots=True)
         for engine in ENGINES
     ]
     claims = [claim_of(e, curve) for curve in curves]
     curves.append(Curve(TRUTH, CLOSING, np.full(len(CLOSING), e)))
-    scenario = scene_of(e)
     chart = LessonChart(
         "Separation over approach speed",
         "closing speed in m/s",
@@ -50,13 +38,12 @@ def show_javascript(settings: Settings) -> Shown:
         curves,
         "x",
     )
-    return Shown([chart], filmed(scenario, [run_of(PLAIN, scenario, 1)]), [], claims)
+    return Shown([chart], Simulation.by(at_all_speeds(e), (PLAIN,), 1).film, claims=claims)
 
 
 def claim_of(e: float, curve: Curve) -> Claim:
     """The speed up to which an engine reduces the bounce, and the e that it gives above."""
-    name = curve.name
-    speed, ratio = np.asarray(curve.x, float), np.asarray(curve.y, float)
+    name, speed, ratio = curve.name, curve.x, curve.y
     stuck = ratio < STUCK * e
     low, high = float(ratio[~stuck].min()), float(ratio[~stuck].max())
     kept = max(abs(low - e), abs(high - e)) <= KEPT_E
@@ -90,19 +77,16 @@ JAVASCRIPT = Lesson(
     number="6.11",
     title="The same bounce in planck, matter and Rapier",
     asks="Which restitution do the JavaScript engines give?",
-    text=(
-        (
-            "<code>planck</code> is Box2D 2.3, with its restitution threshold (see [threshold])."
-            " <code>Rapier</code> has no threshold. <code>matter-js</code> differs in three ways,"
-            " and each can be disabled. Air slows its disks in flight. Its disks are polygons,"
-            " which touch at a corner, so that a part of the impulse turns them. It solves a"
-            " collision in several iterations, and those after the first stop a slow pair."
-        ),
-        (
-            "Disable them one after the other. The matched profiles avoid all three by settings"
-            " that the engines document; matter's disks then have 200 sides."
-        ),
-    ),
+    text="""
+    <code>planck</code> is Box2D 2.3, with its restitution threshold (see [threshold]).
+    <code>Rapier</code> has no threshold. <code>matter-js</code> differs in three ways, and each
+    can be disabled. Air slows its disks in flight. Its disks are polygons, which touch at a
+    corner, so that a part of the impulse turns them. It solves a collision in several
+    iterations, and those after the first stop a slow pair.
+
+    Disable them one after the other. The matched profiles avoid all three by settings that the
+    engines document; matter's disks then have 200 sides.
+    """,
     sliders=(
         Slider("e", "Restitution e", RESTITUTIONS, 1),
         Slider("off", "Disabled", tuple(VERSIONS), 0),
@@ -115,6 +99,6 @@ JAVASCRIPT = Lesson(
     show=show_javascript,
     recorded=(
         "The ratios of planck, matter and Rapier were recorded on"
-        f" {recorded()}, by {COMMAND}. The replay shows reference:exercise."
+        f" {made_with(KEPT)}, by {COMMAND}. The replay shows reference:exercise."
     ),
 )

@@ -8,20 +8,18 @@ installed.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from adapters.engines import FETCHED
-from adapters.play import play_once
+from adapters.engines import row_of
 from adapters.run import Run
-from reports.lessons.mechanisms.ablation import asked
-from reports.lessons.mechanisms.pairs import pairs, separation
-from reports.lessons.mechanisms.recorded import keep, made_with, table_in
-from scenarios.model import Array, Scenario
+from reports.lessons.lesson import run_of
+from reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
+from reports.lessons.mechanisms.recorded import keep, table_in
+from scenarios.model import Array
 
 KEPT = Path(__file__).with_name("javascript_bounces.csv")
 COMMAND = "uv run --extra js python -m reports.lessons.mechanisms.javascript_bounces"
@@ -39,40 +37,26 @@ VERSIONS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 }
 CHANGED = "matter, changed"  # as shipped but for what is switched off
 RESTITUTIONS = (0.5, 0.9, 1.0)
-CLOSING = np.array(
-    [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]
-)  # m/s
-SECONDS = 0.5  # until the separation is read: they meet after 0.2 s
-
-
-def scene_of(e: float) -> Scenario:
-    """One pair for each closing speed."""
-    return asked(pairs(CLOSING, e), SECONDS)
 
 
 def name_in(engine: str, version: str) -> str:
     """Whose curve it is: `engine:profile`, or `CHANGED`; the options are matter's alone."""
     changed = engine == "matter" and VERSIONS[version][1]
-    return CHANGED if changed else row_of(engine, version)
+    return CHANGED if changed else f"{engine}:{VERSIONS[version][0]}"
 
 
-def row_of(engine: str, version: str) -> str:
-    """`engine:profile` of a version."""
-    return f"{engine}:{VERSIONS[version][0]}"
-
-
-def run_of(engine: str, version: str, e: float) -> Run:
+def played(engine: str, version: str, e: float) -> Run:
     """A JavaScript engine at 60 steps a second."""
-    name, options = row_of(engine, version), VERSIONS[version][1] if engine == "matter" else {}
-    scenario = scene_of(e)
-    make = partial(FETCHED[name].make, **options)
-    return play_once(make, name, scenario, scenario.sample_interval)
+    profile, options = VERSIONS[version]
+    name = f"{engine}:{profile}"
+    make = partial(row_of(name).make, **(options if engine == "matter" else {}))
+    return run_of(name, at_all_speeds(e), 1, make)
 
 
 def measured(engine: str, version: str, e: float) -> pd.DataFrame:
     """A row for each closing speed: separation over approach speed. Raises `ValueError` if the
     engine does not play the scene to its end."""
-    run = run_of(engine, version, e)
+    run = played(engine, version, e)
     if run.status != "ok" or run.trajectory is None:
         raise ValueError(f"{run.name}: {run.status}: {run.reason}")
     ratio = separation(CLOSING)(run.trajectory)
@@ -81,28 +65,17 @@ def measured(engine: str, version: str, e: float) -> pd.DataFrame:
     )
 
 
-@cache
-def kept() -> pd.DataFrame:
-    """The table as it was last written."""
-    return table_in(KEPT)
-
-
 def ratios(engine: str, version: str, e: float) -> Array:
     """(k,) the recorded separation over approach speed at each of `CLOSING`."""
-    rows = kept()
+    rows = table_in(KEPT)
     mine = (rows.engine == engine) & (rows.off == version) & (rows.e == e)
     return rows.ratio[mine].to_numpy(float)
-
-
-def recorded() -> str:
-    """When and with which versions the table was written."""
-    return made_with(KEPT)
 
 
 def main() -> None:
     """Play all of them and write javascript_bounces.csv; it takes some seconds."""
     cases = [(name, off, e) for name in ENGINES for off in VERSIONS for e in RESTITUTIONS]
-    runs = [run_of(name, "nothing", RESTITUTIONS[0]) for name in ENGINES]
+    runs = [played(name, "nothing", RESTITUTIONS[0]) for name in ENGINES]
     keep(KEPT, pd.concat([measured(*case) for case in cases]), runs)
 
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.mechanisms.ablated import EXERCISE, POSITION_FIRST, AblatedReference
-from reports.lessons.lesson import Claim, Settings, Shown, Slider, time_step
-from reports.lessons.mechanisms.ablation import PLAIN, follows, lies_on, page
+from adapters.mechanisms.ablated import EXERCISE, POSITION_FIRST
+from reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
+from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, lies_on
 from reports.lessons.mechanisms.falling import ROUNDING_MM, falling
-from reports.page.style import number
+from reports.page.style import TRUTH, number
 from scenarios.families.lesson import free_fall
 from scenarios.model import Array
 
 END = free_fall().duration  # s
 
 
-def show_order(settings: Settings) -> Shown:
+def show_order(order: str, k: int) -> Shown:
     """Velocity then position, or position then velocity."""
-    position_first = settings["order"] == "position first"
+    position_first = order == "position first"
 
     def claims(offset: Array) -> list[Claim]:
         mm, both = number(offset[-1]), number(2 * offset[-1])
@@ -27,12 +27,12 @@ def show_order(settings: Settings) -> Shown:
             Claim(
                 f"pymunk:matched moves first. It is g dt t / 2 above the parabola, {mm} mm in the"
                 f" end: the exact flight of a disk that is thrown g dt / 2 = {faster} mm/s faster.",
-                follows("pymunk:matched", offset, ROUNDING_MM),
+                lambda shown: shown.follows("pymunk:matched", offset, ROUNDING_MM),
             ),
             Claim(
                 f"reference:exercise changes the velocity first. It is as far below, {mm} mm in the"
                 " end: the exact flight of a disk that is thrown as much slower.",
-                follows(PLAIN, -offset, ROUNDING_MM),
+                lambda shown: shown.follows(PLAIN, -offset, ROUNDING_MM),
             ),
             Claim(
                 "The distance between these two is g dt t, the sum of both offsets:"
@@ -45,19 +45,23 @@ def show_order(settings: Settings) -> Shown:
             lies_on("pymunk:matched", position_first, ROUNDING_MM, "mm"),
         ]
 
-    order = POSITION_FIRST if position_first else EXERCISE
-    return falling("pymunk:matched", AblatedReference(order=order), settings["k"], claims)
+    steps = POSITION_FIRST if position_first else EXERCISE
+    return falling("pymunk:matched", ablated(order=steps), k, claims)
 
 
-ORDER = page(
-    3,
-    "order",
-    "Velocity or position first",
-    "Why is a thrown disk off its parabola?",
-    "With the same gravity and the same step, one engine moves a disk with the old velocity and"
-    " another with the new velocity. [thrust] does this with a force.",
-    ["pymunk:matched"],
-    show_order,
-    Slider("order", "Order", ("velocity first", "position first"), 0),
-    time_step(1 / 60, (4, 2, 1), 2),
+ORDER = Lesson(
+    name="order",
+    number="6.3",
+    title="Velocity or position first",
+    asks="Why is a thrown disk off its parabola?",
+    text="""
+    With the same gravity and the same step, one engine moves a disk with the old velocity and
+    another with the new velocity. [thrust] does this with a force.
+    """,
+    sliders=(
+        Slider("order", "Order", ("velocity first", "position first"), 0),
+        time_step(1 / 60, (4, 2, 1), 2),
+    ),
+    names=("pymunk:matched", PLAIN, ABLATED, TRUTH),
+    show=show_order,
 )

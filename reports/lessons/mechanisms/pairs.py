@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.mechanisms.ablation import Read
+from reports.lessons.lesson import Read
+from reports.lessons.mechanisms.ablation import asked
 from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scene, Trajectory
+from scenarios.model import Array, Scenario, Scene, Trajectory
+
+CLOSING = np.array(
+    [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]
+)  # m/s
+SECONDS = 0.5  # until the separation is read: they meet after 0.2 s
+
+
+def at_all_speeds(e: float) -> Scenario:
+    """One pair for each of `CLOSING`."""
+    return asked(pairs(CLOSING, e), SECONDS)
 
 
 def pairs(closing: Array, restitution: float, friction: float = 0.0, spin: float = 0.0) -> Scene:

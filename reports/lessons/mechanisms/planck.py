@@ -7,18 +7,15 @@ which the lesson shows: planck is an npm package that need not be installed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED
-from adapters.play import play_once
 from adapters.run import Run
 from reports.compare.laws import deviation
-from reports.lessons.mechanisms.recorded import keep, made_with, table_in
+from reports.lessons.lesson import run_of
+from reports.lessons.mechanisms.recorded import keep
 from scenarios.catalogue import SCENARIOS, scenario
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -46,11 +43,9 @@ def known(name: str) -> tuple[Scenario, Trajectory | None]:
     return answered(scenario(name))
 
 
-def run_of(engine: str, profile: str, name: str, substeps: int) -> Run:
+def played(engine: str, profile: str, name: str, substeps: int) -> Run:
     """One engine in a scene of the catalogue."""
-    rows: Mapping[str, EngineRow] = FETCHED if engine == PLANCK else ENGINES
-    called, (scene, _) = f"{engine}:{profile}", known(name)
-    return play_once(rows[called].make, called, scene, scene.dt(substeps))
+    return run_of(f"{engine}:{profile}", known(name)[0], substeps)
 
 
 def whole(run: Run) -> Trajectory | None:
@@ -71,7 +66,7 @@ def largest_deviation(one: Trajectory | None, other: Trajectory | None, name: st
 def measured(name: str, profile: str, substeps: int) -> dict[str, float | str | int]:
     """A row of the table: the error of both engines, and their deviation from each other."""
     scenario, truth = known(name)
-    planck, box2d = (whole(run_of(each, profile, name, substeps)) for each in (PLANCK, BOX2D))
+    planck, box2d = (whole(played(each, profile, name, substeps)) for each in (PLANCK, BOX2D))
     return {
         "scenario": name,
         "profile": profile,
@@ -95,20 +90,9 @@ def table() -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-@cache
-def kept() -> pd.DataFrame:
-    """The table as it was last written."""
-    return table_in(KEPT)
-
-
-def recorded() -> str:
-    """When and with which versions it was written."""
-    return made_with(KEPT)
-
-
 def main() -> None:
     """Play both engines in all scenes, and write planck.csv; it takes half a minute."""
-    keep(KEPT, table(), [run_of(engine, PROFILES[0], SCENES[0], 1) for engine in (PLANCK, BOX2D)])
+    keep(KEPT, table(), [played(engine, PROFILES[0], SCENES[0], 1) for engine in (PLANCK, BOX2D)])
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from datetime import date
+from functools import cache
 from pathlib import Path
 
 import pandas as pd
@@ -21,6 +22,7 @@ def keep(path: Path, found: pd.DataFrame, runs: Iterable[Run]) -> None:
     put_text(path, f"# {date.today().isoformat()} with {made}\n{text}")
 
 
+@cache
 def table_in(path: Path) -> pd.DataFrame:
     """The table as it was last written."""
     return pd.read_csv(path, comment="#")

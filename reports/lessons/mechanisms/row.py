@@ -2,64 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.ablated import BOX2D, EXERCISE, AblatedReference
-from adapters.play import play_once
-from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider
+from adapters.mechanisms.ablated import BOX2D, EXERCISE
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider, run_of
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     PLAIN,
+    ablated,
     asked,
     distances,
-    filmed,
-    follows,
     lies_on,
-    over,
-    page,
-    runs_of,
 )
 from reports.page.style import TRUTH, number
 from scenarios.families.placing import lay_out
 from scenarios.model import Array, Scenario
-from scenarios.no_truth import answered
-from scenarios.truth.exact import with_oracle
 
+NAMES = ("box2d:matched", "pymunk:matched", PLAIN, ABLATED)
+ORDERS = {"pair by pair": EXERCISE, "together": BOX2D}
 GAP = 1e-6  # m, between the disks of the row that is set beside the touching one
 OVERLAP = 1e-12  # m, of the disks of the other one
 ROUNDING = 1e-12  # m/s: up to 5 impulses at 5 m/s, each rounded a few times in float64
 
 
-def show_row(settings: Settings) -> Shown:
+def show_row(order: str, iterations: int, n: int) -> Shown:
     """The velocities after a disk has struck a row that touches."""
-    n = settings["n"]
-    scenario = struck(n, 0.0)
-    order = {"pair by pair": EXERCISE, "together": BOX2D}[settings["order"]]
-    names = ["box2d:matched", "pymunk:matched"]
-    runs = runs_of(
-        names,
-        AblatedReference(order, iterations=settings["iterations"], touching=True),
-        scenario,
-        4,
-    )
-    curves = over(np.arange(n + 1.0), runs, lambda each: each.velocity[-1, :, 0])
-    facts = distances(runs, curves, "m/s")
-    film = filmed(scenario, runs)
-    assert film.truth is not None
-    curves.append(Curve(TRUTH, np.arange(n + 1.0), film.truth.velocity[-1, :, 0]))
+    makes = ablated(order=ORDERS[order], iterations=iterations, touching=True)
+    played = Simulation.by(struck(n, 0.0), NAMES, 4, makes)
+    curves = played.curves(lambda each: each.velocity[-1, :, 0], np.arange(n + 1.0))
     chart = LessonChart("Velocity after the collision", "disk", "m/s", curves)
     return Shown(
         [chart],
-        film,
-        facts,
-        row_claims(n, settings["order"], settings["iterations"]),
+        played.film,
+        distances(chart, "m/s"),
+        list(row_claims(n, order, iterations)),
         # pair by pair goes through the contacts once
-        said={} if order is BOX2D else {"iterations": "not used pair by pair"},
+        said={} if order == "together" else {"iterations": "not used pair by pair"},
     )
 
 
@@ -79,22 +61,18 @@ def struck(n: int, gap: float) -> Scenario:
 def with_gaps(n: int) -> Array:
     """(n + 1,) m/s at the end of the exact answer to the row with gaps of `GAP`, in which no two
     collisions are simultaneous."""
-    _, truth = answered(with_oracle(struck(n, GAP)))
-    assert truth is not None
-    return truth.velocity[-1, :, 0]
+    return Simulation(struck(n, GAP), ()).truth.velocity[-1, :, 0]
 
 
 @cache
 def overlapping(n: int) -> Array:
     """(n + 1,) m/s: what pymunk:matched makes of a row whose disks overlap by `OVERLAP`."""
-    scenario = replace(struck(n, -OVERLAP), truth=None)
-    name = "pymunk:matched"
-    run = play_once(ENGINES[name].make, name, scenario, scenario.dt(4))
+    run = run_of("pymunk:matched", struck(n, -OVERLAP), 4)
     assert run.trajectory is not None
     return run.trajectory.velocity[-1, :, 0]
 
 
-def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
+def row_claims(n: int, order: str, iterations: int) -> Iterator[Claim]:
     """How the 5 m/s are shared among the disks."""
     last, thrown = np.append(np.zeros(n), 5.0), overlapping(n)
     # 8 iterations over up to 5 contacts, at 5 m/s.
@@ -104,79 +82,69 @@ def row_claims(n: int, order: str, iterations: int) -> list[Claim]:
         y = shown.y("box2d:matched")
         return bool(y[0] < -1 and (y[1:] > 1).all() and abs(y.sum() - 5) < 1e-4)
 
-    claims = [
-        Claim(
-            "In the exact answer the last disk takes all of the 5 m/s and the others stay.",
-            follows(TRUTH, last, 0.0),
+    yield Claim(
+        "In the exact answer the last disk takes all of the 5 m/s and the others stay.",
+        lambda shown: shown.follows(TRUTH, last, 0.0),
+    )
+    yield Claim(
+        f"With gaps of {number(1e6 * GAP)} µm between the disks the pairs collide one after the"
+        " other, and the exact answer ends with the same velocities.",
+        lambda shown: shown.follows(TRUTH, with_gaps(n), ROUNDING),
+    )
+    yield Claim(
+        "reference:exercise takes one pair after the other, and ends with these velocities, too.",
+        lambda shown: shown.follows(PLAIN, last, ROUNDING),
+    )
+    yield Claim(
+        "So does pymunk:matched here, because it finds no contact between disks that just touch. If"
+        f" the disks of the row overlap by {number(OVERLAP)} m, it solves their contacts together:"
+        f" the first disk is thrown back at {number(-thrown[0])} m/s, and all others move on.",
+        lambda shown: (
+            shown.follows("pymunk:matched", last, ROUNDING)
+            and bool(thrown[0] < -1 and (thrown[1:] > 1).all())
         ),
-        Claim(
-            f"With gaps of {number(1e6 * GAP)} µm between the disks the pairs collide one after the"
-            " other, and the exact answer ends with the same velocities.",
-            follows(TRUTH, with_gaps(n), ROUNDING),
-        ),
-        Claim(
-            "reference:exercise takes one pair after the other, and ends with these velocities,"
-            " too.",
-            follows(PLAIN, last, ROUNDING),
-        ),
-        Claim(
-            "So does pymunk:matched here, because it finds no contact between disks that just"
-            " touch."
-            f" If the disks of the row overlap by {number(OVERLAP)} m, it solves their contacts"
-            f" together: the first disk is thrown back at {number(-thrown[0])} m/s, and all others"
-            " move on.",
-            lambda shown: (
-                follows("pymunk:matched", last, ROUNDING)(shown)
-                and bool(thrown[0] < -1 and (thrown[1:] > 1).all())
-            ),
-        ),
-        Claim(
-            "In Box2D the first disk is thrown back and all others move on; the momentum is the"
-            " same.",
-            shared,
-        ),
-    ]
+    )
+    yield Claim(
+        "In Box2D the first disk is thrown back and all others move on; the momentum is the same.",
+        shared,
+    )
     if order == "pair by pair":
-        claims.append(lies_on("pymunk:matched", True, ROUNDING, "m/s"))
+        yield lies_on("pymunk:matched", True, ROUNDING, "m/s")
     if order == "together" and iterations == 50:
         together = 10 / (n + 1)  # m/s: one body of n disks, struck with e = 1
-        claims.append(
-            Claim(
-                "After 50 iterations the row of the ablated reference moves on as one body, at"
-                f" {number(together)} m/s, within 1 mm/s.",
-                follows(ABLATED, np.append(5 - n * together, np.full(n, together)), 1e-3),
-            )
+        yield Claim(
+            "After 50 iterations the row of the ablated reference moves on as one body, at"
+            f" {number(together)} m/s, within 1 mm/s.",
+            lambda shown: shown.follows(
+                ABLATED, np.append(5 - n * together, np.full(n, together)), 1e-3
+            ),
         )
     else:
-        claims.append(
-            lies_on("box2d:matched", order == "together" and iterations == 8, single, "m/s")
-        )
-    return claims
+        yield lies_on("box2d:matched", order == "together" and iterations == 8, single, "m/s")
 
 
-ROW = page(
-    9,
-    "row",
-    "Sequential impulses in a touching row",
-    "What comes out of a row that touches?",
-    (
-        (
-            "A disk strikes a row of disks that touch. All contacts act at the same instant, and"
-            " mechanics does not fix the order in which the pairs collide. The exact answer takes"
-            " one pair after the other. It tries every order, and it exists only where all orders"
-            " end with the same velocities. Here they do: the masses are equal and e = 1, so a"
-            " collision exchanges the two velocities."
-        ),
-        (
-            "The exercise, too, lets one pair after the other collide. A solver of simultaneous"
-            " contacts first fixes the separation speed of each contact: e times its closing speed,"
-            " and 0 where two disks only touch. Then it goes through all contacts again and again,"
-            " a number of <b>iterations</b>."
-        ),
+ROW = Lesson(
+    name="row",
+    number="6.9",
+    title="Sequential impulses in a touching row",
+    asks="What comes out of a row that touches?",
+    text="""
+    A disk strikes a row of disks that touch. All contacts act at the same instant, and
+    mechanics does not fix the order in which the pairs collide. The exact answer takes one pair
+    after the other. It tries every order, and it exists only where all orders end with the same
+    velocities. Here they do: the masses are equal and e = 1, so a collision exchanges the two
+    velocities.
+
+    The exercise, too, lets one pair after the other collide. A solver of simultaneous contacts
+    first fixes the separation speed of each contact: e times its closing speed, and 0 where two
+    disks only touch. Then it goes through all contacts again and again, a number of
+    <b>iterations</b>.
+    """,
+    sliders=(
+        Slider("order", "Contacts", tuple(ORDERS), 0),
+        Slider("iterations", "Iterations", (1, 2, 4, 8, 50), 3),
+        Slider("n", "Disks in the row", (2, 3, 5), 1),
     ),
-    ["box2d:matched", "pymunk:matched"],
-    show_row,
-    Slider("order", "Contacts", ("pair by pair", "together"), 0),
-    Slider("iterations", "Iterations", (1, 2, 4, 8, 50), 3),
-    Slider("n", "Disks in the row", (2, 3, 5), 1),
+    names=(*NAMES, TRUTH),
+    show=show_row,
 )

@@ -4,44 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.mechanisms.ablated import AblatedReference
-from reports.lessons.lesson import Claim, Curve, LessonChart, Settings, Shown, Slider
+from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider
 from reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     PLAIN,
-    asked,
+    ablated,
     distances,
-    filmed,
     lies_on,
-    over,
-    page,
-    runs_of,
     setting_rows,
 )
-from reports.lessons.mechanisms.pairs import pairs, separation
+from reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
 from reports.page.style import TRUTH, number
 
+NAMES = ("box2d:shipped", PLAIN, ABLATED)
 
-def show_threshold(settings: Settings) -> Shown:
+
+def show_threshold(threshold: float, e: float) -> Shown:
     """e of a collision against its closing speed."""
-    closing = np.array(
-        [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]
+    played = Simulation.by(at_all_speeds(e), NAMES, 4, ablated(threshold=threshold))
+    curves = played.curves(separation(CLOSING), CLOSING)
+    chart = LessonChart(
+        "Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x"
     )
-    threshold, e = settings["threshold"], settings["e"]
-    scenario = asked(pairs(closing, e), 0.5)
-    runs = runs_of(["box2d:shipped"], AblatedReference(threshold=threshold), scenario, 4)
-    curves = over(closing, runs, separation(closing))
-    facts = [
-        *setting_rows(runs, "restitution threshold in m/s"),
-        *distances(runs, curves, ""),
-    ]
-    curves.append(Curve(TRUTH, closing, np.full(len(closing), e)))
     rounding = 8 * FLOAT32  # of a ratio of velocities that are rounded a few times
 
     def cut_below(shown: Shown, name: str, speed: float) -> bool:
-        expected = np.where(closing < speed, 0.0, e)
-        return bool(np.abs(shown.y(name) - expected).max() <= rounding)
+        return shown.follows(name, np.where(speed > CLOSING, 0.0, e), rounding)
 
     claims = [
         Claim(
@@ -57,22 +46,24 @@ def show_threshold(settings: Settings) -> Shown:
         ),
         lies_on("box2d:shipped", threshold == 1.0, rounding),
     ]
-    chart = LessonChart(
-        "Separation over approach speed", "closing speed in m/s", "e of the collision", curves, "x"
-    )
-    return Shown([chart], filmed(scenario, runs), facts, claims)
+    facts = [*setting_rows(played.runs, "restitution threshold in m/s"), *distances(chart)]
+    return Shown([chart], played.film, facts, claims)
 
 
-THRESHOLD = page(
-    1,
-    "threshold",
-    "A restitution threshold",
-    "Why do slow disks stick in Box2D?",
-    "An engine may take a collision below a threshold of closing speed as inelastic, so that disks"
-    " come to rest. The threshold is a speed in the units of the scene. Raise it in the ablated"
-    " reference until its curve lies on that of Box2D.",
-    ["box2d:shipped"],
-    show_threshold,
-    Slider("threshold", "Threshold", (0.0, 0.25, 0.5, 1.0, 2.0), 0, "m/s"),
-    Slider("e", "Restitution e", (0.5, 0.9, 1.0), 1),
+THRESHOLD = Lesson(
+    name="threshold",
+    number="6.1",
+    title="A restitution threshold",
+    asks="Why do slow disks stick in Box2D?",
+    text="""
+    An engine may take a collision below a threshold of closing speed as inelastic, so that
+    disks come to rest. The threshold is a speed in the units of the scene. Raise it in the
+    ablated reference until its curve lies on that of Box2D.
+    """,
+    sliders=(
+        Slider("threshold", "Threshold", (0.0, 0.25, 0.5, 1.0, 2.0), 0, "m/s"),
+        Slider("e", "Restitution e", (0.5, 0.9, 1.0), 1),
+    ),
+    names=(*NAMES, TRUTH),
+    show=show_threshold,
 )

@@ -323,13 +323,17 @@ def test_another_engine_can_be_solid(page: Page):
 
 
 def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
-    """Nothing scrolls sideways, on a phone not even the table; Tab comes to every control, with a
-    visible outline."""
+    """Nothing scrolls sideways, on a phone not even the table, where the name of an engine is one
+    line; Tab comes to every control, with a visible outline."""
     page, heard = opened(browser, url, viewport={"width": 400, "height": 800}, color_scheme="dark")
     page.wait_for_function("() => game.field && game.now.frame > 10", timeout=20_000)
     too_wide = overhang(page)
     cut = page.evaluate(
         "(({ scrollWidth: a, clientWidth: b }) => a - b)(document.querySelector('.scroll'))"
+    )
+    names = page.locator(".who").evaluate_all(
+        "all => all.map((each) =>"
+        " each.offsetHeight < 2 * parseFloat(getComputedStyle(each).fontSize))"
     )
     headed = page.locator("tr.solid td[data-cell=collisions]").evaluate(
         "(cell) => getComputedStyle(cell, '::before').content"
@@ -346,6 +350,7 @@ def test_the_page_fits_and_is_reached_by_keyboard(browser: Browser, url: str):
     page.context.close()
 
     assert (too_wide <= 0, cut <= 0, headed) == (True, True, '"Collisions"')
+    assert all(names)
     assert {
         "sky",
         "pause",

@@ -21,7 +21,7 @@ from reports.lessons.limits import SEEN, limits_of
 from reports.lessons.pages import FILES, answer_json, lesson_page
 from reports.page.style import TRUTH
 from reports.stability.limits import LIMIT, QUICK
-from tests.reports.page.browsing import opened
+from tests.reports.lessons.browsing import opened_lesson
 
 COSTLY = ("box", "crowd", "horizon", "limits")  # a second or more for each setting
 EVERY = [pytest.param(name, marks=pytest.mark.long if name in COSTLY else ()) for name in LESSONS]
@@ -133,8 +133,7 @@ def test_the_page_marks_a_sentence_that_its_curves_contradict(
     lesson = LESSONS["order"]
     path = tmp_path / "order.html"
     path.write_text(lesson_page(lesson, answer_json("order", lesson.start), FILES))
-    page, heard = opened(browser, path.as_uri())
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, path.as_uri())
     marked = page.locator(".claims b").all_inner_texts()
     page.context.close()
 
@@ -255,7 +254,7 @@ NO_CLAIM = {
 
 def sentences(lesson: Lesson) -> list[str]:
     """Of its paragraphs, without their markup, each with a capital letter."""
-    plain = re.sub(r"<[^>]*>|\[\w+\]", "", " ".join(lesson.text))
+    plain = re.sub(r"<[^>]*>|\[\w+\]", "", " ".join(lesson.paragraphs))
     return [each[:1].upper() + each[1:] for each in re.split(r"(?<=[.?!:;]) ", plain)]
 
 
@@ -281,7 +280,7 @@ def test_a_float32_number_has_24_binary_digits():
 )
 def test_a_limit_is_bracketed_as_closely_as_the_text_says(cases: int | None):
     """The ratio of what works to what fails, of all limits of the cases of lesson 8."""
-    assert f"{QUICK.ratio - 1:.0%} apart" in LESSONS["limits"].text[0]
+    assert f"{QUICK.ratio - 1:.0%} apart" in LESSONS["limits"].paragraphs[0]
     for seen in list(SEEN.values())[:cases]:
         for limit in limits_of(seen.case):
             if limit.verdict == LIMIT:

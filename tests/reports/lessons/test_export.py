@@ -22,6 +22,7 @@ from reports.lessons.lesson import Shown
 from reports.lessons.mechanisms.ablation import ABLATED
 from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, index_page, linked, offline
 from reports.page.style import TRUTH
+from tests.reports.lessons.browsing import opened_lesson, wait_until_drawn
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
 
@@ -37,7 +38,7 @@ def test_a_lesson_as_a_file_needs_no_server(browser: Browser, tmp_path: Path):
     )
     page, heard = opened(browser, path.as_uri())
     page.on("request", lambda request: heard.append(request.url))
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    wait_until_drawn(page)
     curves = (
         "[...document.querySelectorAll('.curve')].map((curve) => curve.getAttribute('d')).join()"
     )
@@ -64,8 +65,7 @@ def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, t
     path.write_text(
         offline(lesson, {places: answer_json("order", places) for places in lesson.grid})
     )
-    page, heard = opened(browser, path.as_uri(), accept_downloads=True)
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, path.as_uri(), accept_downloads=True)
     files = {}
     for kind in ("SVG", "CSV"):
         with page.expect_download() as download:
@@ -91,15 +91,20 @@ def test_a_chart_of_a_lesson_is_saved_as_picture_and_numbers(browser: Browser, t
 
 
 @pytest.mark.slow
-def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path: Path):
-    """A sheet of A4 sideways, with the longest answers; unbroken in larger letters they do not."""
+def test_the_conventions_of_all_engines_fit_on_a_screen_and_on_paper(
+    browser: Browser, tmp_path: Path
+):
+    """A window of 1280 px, and a sheet of A4 sideways, with the longest answers; unbroken in larger
+    letters they do not."""
     got = dict.fromkeys(ENGINES, ("not modelled", "keeps"))
     asked = [
         Convention("What friction acts in a bounce with e = 0, where 0.2 is stated?", "0", got)
     ]
     path = tmp_path / "index.html"
     path.write_text(index_page(FILES, asked), encoding="utf-8")
-    page, heard = opened(browser, path.as_uri(), viewport={"width": 1032, "height": 703})
+    page, heard = opened(browser, path.as_uri(), viewport={"width": 1280, "height": 800})
+    cut = page.locator(".scroll").evaluate("(table) => table.scrollWidth - table.clientWidth")
+    page.set_viewport_size({"width": 1032, "height": 703})
     page.emulate_media(media="print")
     end = "document.querySelector('.conventions').getBoundingClientRect().right - innerWidth"
     right = page.evaluate(end)
@@ -110,6 +115,7 @@ def test_the_conventions_of_all_engines_fit_on_paper(browser: Browser, tmp_path:
     wide = page.evaluate(end)
     page.context.close()
 
+    assert cut <= 0
     assert right <= 1 < wide
     assert heard == []
 
@@ -131,8 +137,7 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
     page, heard = opened(browser, (tmp_path / "all" / "index.html").as_uri())
     text = page.locator("#measured").inner_text()
     links = page.locator("a").evaluate_all("all => all.map((a) => a.getAttribute('href'))")
-    lesson, more = opened(browser, (tmp_path / "all" / "order.html").as_uri())
-    lesson.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    lesson, more = opened_lesson(browser, (tmp_path / "all" / "order.html").as_uri())
     around = lesson.locator(".crumbs a").evaluate_all(
         "all => all.map((a) => a.getAttribute('href'))"
     )
@@ -178,7 +183,7 @@ def test_a_lesson_links_to_what_it_speaks_of():
 @pytest.mark.parametrize("name", LESSONS)
 def test_every_lesson_that_a_text_speaks_of_is_there(name: str):
     """A name that is wrong raises."""
-    for paragraph in LESSONS[name].text:
+    for paragraph in LESSONS[name].paragraphs:
         assert "[" not in linked(paragraph, LIVE)
 
 

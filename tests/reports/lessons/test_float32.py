@@ -12,24 +12,26 @@ from adapters.npm_packages import missing, version_of
 from reports.lessons.mechanisms.float32 import claim_of_all, shares_of
 from reports.lessons.mechanisms.planck import (
     BOX2D,
+    KEPT,
     LADDER,
     PROFILES,
     SCENES,
-    kept,
     known,
     largest_deviation,
     measured,
-    recorded,
-    run_of,
+    played,
     whole,
 )
+from reports.lessons.mechanisms.recorded import made_with, table_in
 from scenarios.catalogue import SCENARIOS
 from tests.test_readme import TEXTS
 
 QUICK = [*(("free_fall", profile, 64) for profile in PROFILES), ("galperin_3", "matched", 4)]
-EVERY = list(zip(*(kept()[column].tolist() for column in ("scenario", "profile", "substeps"))))
+EVERY = list(
+    zip(*(table_in(KEPT)[column].tolist() for column in ("scenario", "profile", "substeps")))
+)
 fetched = pytest.mark.skipif(bool(missing("planck")), reason=missing("planck"))
-ROWS = kept().set_index(["scenario", "profile", "substeps"])
+ROWS = table_in(KEPT).set_index(["scenario", "profile", "substeps"])
 
 
 def differing(fresh: dict[str, float | str | int], columns: tuple[str, ...]) -> list[str]:
@@ -50,7 +52,7 @@ ROWS_OF_SUITES = (
 
 def box2d_alone(name: str, profile: str, substeps: int) -> dict[str, float | str | int]:
     """Its part of a row, for which no npm package is needed."""
-    error = largest_deviation(whole(run_of(BOX2D, profile, name, substeps)), known(name)[1], name)
+    error = largest_deviation(whole(played(BOX2D, profile, name, substeps)), known(name)[1], name)
     return {"scenario": name, "profile": profile, "substeps": substeps, "box2d_radii": error}
 
 
@@ -97,7 +99,7 @@ def test_the_versions_that_were_recorded_are_those_that_are_pinned():
     assert [
         f"{name} {version}"
         for name, version in pinned.items()
-        if f"{name} {version}" not in recorded()
+        if f"{name} {version}" not in made_with(KEPT)
     ] == []
 
 
@@ -124,7 +126,7 @@ def test_a_share_is_the_error_of_box2d_less_that_of_planck(monkeypatch: pytest.M
         [(name, "matched", known(name)[0].middle_substeps, p, b) for name, p, b in rows],
         columns=["scenario", "profile", "substeps", "planck_radii", "box2d_radii"],
     )
-    monkeypatch.setattr("reports.lessons.mechanisms.float32.kept", lambda: table)
+    monkeypatch.setattr("reports.lessons.mechanisms.float32.table_in", lambda _: table)
     shares_of.cache_clear()
     found = shares_of("matched")
     shares_of.cache_clear()

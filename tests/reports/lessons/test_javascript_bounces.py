@@ -8,16 +8,16 @@ import pytest
 
 from adapters.npm_packages import missing, version_of
 from reports.lessons.mechanisms.javascript_bounces import (
-    CLOSING,
     ENGINES,
+    KEPT,
     RESTITUTIONS,
     VERSIONS,
-    kept,
     measured,
+    played,
     ratios,
-    recorded,
-    run_of,
 )
+from reports.lessons.mechanisms.pairs import CLOSING
+from reports.lessons.mechanisms.recorded import made_with, table_in
 
 LACKING = next(filter(None, map(missing, ("planck", "matter-js", "@dimforge/rapier2d-compat"))), "")
 fetched = pytest.mark.skipif(bool(LACKING), reason=LACKING)
@@ -26,7 +26,7 @@ CASES = [(name, off, e) for name in ENGINES for off in VERSIONS for e in RESTITU
 
 def test_every_engine_has_a_ratio_at_every_speed():
     """In every version, for every e."""
-    assert len(kept()) == len(CASES) * len(CLOSING)
+    assert len(table_in(KEPT)) == len(CASES) * len(CLOSING)
     assert all(len(ratios(*case)) == len(CLOSING) for case in CASES)
 
 
@@ -44,7 +44,7 @@ def test_the_engines_give_what_is_recorded():
 def test_the_versions_that_were_recorded_are_those_that_are_pinned():
     """Another version may bounce otherwise."""
     packages = ("planck", "matter-js", "@dimforge/rapier2d-compat")
-    assert [name for name in packages if f"{name} {version_of(name)}" not in recorded()] == []
+    assert [name for name in packages if f"{name} {version_of(name)}" not in made_with(KEPT)] == []
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
@@ -65,5 +65,5 @@ def test_a_disk_of_matter_is_a_polygon_and_the_matched_one_has_200_sides():
     """At 100 pixels a metre a disk of 0.1 m has 10 pixels, and 10 sides."""
     setting = "sides of the polygon of a disk"
 
-    assert run_of("matter", "nothing", 0.9).settings[setting][1] == 10
-    assert run_of("matter", "all that matched lifts", 0.9).settings[setting][1] == 200
+    assert played("matter", "nothing", 0.9).settings[setting][1] == 10
+    assert played("matter", "all that matched lifts", 0.9).settings[setting][1] == 200

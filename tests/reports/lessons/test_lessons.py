@@ -30,6 +30,7 @@ from reports.page.style import TRUTH
 from scenarios.catalogue import scenario
 from scenarios.no_truth import answered
 from scenarios.truth.exact import with_oracle
+from tests.reports.lessons.browsing import opened_lesson, wait_until_drawn
 from tests.reports.page.browsing import opened, overhang, served
 
 BROWSED, COSTLY = ("order",), ("box", "crowd", "horizon", "limits")
@@ -110,7 +111,7 @@ def test_the_numbers_of_a_collision_are_those_of_the_solver():
     """The impulse that lesson 4 writes out is the one the solver reports, and momentum is kept."""
     scene = two(0.9, 10.0, 1.0).scene
     before, after, reported = collision_of_the_reference(scene, 1 / 64)
-    steps = dict(LESSONS["meeting"].at((2, 2, 2, 1)).steps)
+    steps = LESSONS["meeting"].at((2, 2, 2, 1)).steps
     kick = scene.mass[0] * np.hypot(*(after.velocity[0] - before.velocity[0]))
 
     assert reported == pytest.approx(kick, rel=1e-14)
@@ -182,10 +183,9 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
     """Moved by keyboard; no complaint, nothing wider than the window at 400 and 1280 px, nothing
     moves by itself."""
     lesson: Lesson = LESSONS[name]
-    page, heard = opened(
+    page, heard = opened_lesson(
         browser, f"{url}/{name}", viewport={"width": 400, "height": 800}, reduced_motion="reduce"
     )
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
     drawn = "[...document.querySelectorAll('.curve, .curves .axis')]"
     curves = f"{drawn}.map((each) => each.getAttribute('d') ?? each.textContent).join()"
     for slider in lesson.sliders:
@@ -217,8 +217,9 @@ def test_every_slider_changes_the_curves(browser: Browser, url: str, name: str):
 def test_names_are_chosen_from_a_list_and_numbers_by_a_slider(browser: Browser, url: str):
     """A list says its choice itself, nothing beside it says it again; it goes with the arrow keys,
     prints as it is, and a page that is loaded again starts where its curves do."""
-    page, heard = opened(browser, f"{url}/javascript", viewport={"width": 1280, "height": 900})
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(
+        browser, f"{url}/javascript", viewport={"width": 1280, "height": 900}
+    )
     off = page.get_by_label("Disabled")
     off.focus()
     page.keyboard.press("ArrowDown")
@@ -230,7 +231,7 @@ def test_names_are_chosen_from_a_list_and_numbers_by_a_slider(browser: Browser, 
     prints = off.is_visible()
     page.emulate_media(media="screen")
     page.reload()
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    wait_until_drawn(page)
     again = page.evaluate("lesson.at")
     page.context.close()
 
@@ -246,8 +247,7 @@ def test_names_are_chosen_from_a_list_and_numbers_by_a_slider(browser: Browser, 
 def test_curves_that_coincide_can_be_told_apart(browser: Browser, url: str):
     """Each has its marks at places of its own, and the one that is pointed at, in the legend or in
     the chart, comes to the top; the others fade until it is left."""
-    page, heard = opened(browser, f"{url}/order", viewport={"width": 1280, "height": 1800})
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, f"{url}/order", viewport={"width": 1280, "height": 1800})
     marks = page.locator(".of").evaluate_all(
         "all => all.map((each) => [...each.querySelectorAll('.mark')]"
         ".map((mark) => mark.getAttribute('transform').split(',')[0]))"
@@ -323,8 +323,7 @@ def test_what_cannot_be_shown_is_reported(url: str, path: str, status: int, said
 def test_a_slider_that_is_dragged_asks_for_where_it_stops(browser: Browser, url: str):
     """Not for every place it passes: a lesson that takes a second would answer half a minute
     later."""
-    page, heard = opened(browser, f"{url}/row", viewport={"width": 1280, "height": 900})
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, f"{url}/row", viewport={"width": 1280, "height": 900})
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.evaluate("""for (let k = 0; k < 12; k++) {
@@ -376,13 +375,12 @@ def test_sliders_and_a_chart_fit_the_window_together(
 ):
     """Whatever is scrolled to: the sliders stay at the top. Lesson 9.1 has most of both."""
     width, height = size
-    page, heard = opened(
+    page, heard = opened_lesson(
         browser,
         f"{url}/friction",
         viewport={"width": width, "height": height},
         reduced_motion="reduce",
     )
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
     seen = []
     for chart in range(3):
         page.evaluate(
@@ -408,8 +406,7 @@ def test_what_is_of_another_setting_is_grey_and_a_long_wait_is_explained(
     browser: Browser, url: str
 ):
     """Sentences and numbers, too; once the answer is there, nothing is grey and nothing waits."""
-    page, heard = opened(browser, f"{url}/order", viewport={"width": 1280, "height": 900})
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(browser, f"{url}/order", viewport={"width": 1280, "height": 900})
     page.evaluate("""() => {
       const asked = window.fetch;
       const told = new Promise((go) => { window.answer = go; });
@@ -437,8 +434,9 @@ def test_what_is_of_another_setting_is_grey_and_a_long_wait_is_explained(
 @pytest.mark.slow
 def test_the_replay_is_on_paper_and_says_whom_it_leaves_out(browser: Browser, url: str):
     """The picture at the time at which it stands, without its buttons."""
-    page, heard = opened(browser, f"{url}/javascript", viewport={"width": 1280, "height": 900})
-    page.wait_for_function("() => window.lesson && document.querySelector('.curve')")
+    page, heard = opened_lesson(
+        browser, f"{url}/javascript", viewport={"width": 1280, "height": 900}
+    )
     page.evaluate("lesson.ready")
     said = page.locator(".replayed").inner_text()
     page.emulate_media(media="print")

@@ -92,7 +92,7 @@ def test_the_run_fails_beyond_the_limit_and_only_there(
     nothing."""
     shown = LESSON.at(at(case, engine, place))
     curves = {curve.name: np.asarray(curve.y) for curve in shown.charts[0].curves}
-    here = dict(shown.steps)["Here"]
+    here = shown.steps["Here"]
 
     assert ("event" in shown.opening) == fails
     assert ("0 of" in here or "none of" in here or "it works" in here) != fails
@@ -111,8 +111,8 @@ def test_refusals_are_shown_beside_the_exact_answer():
     shown = LESSON.at(at("spin", "box2d:matched", 8))
 
     assert [curve.name for curve in shown.charts[0].curves] == [TRUTH]
-    assert "the most that Box2D allows" in dict(shown.steps)["Here"]
-    assert "b2_maxRotation" in dict(shown.steps)["Why"]
+    assert "the most that Box2D allows" in shown.steps["Here"]
+    assert "b2_maxRotation" in shown.steps["Why"]
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_the_share_that_is_drawn_is_of_all_runs_as_the_text_counts_them():
     values = [SEEN["a fast disk meets another"].value(place) for place in HARSHNESS]
     place = values.index(4.0)
     shown = LESSON.at(at("tunnelling_head_on", "box2d:matched", place))
-    failed, runs = re.search(r"(\d+) of (\d+) runs fail", dict(shown.steps)["Here"]).groups()
+    failed, runs = re.search(r"(\d+) of (\d+) runs fail", shown.steps["Here"]).groups()
     x, y = shown.x("box2d:matched", 1), shown.y("box2d:matched", 1)
 
     assert (failed, runs) == ("15", "32")  # half of the phases, by geometry: 2 R missed in each 4 R
