@@ -22,6 +22,7 @@ from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
 from reports.compare.view import beside
+from reports.page.style import number
 from reports.run.machine import busy_cores
 from reports.run.scenes import open_scene
 from reports.run.stepping import Stepping
@@ -135,7 +136,8 @@ class Advice:
 
     Attributes:
         scene: the name of the scene.
-        until, duration: s, how far the exact answer goes and how long the scene is.
+        until, duration: s, up to where errors are judged, and how long the scene is.
+        collisions: how many of the exact answer are judged.
         step_sizes: s, those that were tried, coarse to fine.
         keeping: for every engine that keeps the error, and plays the whole scene, the coarsest step
             size at which it keeps it, as at every finer one; cheapest first.
@@ -150,6 +152,7 @@ class Advice:
     scene: str
     until: float
     duration: float
+    collisions: int
     step_sizes: Sequence[float]
     keeping: Sequence[Attempt]
     short: Sequence[OutOfReach]
@@ -157,6 +160,13 @@ class Advice:
     changes: Sequence[ChangedOption]
     noise: float
     busy: float
+
+    @property
+    def judged(self) -> str:
+        """The part of the scene in which errors are judged, as the end of a sentence."""
+        early = self.until < self.duration and not self.collisions
+        part = f"up to {number(self.until)} of {number(self.duration)} s"
+        return f"{part}, before any collision" if early else part
 
     @property
     def quiet(self) -> bool:
@@ -212,6 +222,7 @@ def advise(
         scenario.name,
         scenario.duration,
         open_scene(scene, seed).duration,
+        len(scored(scene, seed).truth.collisions),
         [scenario.dt(k) for k in step_sizes],
         sorted(plain.values(), key=lambda one: one.cost),
         reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),

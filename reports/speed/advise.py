@@ -66,6 +66,7 @@ def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
         "error_at_most": bound,
         "until_s": advice.until,
         "duration_s": advice.duration,
+        "collisions_judged": advice.collisions,
         "dt_s_tried": list(advice.step_sizes),
         "cheapest_first": [row_of_attempt(one) for one in advice.keeping],
         "not_within": [
@@ -108,8 +109,7 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     times are."""
     console = Console()
     console.print(
-        f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)},"
-        f" up to {number(advice.until)} of {number(advice.duration)} s",
+        f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)}, {advice.judged}",
         highlight=False,
     )
     console.print()
@@ -144,7 +144,10 @@ def print_choices(console: Console, advice: Advice) -> None:
         for one in advice.keeping[:SHOWN]
     ]
     headings = ["engine", "dt, ms", "error", "µs per\nsimulated s"]
-    print_table(console, headings, rows, "Cheapest first, in the whole scene")
+    title = "Cheapest first, in the whole scene"
+    if advice.until < advice.duration:
+        title = f"Cheapest first: error {advice.judged}; cost of the whole scene"
+    print_table(console, headings, rows, title)
     if dearer := advice.keeping[SHOWN:]:
         names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for one in dearer)
         console.print(f"Also within it: {names}.", highlight=False)
@@ -177,7 +180,8 @@ def print_short(console: Console, advice: Advice) -> None:
 
 def print_changes(console: Console, advice: Advice, bound: float) -> None:
     """Print the effect of each option of the engines that keep the error."""
-    title = "What the scene does not need: one option changed, at the same step size"
+    what = "this part of the scene" if advice.until < advice.duration else "the scene"
+    title = f"What {what} does not need: one option changed, at the same step size"
     rows = [
         [
             f"{change.plain.name}, {change.changed.change}",
