@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from adapters.engines import ENGINES
 from reports.page.style import number
 from reports.run.arguments import checked_engines, checked_scenes, unknown
-from reports.speed.advice import BUSY, LOUD, Advice, Attempt, NoAdvice, advise
+from reports.speed.advice import BUSY, LOUD, Advice, Attempt, Inquiry, NoAdvice
 from reports.speed.purposes import PURPOSES
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
@@ -35,7 +35,8 @@ def give_advice(
     names = checked_engines(engines, ENGINES)
     with stoppable(), Progress() as progress:
         try:
-            advice = advise(checked, seed, purpose, bound, names, os.cpu_count() or 1, progress)
+            asked = Inquiry(checked, seed, purpose, os.cpu_count() or 1, progress)
+            advice = asked.advice(bound, names)
         except NoAdvice as why:
             say(f"{scene}: {why}")
             sys.exit(FAILED)

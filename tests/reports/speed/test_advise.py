@@ -33,9 +33,8 @@ from reports.speed.advice import (
     Advice,
     Attempt,
     ChangedOption,
-    ladder_of,
+    Inquiry,
     those_that_keep,
-    to_the_end,
 )
 from reports.speed.advise import print_advice, sentence_on_times
 from reports.speed.plan import PLAIN
@@ -106,7 +105,7 @@ def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
         Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "pymunk:matched")
     ]
     with Progress() as progress:
-        able, partly = to_the_end("column_of_ten", 0, 1, progress, found)
+        able, partly = Inquiry("column_of_ten", 0, "trajectory", 1, progress).to_the_end(found)
 
     assert [one.name for one in able] == ["pymunk:matched"]
     assert [one.name for one in partly] == ["event_driven:float64"]
@@ -186,7 +185,7 @@ def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
     """Two step sizes at least, so that one finer can speak for a coarser."""
     for name in SCENARIOS:
         scenario = open_scene(name, 0)
-        steps = ladder_of(scenario)
+        steps = Inquiry(name, 0, "trajectory", 1, Progress()).ladder
         assert steps[0] == scenario.substeps[0]
         assert len(steps) >= 2
         assert all(fine == 2 * coarse for coarse, fine in pairwise(steps))
