@@ -28,7 +28,7 @@ from reports.speed.kept import Kept
 from reports.speed.measure import measure
 from reports.speed.page import write_page
 from reports.speed.plan import SpeedPlan
-from reports.speed.results import Results
+from reports.speed.results import QUIET, Results
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.exits import DONE, FAILED, broken_off, say
@@ -189,15 +189,15 @@ def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
 
 def said_of_noise(results: Results) -> str:
     """The noise floor in a sentence, and what to do where it is too loud."""
-    noise = results.noise_summary()
-    if not noise["pairs"]:
+    noise = results.noise_floor()
+    if not noise.pairs:
         return "No engine was timed against itself, so the noise floor is not known."
     said = (
-        f"Noise floor: the time of an engine over its own time again is {noise['median']:.3f}; for"
-        f" half of {noise['pairs']} pairs it is from {noise['low']:.3f} to"
-        f" {noise['high']:.3f}."
+        f"Noise floor: the time of an engine over its own time again is {noise.median:.3f}; for"
+        f" half of {noise.pairs} pairs it is from {noise.low:.3f} to"
+        f" {noise.high:.3f}."
     )
-    if noise["quiet"]:
+    if noise.floor <= QUIET:
         return said
     return (
         f"{said} It must stay between 0.95 and 1.05: measure again while nothing else runs before"

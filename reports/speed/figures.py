@@ -101,7 +101,7 @@ def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.Dat
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
     """Write the figures as CSV, below comment lines with the machine, the versions and how quiet
     the machine was."""
-    noise = results.noise_summary()
+    noise = results.noise_floor()
     about = {
         "command": header["command"],
         "seed": header["seed"],
@@ -109,9 +109,7 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
         **header["machine"],
         **header["versions"],
         "busy cores": f"{header['load']:.2f}",
-        "an engine against itself": (
-            f"{noise['median']:.3f} ({noise['low']:.3f} to {noise['high']:.3f})"
-        ),
+        "an engine against itself": (f"{noise.median:.3f} ({noise.low:.3f} to {noise.high:.3f})"),
         "scenes": len(results.scenes),
     }
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())

@@ -19,12 +19,13 @@ from reports.compare.pareto import (
 )
 from reports.compare.pooling import POOLED, pooled
 from reports.run.scenes import open_scene
+from reports.run.timing import Noise, noise_of
 from reports.speed import cheapest, explained, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
 from reports.terminal.foreign_text import put_text
 
-QUIET = 0.05  # how far from 1 an engine against itself may read
+QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 
 
 @dataclass
@@ -144,23 +145,10 @@ class Results:
         """See `tables.noise`."""
         return tables.noise(self.measured)
 
-    def noise_summary(self, scene: str = "") -> dict[str, float]:
-        """median, low, high (quartiles), least, most and pairs of an engine against itself; quiet:
-        within `QUIET`."""
+    def noise_floor(self, scene: str = "") -> Noise:
+        """That of an engine against itself, in one scene or in all; quiet up to `QUIET`."""
         ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
-        if ratios.empty:
-            return {"pairs": 0, "quiet": False}
-        low, median, high = np.percentile(ratios, [25, 50, 75])
-        quiet = max(abs(low - 1), abs(high - 1)) <= QUIET
-        return {
-            "median": float(median),
-            "low": float(low),
-            "high": float(high),
-            "least": float(ratios.min()),
-            "most": float(ratios.max()),
-            "pairs": len(ratios),
-            "quiet": bool(quiet),
-        }
+        return noise_of(ratios.to_numpy(float))
 
     @cached_property
     def driving(self) -> pd.DataFrame:
