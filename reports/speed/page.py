@@ -283,7 +283,7 @@ def sweep_sections(results: Results) -> list[SpeedSection]:
         charts.sweeps(results.pooled_sweeps, relative=True),
     )
     each = {
-        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.sweeps(points))
+        str(scene): Drawing(str(scene), open_scene(str(scene), 0).asks, charts.sweeps(points))
         for scene, points in results.sweeps.groupby("scenario", sort=False)
     }
     return [

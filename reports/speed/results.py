@@ -24,7 +24,9 @@ from reports.speed import cheapest, explained, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
 from reports.terminal.foreign_text import put_text
+from scenarios.model import Scenario
 
+NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
 QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 
 
@@ -46,11 +48,17 @@ class Results:
         return self.measured.left_out
 
     @cached_property
+    def asked(self) -> dict[str, Scenario]:
+        """The scenarios that were asked for, by name."""
+        opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
+        return {scenario.name: scenario for scenario in opened}
+
+    @cached_property
     def asks(self) -> dict[str, str]:
         """Scenario -> its question, for the measured scenarios in the order in which they were
         asked for."""
-        named = dict(tables.asks_of(scene) for scene in self.plan.scenes)
-        return {name: asks for name, asks in named.items() if name in set(self.points.scenario)}
+        measured = set(self.points.scenario)
+        return {name: one.asks for name, one in self.asked.items() if name in measured}
 
     @property
     def scenes(self) -> list[str]:
@@ -62,8 +70,7 @@ class Results:
         """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs
         per simulated s."""
         points = tables.points(self.measured, self.plan.seed)
-        scenarios = {tables.asks_of(scene)[0]: scene for scene in self.plan.scenes}
-        return points.assign(idle=tables.idle(self.bindings, points, scenarios))
+        return points.assign(idle=tables.idle(self.bindings, points, self.asked))
 
     @cached_property
     def orders(self) -> pd.DataFrame:
@@ -78,8 +85,9 @@ class Results:
     def poolable(self, table: pd.DataFrame) -> pd.DataFrame:
         """The rows of scenes without friction, which alone are pooled; all rows if every scene
         has friction."""
-        opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
-        rough = table.scenario.isin([one.name for one in opened if one.scene.friction])
+        rough = table.scenario.isin(
+            [name for name, one in self.asked.items() if one.scene.friction]
+        )
         return table if rough.all() else table[~rough]
 
     @cached_property
@@ -112,19 +120,11 @@ class Results:
         for (engine, profile, accuracy), group in self.poolable(self.reached).groupby(
             ["engine", "profile", "accuracy"], sort=False
         ):
-            counts = {
-                "of": len(group),
-                "got": int(group.cost.notna().sum()),
-                "never": int((group.why == UNREACHABLE).sum()),
-                "failed": int((group.why == FAILED).sum()),
-                "untimed": int((group.why == NOT_TIMED).sum()),
-            }
-            most = 2 * counts["got"] > len(group)
-            others = [
-                f"{what} in {counts[what]}"
-                for what in ("never", "failed", "untimed")
-                if counts[what]
-            ]
+            got = int(group.cost.notna().sum())
+            others = {name: int((group.why == why).sum()) for name, why in NOT_GOT.items()}
+            said = [f"{got} of {len(group)}"]
+            said += [f"{name} in {count}" for name, count in others.items() if count]
+            most = 2 * got > len(group)
             rows.append(
                 {
                     "scenario": POOLED,
@@ -133,9 +133,11 @@ class Results:
                     "accuracy": accuracy,
                     "cost": paired_cost(group, own[own.accuracy == accuracy]) if most else np.nan,
                     "dt_s": np.nan,
-                    "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
+                    "why": ", ".join(said),
                     "lost": 2 * int(group.lost.sum()) >= len(group),
-                    **counts,
+                    "of": len(group),
+                    "got": got,
+                    **others,
                 }
             )
         return pd.DataFrame(rows)
@@ -160,19 +162,15 @@ class Results:
         """See `tables.bindings`."""
         return tables.bindings(self.measured)
 
-    @property
+    @cached_property
     def sizes(self) -> pd.DataFrame:
-        """Costs of `tables.grown`."""
-        return self._grown[0]
-
-    @property
-    def growth(self) -> pd.DataFrame:
-        """Exponents of `tables.grown`."""
-        return self._grown[1]
+        """See `tables.sizes`."""
+        return tables.sizes(self.measured)
 
     @cached_property
-    def _grown(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        return tables.grown(self.measured)
+    def growth(self) -> pd.DataFrame:
+        """See `tables.growth`."""
+        return tables.growth(self.sizes, self.measured.stopped)
 
     @cached_property
     def options(self) -> pd.DataFrame:
@@ -202,21 +200,16 @@ class Results:
         why) as columns."""
         orders = self.orders[self.orders.scenario == scene]
         reached = self.reached[self.reached.scenario == scene]
-        wide = orders.assign(
-            **{
-                accuracy: [
-                    next(
-                        reached[
-                            (reached.engine == engine)
-                            & (reached.profile == profile)
-                            & (reached.accuracy == accuracy)
-                        ][["cost", "dt_s", "why"]].itertuples(index=False, name=None)
-                    )
-                    for engine, profile in zip(orders.engine, orders.profile)
-                ]
-                for accuracy in ACCURACIES
-            }
+        got = dict(
+            zip(
+                zip(reached.engine, reached.profile, reached.accuracy),
+                zip(reached.cost, reached.dt_s, reached.why),
+            )
         )
+        who = list(zip(orders.engine, orders.profile))
+        wide = orders.copy()
+        for accuracy in ACCURACIES:
+            wide[accuracy] = [got[*each, accuracy] for each in who]
         beside = self.bindings[self.bindings.scenario == scene].drop(columns="scenario")
         wide = wide.merge(beside, on=["engine", "profile"], how="left")
         return wide.assign(name=wide.engine + ":" + wide.profile)

@@ -14,12 +14,12 @@ from adapters.mechanisms.options import SWEEPS
 from reports.compare.order import FINEST, NEARER, Order, median_interval, order_of
 from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
 from reports.compare.pooling import WHO, pooled
-from reports.run.scenes import open_scene
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
 from reports.run.timing import WARM_UP
 from reports.speed.measure import SIZE, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.sizes import exponent
+from scenarios.model import Scenario
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
@@ -151,26 +151,21 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
     """
     rows = []
     for keys, dt, errors, changes in ladders(measured):
-        found = (
-            order_of(dt, errors, changes, seed)
-            if errors.shape[1] >= 2
-            else Order(np.nan, np.nan, np.nan, "")
-        )
-        if not np.isfinite(errors).any():
-            found = Order(np.nan, np.nan, np.nan, FAILED)
+        failed = ~np.isfinite(errors)
+        if failed.all() or len(dt) < 2:
+            found = Order(np.nan, np.nan, np.nan, FAILED if failed.all() else "")
+        else:
+            found = order_of(dt, errors, changes, seed)
+        coarsest, finest = np.median(errors[:, [0, -1]], axis=0).tolist()
         rows.append(
             dict(zip(["scenario", *WHO], keys))
             | found._asdict()
             | {
                 "finest_dt_s": dt[-1],
                 "steps": len(dt),
-                **dict(
-                    zip(
-                        ("coarsest_error", "finest_error"),
-                        np.median(errors[:, [0, -1]], axis=0).tolist(),
-                    )
-                ),
-                "failed": int((~np.isfinite(errors)).any(axis=0).sum()),
+                "coarsest_error": coarsest,
+                "finest_error": finest,
+                "failed": int(failed.any(axis=0).sum()),
             }
         )
     return pd.DataFrame(rows)
@@ -265,12 +260,10 @@ def driving(found: pd.DataFrame) -> pd.DataFrame:
     return in_order(medians.assign(read_most_us=each.read_us.max()).reset_index())
 
 
-def idle(found: pd.DataFrame, points: pd.DataFrame, scenes: Mapping[str, str]) -> pd.Series:
+def idle(found: pd.DataFrame, points: pd.DataFrame, scenarios: Mapping[str, Scenario]) -> pd.Series:
     """Of each row of `points` what its steps and calls cost where there is nothing to do, µs per
-    simulated second; nan where `found`, of `bindings`, does not say. scenes: by the name of the
-    scenario."""
+    simulated second; nan where `found`, of `bindings`, does not say."""
     both = points[["scenario", *WHO, "substeps"]].merge(found, on=["scenario", *WHO], how="left")
-    scenarios = {name: open_scene(scene, 0) for name, scene in scenes.items()}
     values = [
         binding_of(
             row["step_us"],
@@ -290,29 +283,26 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
     return table.loc[names.map(ranks).sort_values(kind="stable").index]
 
 
-def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """(engine, profile, n, cost in µs a step and so on) and (engine, profile, exponent, low, high,
-    stopped)."""
+def sizes(measured: Measured) -> pd.DataFrame:
+    """engine, profile, n, cost in µs a step, and the other columns of `summed_up`."""
     samples = measured.samples[measured.samples.kind == SIZE]
     costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
-    costs = in_order(costs.reset_index(drop=True))
+    return in_order(costs.reset_index(drop=True))
+
+
+def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:
+    """engine, profile, exponent of the costs of `sizes`, low, high, most (disks), and where and why
+    it was first stopped, `Measured.stopped`."""
+    first = {who: f"{n}: {why}" for (who, n), why in reversed([*stopped.items()])}
+    timed = costs.engine + ":" + costs.profile
     rows = []
-    timed = (costs.engine + ":" + costs.profile).tolist()
     # some engines were stopped at the smallest number of disks
-    for name in dict.fromkeys([*timed, *(name for name, _ in measured.stopped)]):
-        engine, profile = name.split(":")
-        group = costs[(costs.engine == engine) & (costs.profile == profile)]
+    for name in dict.fromkeys([*timed, *(name for name, _ in stopped)]):
+        group = costs[timed == name]
         fitted = exponent(group.n.to_numpy(float), group.cost.to_numpy(float))
-        ends = [f"{n}: {why}" for (who, n), why in measured.stopped.items() if who == name]
-        rows.append(
-            {"engine": engine, "profile": profile}
-            | dict(zip(("exponent", "low", "high"), fitted))
-            | {
-                "most": int(group.n.max()) if len(group) else 0,
-                "stopped": ends[0] if ends else "",
-            }
-        )
-    return costs, pd.DataFrame(rows)
+        most = int(group.n.max()) if len(group) else 0
+        rows.append([*name.split(":"), *fitted, most, first.get(name, "")])
+    return pd.DataFrame(rows, columns=[*WHO, "exponent", "low", "high", "most", "stopped"])
 
 
 def options(measured: Measured) -> pd.DataFrame:
@@ -351,9 +341,3 @@ def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
         }
     )
     return table.reset_index()
-
-
-def asks_of(scene: str) -> tuple[str, str]:
-    """Name and question of a scene."""
-    scenario = open_scene(scene, 0)
-    return scenario.name, scenario.asks

@@ -185,7 +185,8 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
     measured = Measured(
         samples=pd.DataFrame([sample]), stopped={("box2d:matched", 3): "refused: no"}
     )
-    costs, growth = tables.grown(measured)
+    costs = tables.sizes(measured)
+    growth = tables.growth(costs, measured.stopped)
     names = [trace.name for trace in go.Figure(charts.sizes(costs, growth)).data]
 
     assert growth.set_index("engine").stopped.to_dict() == {"pymunk": "", "box2d": "3: refused: no"}
