@@ -30,53 +30,46 @@ LOOSE = 3.0
 def figures(results: Results) -> pd.DataFrame:
     """Columns `COLUMNS`: the pooled points, the cost of each accuracy, the cost by number of
     disks with its exponent, and what a call costs."""
-    failed = results.pooled.failed
+    pooled, reached, sizes = results.pooled, results.pooled_reached, results.sizes
+    growth, driving = results.growth, results.driving
+    failed = pooled.failed.map("failed in {}".format) + pooled.of.map(" of {}".format)
     parts = [
-        results.pooled.assign(
+        pooled.assign(
             figure="pooled error",
-            at=results.pooled.step_size,
-            value=results.pooled.error,
-            low=results.pooled.error_low,
-            high=results.pooled.error_high,
+            at=pooled.step_size,
+            value=pooled.error,
+            low=pooled.error_low,
+            high=pooled.error_high,
             unit="radii",
-            note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format),
+            note=failed,
         ),
-        results.pooled.assign(
-            figure="pooled cost",
-            at=results.pooled.step_size,
-            value=results.pooled.cost,
-            unit="us/s",
-        ),
-        results.pooled.assign(
+        pooled.assign(figure="pooled cost", at=pooled.step_size, value=pooled.cost, unit="us/s"),
+        pooled.assign(
             figure="pooled cost less idle steps",
-            at=results.pooled.step_size,
-            value=results.pooled.bare,
+            at=pooled.step_size,
+            value=pooled.bare,
             low=np.nan,
             high=np.nan,
             unit="us/s",
         ),
-        results.pooled_reached.assign(
+        reached.assign(
             figure="cost at accuracy",
-            at=results.pooled_reached.accuracy,
-            value=results.pooled_reached.cost,
-            note=results.pooled_reached.why,
+            at=reached.accuracy,
+            value=reached.cost,
+            note=reached.why,
             unit="us/s",
         ),
-        results.sizes.assign(
-            figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"
+        sizes.assign(figure="cost of a step", at=sizes.n, value=sizes.cost, unit="us"),
+        growth.assign(
+            figure="exponent", at=growth.most, value=growth.exponent, note=growth.stopped, unit="1"
         ),
-        results.growth.assign(
-            figure="exponent",
-            at=results.growth.most,
-            value=results.growth.exponent,
-            note=results.growth.stopped,
-            unit="1",
+        driving.assign(figure="idle step", value=driving.step_us, unit="us"),
+        driving.assign(figure="read-out", value=driving.read_us, unit="us"),
+        driving.assign(figure="idle call", value=driving.call_us, unit="us"),
+        cheaper(results.versus, AGAINST, "cheaper"),
+        cheaper(results.versus, AGAINST_BARE, "bare_cheaper").assign(
+            value=np.nan, low=np.nan, high=np.nan
         ),
-        results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
-        results.driving.assign(figure="read-out", value=results.driving.read_us, unit="us"),
-        results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
-        cheaper(results.versus, AGAINST, "cheaper", "ratio"),
-        cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
     ]
     table = pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
     # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
@@ -84,18 +77,14 @@ def figures(results: Results) -> pd.DataFrame:
     return table[~names.isin([name for name, row in ENGINES.items() if row.adds_friction])]
 
 
-def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:
-    """A row for each engine and change of `versus`: in which scenes it costs less than `YARDSTICK`;
-    value: the ratio."""
+def cheaper(versus: pd.DataFrame, figure: str, count: str) -> pd.DataFrame:
+    """A row for each engine and change of `versus`: the ratio of its cost to that of `YARDSTICK`,
+    and the scenes in which it costs less."""
     rows = versus[versus[count].notna()]
-    numbers = {
-        name: rows[column] if value else np.nan
-        for name, column in (("value", "ratio"), ("low", "low"), ("high", "high"))
-    }
     said = (
         rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
     )
-    return rows.assign(figure=figure, at=rows.change, note=said, unit="1", **numbers)
+    return rows.assign(figure=figure, at=rows.change, value=rows.ratio, note=said, unit="1")
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:

@@ -11,25 +11,16 @@ from typing import Any
 from reports.run.folders import may_go_on
 from reports.run.journal import Journal, numbers, plain
 from reports.run.journal_lines import checked_lines, no_use
-from reports.speed.lines import KINDS, scene_of, stranger
+from reports.speed.lines import KINDS, BudgetRow, Closed, ErrorRow, SampleRow, scene_of, stranger
 from scenarios.model import Scenario
 
-TEXT = frozenset(
-    (
-        "kind",
-        "scenario",
-        "engine",
-        "profile",
-        "change",
-        "status",
-        "reason",
-        "contribution",
-        "note",
-        "truth",
-        "stopped",
-        "task",
-    )
-)  # columns of results that hold text
+# columns of results that hold text, and what holds numbers and text
+TEXT = {"status", "stopped", "task"} | {
+    name
+    for row in (ErrorRow, BudgetRow, SampleRow, Closed)
+    for name, field in row.model_fields.items()
+    if field.annotation is str
+}
 
 
 class Kept:
@@ -57,27 +48,27 @@ class Kept:
         self.journal, folder = journal, journal.path.parent
         lines = []
         for number, kind, line in checked_lines(folder, KINDS):
-            if (kind == "header") != (number == 1):
-                what = (
-                    "only the first line may be the header"
-                    if number > 1
-                    else "the first line must be the header"
-                )
+            if kind != "header" and number == 1:
                 raise ValueError(
-                    no_use(folder, number, what, KINDS.asked if number == 1 else KINDS.missed)
+                    no_use(folder, number, "the first line must be the header", KINDS.asked)
+                )
+            if kind == "header" and number > 1:
+                raise ValueError(
+                    no_use(folder, number, "only the first line may be the header", KINDS.missed)
                 )
             lines.append(line)
-        same = bool(lines) and lines[0]["header"] == json.loads(json.dumps(plain(header)))
-        may_go_on(folder, len(lines[1:]), same, resume)
-        for number, line in enumerate(lines[1:] if same else [], start=2):
-            if fault := misfit(line, scenarios):
-                raise ValueError(no_use(folder, number, fault, KINDS.missed))
-        self.results = (
-            {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
-        )
+        header_before, tasks = (lines[0]["header"], lines[1:]) if lines else (None, [])
+        same = header_before == json.loads(json.dumps(plain(header)))
+        may_go_on(folder, len(tasks), same, resume)
+        self.results: dict[str, Any] = {}
         if not same:
             os.truncate(journal.path, 0)
             journal.append({"header": header})
+            return
+        for number, line in enumerate(tasks, start=2):
+            if fault := misfit(line, scenarios):
+                raise ValueError(no_use(folder, number, fault, KINDS.missed))
+            self.results[json.dumps(line["task"])] = line["result"]
 
     def __len__(self) -> int:
         """The number of tasks that the interrupted measurement finished."""

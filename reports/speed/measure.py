@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import groupby
+from math import nan
 from typing import Any
 
 import pandas as pd
@@ -52,12 +53,12 @@ class Measured:
     """
 
     errors: pd.DataFrame = field(default_factory=pd.DataFrame)
-    budget: pd.DataFrame = field(default_factory=pd.DataFrame)
+    budget: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=budget.COLUMNS))
     samples: pd.DataFrame = field(default_factory=lambda: samples_table([]))
     truths: pd.DataFrame = field(default_factory=pd.DataFrame)
     left_out: list[tuple[str, str]] = field(default_factory=list)
     stopped: dict[tuple[str, int], str] = field(default_factory=dict)
-    busy: float = float("nan")
+    busy: float = nan
 
 
 def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -213,16 +214,12 @@ def in_turns(
 
     On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
     """
-    all_of_them = {}
-    for measurement in measurements:
-        for k in measurement.step_sizes:
-            twice = (
-                measurement.kind == SCENE
-                and k == measurement.step_sizes[len(measurement.step_sizes) // 2]
-            )
-            for copy in (0, 1) if twice else (0,):
-                all_of_them[(measurement.name, measurement.change), k, copy] = measurement.make
-    return all_of_them
+    return {
+        ((one.name, one.change), k, copy): one.make
+        for one in measurements
+        for place, k in enumerate(one.step_sizes)
+        for copy in ((0, 1) if one.kind == SCENE and place == len(one.step_sizes) // 2 else (0,))
+    }
 
 
 def scene_rows(
@@ -230,21 +227,17 @@ def scene_rows(
 ) -> list[dict[str, Any]]:
     """Rows of `Measured.samples` of measurements as `in_turns` gives them; where these are of a
     scene's ladders, of what is measured beside their steps, too."""
-    scenario, rows = open_scene(scene, seed), []
+    scenario = open_scene(scene, seed)
+    rows = []
     also = {who[0]: make for (who, _, _), make in measurements.items()} if kind == SCENE else {}
     for sample in ladder.times_of(scene, seed, measurements, **repeats, also=also):
         if len(sample.key) == 2:
             name, what = sample.key
             rows.append(sample_row(what, name, sample, scenario=scenario.name))
-            continue
-        (name, change), k, copy = sample.key
-        identity = {
-            "scenario": scenario.name,
-            "change": change,
-            "dt_s": scenario.dt(k),
-            "copy_of": copy,
-        }
-        rows.append(sample_row(kind, name, sample, **identity))
+        else:
+            (name, change), k, copy = sample.key
+            whose = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k)}
+            rows.append(sample_row(kind, name, sample, **whose, copy_of=copy))
     return rows
 
 
@@ -263,25 +256,11 @@ def size_rows(
 def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
-    unknown = {
-        "scenario": "",
-        "change": PLAIN,
-        "dt_s": float("nan"),
-        "n": 0,
-        "copy_of": 0,
-    }
-    return (
-        {"kind": kind, "engine": engine, "profile": profile}
-        | unknown
-        | identity
-        | {
-            "round": sample.round,
-            "place": sample.place,
-            "cost": sample.cost,
-            "wrapping": sample.wrapping,
-            "runs": sample.runs,
-        }
-    )
+    row: dict[str, Any] = {"kind": kind, "engine": engine, "profile": profile}
+    row |= {"scenario": "", "change": PLAIN, "dt_s": nan, "n": 0, "copy_of": 0} | identity
+    row |= sample._asdict()
+    del row["key"]
+    return row
 
 
 def done(

@@ -180,10 +180,7 @@ class Results:
     @cached_property
     def explained(self) -> pd.DataFrame:
         """See `explained.explained`."""
-        budget = self.measured.budget
-        return (
-            explained.explained(budget) if len(budget) else pd.DataFrame(columns=explained.COLUMNS)
-        )
+        return explained.explained(self.measured.budget)
 
     @cached_property
     def versus(self) -> pd.DataFrame:
