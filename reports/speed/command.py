@@ -25,7 +25,7 @@ from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
 from reports.speed.kept import Kept
-from reports.speed.measure import measure
+from reports.speed.measure import Measuring
 from reports.speed.page import write_page
 from reports.speed.plan import SpeedPlan
 from reports.speed.results import QUIET, Results
@@ -122,7 +122,7 @@ def carry_out(
     with Progress() as progress:
         if resume:
             progress.note(f"Kept from the interrupted run: {counted(len(kept), 'task')}.")
-        results = Results(plan, measure(plan, progress, kept))
+        results = Results(plan, Measuring(plan, progress, kept).run())
         progress.say("writing the tables and the page")
         return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
 

@@ -121,7 +121,7 @@ def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
     else none is lost."""
     words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
     with monkeypatch.context() as patch:
-        patch.setattr(measure, "measure_times", interrupted)
+        patch.setattr(measure.Measuring, "measure_times", interrupted)
         first = crosscheck(*words, cwd=tmp_path)
     unasked = crosscheck(*words, cwd=tmp_path)
     monkeypatch.setattr(ladder, "errors_of", fails)
