@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import DISTINCT, ENGINES
+from reports.compare.pareto import YARDSTICK
 from reports.speed.results import Results
 from reports.terminal.foreign_text import put_text
 
@@ -19,8 +20,7 @@ KEPT = Path(__file__).parent / "figures.csv"
 # of the same run, errors only
 ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
-YARDSTICK = ("reference", "exercise")
-AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
+AGAINST, AGAINST_BARE = f"cost over {YARDSTICK}", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
 # the largest factor by which a ratio may differ from the kept one: compilers and processors differ
 # by less, a lost optimisation by more
@@ -138,11 +138,10 @@ def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
         (f"{row['engine']}:{row['profile']}", int(float(row["at"]))): float(row["best"])
         for row in rows.to_dict("records")
     }
-    yardstick = ":".join(YARDSTICK)
     return {
-        (name, n): cost / best[yardstick, n]
+        (name, n): cost / best[YARDSTICK, n]
         for (name, n), cost in best.items()
-        if n in GATED and name != yardstick and (yardstick, n) in best
+        if n in GATED and name != YARDSTICK and (YARDSTICK, n) in best
     }
 
 
@@ -160,7 +159,7 @@ def drifted(
         if not 1 / LOOSE <= change <= LOOSE:
             said.append(
                 f"{name}, {n} disks: a step costs {fresh[name, n]:.3g} times that of"
-                f" {':'.join(YARDSTICK)}, kept is {kept[name, n]:.3g}; allowed is a factor of"
+                f" {YARDSTICK}, kept is {kept[name, n]:.3g}; allowed is a factor of"
                 f" {LOOSE:g}"
             )
     return said

@@ -21,7 +21,6 @@ from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
 from reports.speed.results import QUIET, Results
 from reports.speed.scored_part import scored
-from reports.speed.versus import OWN
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import put_text
 
@@ -75,7 +74,7 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         driving=results.driving.to_dict("records"),
         option_rows=results.options.to_dict("records"),
         versus=results.versus.to_dict("records"),
-        own=OWN,
+        own=YARDSTICK,
         left_out=results.left_out,
         accuracies=list(ACCURACIES),
         flagged=FLAGGED,

@@ -11,7 +11,7 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import SWEEPS
-from reports.compare.order import FINEST, NEARER, Order, median_interval, order_of
+from reports.compare.order import Order, median_interval, order_of
 from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
 from reports.compare.pooling import WHO, pooled
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
@@ -169,17 +169,6 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def no_nearer(fitted: pd.DataFrame) -> pd.Series:
-    """For each row of `orders`, whether the error falls by less than a tenth from the coarsest
-    to the finest step.
-
-    False if all steps failed, or if the finest one has an error of at most `FINEST`; True if
-    only the finest step failed.
-    """
-    falls = fitted.finest_error < NEARER * fitted.coarsest_error
-    return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
 
 
 def ladders(
