@@ -25,7 +25,7 @@ from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
 from reports.speed.kept import Kept
-from reports.speed.measure import Measuring
+from reports.speed.measure import Measured, Measuring
 from reports.speed.page import write_page
 from reports.speed.plan import SpeedPlan
 from reports.speed.results import QUIET, Results
@@ -75,9 +75,10 @@ def run_speed(
         broken_off(part, lambda: f"The finished part is kept in {part}: ask again with --resume"),
         kept.journal,
     ):
-        results, header = carry_out(plan, header, kept, resume)
-        if not results.measured.errors.size:
-            nothing_measured(part, results)
+        measured, header = carry_out(plan, header, kept, resume)
+        if measured.errors.empty:
+            nothing_measured(part, measured)
+        results = Results(plan, measured)
         write_all(part, results, header)
         journal.close()
         replace_folder(part, out, SPEED)
@@ -85,10 +86,10 @@ def run_speed(
     sys.exit(DONE)
 
 
-def nothing_measured(part: Path, results: Results) -> NoReturn:
+def nothing_measured(part: Path, measured: Measured) -> NoReturn:
     """Delete the unfinished folder, and print why no error can be measured; exits 1."""
     discard(part, SPEED)
-    for what, why in results.left_out:
+    for what, why in measured.left_out:
         say(f"{what}: {why}")
     say("no scene that was asked for has an exact answer, so no error can be measured")
     sys.exit(FAILED)
@@ -117,14 +118,14 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume
 
 def carry_out(
     plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool
-) -> tuple[Results, dict[str, Any]]:
-    """The results, and the header of tables and page."""
+) -> tuple[Measured, dict[str, Any]]:
+    """What was measured, and the header of tables and page."""
     with Progress() as progress:
         if resume:
             progress.note(f"Kept from the interrupted run: {counted(len(kept), 'task')}.")
-        results = Results(plan, Measuring(plan, progress, kept).run())
+        measured = Measuring(plan, progress, kept).run()
         progress.say("writing the tables and the page")
-        return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
+        return measured, header | {"seconds": progress.seconds, "load": measured.busy}
 
 
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:

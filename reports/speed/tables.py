@@ -12,14 +12,25 @@ import pandas as pd
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import SWEEPS
 from reports.compare.order import Order, median_interval, order_of
-from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
-from reports.compare.pooling import WHO, pooled
+from reports.compare.pareto import (
+    ACCURACIES,
+    FAILED,
+    NOT_REACHED,
+    NOT_TIMED,
+    UNREACHABLE,
+    cost_to_reach,
+    paired_cost,
+    yardstick_of,
+)
+from reports.compare.pooling import POOLED, WHO, pooled
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
 from reports.run.timing import WARM_UP
 from reports.speed.measure import SIZE, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.sizes import exponent
 from scenarios.model import Scenario
+
+NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
@@ -54,6 +65,8 @@ def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
     change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
     part in it.
     """
+    if found.empty:
+        return found
     both = found.merge(at_matched(found), on=["scenario", "engine"], suffixes=("", "_here"))
     both = both[measurable(both)]
     for of in ("cost", "error"):
@@ -210,6 +223,42 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
                     "lost": why in (UNREACHABLE, FAILED),
                 }
             )
+    return pd.DataFrame(rows)
+
+
+def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
+    """As `reached`, one cost for all scenarios where an engine gets there in more than half of
+    them: `paired_cost`, and how many do and do not.
+
+    A median over all of them would be that of other scenarios for each engine; with many out
+    of reach, of the dearest. Columns besides: of, how many scenarios; got, in how many it gets
+    there; never, at no dt; failed; untimed; in the others it does not down to the finest dt.
+    lost: half or more are never or failed. `part`: the rows of `found`, from `reached`, of the
+    scenarios that are pooled.
+    """
+    rows = []
+    own = yardstick_of(found)
+    for (engine, profile, accuracy), group in part.groupby([*WHO, "accuracy"], sort=False):
+        got = int(group.cost.notna().sum())
+        others = {name: int((group.why == why).sum()) for name, why in NOT_GOT.items()}
+        said = [f"{got} of {len(group)}"]
+        said += [f"{name} in {count}" for name, count in others.items() if count]
+        most = 2 * got > len(group)
+        rows.append(
+            {
+                "scenario": POOLED,
+                "engine": engine,
+                "profile": profile,
+                "accuracy": accuracy,
+                "cost": paired_cost(group, own[own.accuracy == accuracy]) if most else np.nan,
+                "dt_s": np.nan,
+                "why": ", ".join(said),
+                "lost": 2 * int(group.lost.sum()) >= len(group),
+                "of": len(group),
+                "got": got,
+                **others,
+            }
+        )
     return pd.DataFrame(rows)
 
 
