@@ -172,15 +172,8 @@ class Samples(TaskResult):
         """No round is missing, and none is there twice."""
         rounds = defaultdict[tuple[Any, ...], list[int]](list[Any])
         for row in self.result:
-            what = (
-                row.kind,
-                row.scenario,
-                row.name,
-                row.change,
-                str(row.dt_s),
-                row.n,
-                row.copy_of,
-            )
+            whose = row.kind, row.scenario, row.name, row.change
+            what = (*whose, str(row.dt_s), row.n, row.copy_of)
             rounds[what].append(row.round)
         for what, those in rounds.items():
             if sorted(those) != list(range(WARM_UP, WARM_UP + len(those))):
