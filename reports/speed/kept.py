@@ -9,18 +9,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.run.folders import may_go_on
-from reports.run.journal import Journal, numbers, plain
+from reports.run.journal import Journal, plain
 from reports.run.journal_lines import checked_lines, no_use
-from reports.speed.lines import KINDS, BudgetRow, Closed, ErrorRow, SampleRow, scene_of, stranger
+from reports.speed.lines import KINDS, misfit, numbered
 from scenarios.model import Scenario
-
-# columns of results that hold text, and what holds numbers and text
-TEXT = {"status", "stopped", "task"} | {
-    name
-    for row in (ErrorRow, BudgetRow, SampleRow, Closed)
-    for name, field in row.model_fields.items()
-    if field.annotation is str
-}
 
 
 class Kept:
@@ -85,23 +77,3 @@ class Kept:
     def add(self, task: tuple[Any, ...], result: Any) -> None:
         """Store the result of a task."""
         self.journal.append({"task": task, "result": result})
-
-
-def numbered(value: Any) -> Any:
-    """As `numbers`, but for what is text, which may be "nan"."""
-    if isinstance(value, list):
-        return [numbered(item) for item in value]
-    if isinstance(value, dict):
-        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
-    return numbers(value)
-
-
-def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
-    """Why a line belongs to none of the scenarios, as the end of a sentence; "" if it belongs to
-    one."""
-    scene = scene_of(line["task"])
-    if not scene:
-        return ""
-    if scene not in scenarios:
-        return f"task = {str(line['task'])[:60]}: must be of a scene that is measured"
-    return stranger(numbered(line), scenarios[scene])

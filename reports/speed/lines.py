@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from adapters.run import STATUSES
+from reports.run.journal import numbers
 from reports.run.journal_lines import (
     Count,
     EngineProfile,
@@ -278,6 +279,13 @@ class SpeedTaskLine(Line):
         return self
 
 
+# columns of results that hold text, and what holds numbers and text
+TEXT = {"status", "stopped", "task"} | {
+    name
+    for row in (ErrorRow, BudgetRow, SampleRow, Closed)
+    for name, field in row.model_fields.items()
+    if field.annotation is str
+}
 KINDS = Kinds(
     {"header": SpeedHeaderLine, "task": SpeedTaskLine},
     "delete that line, and --resume measures again what it was of",
@@ -285,17 +293,26 @@ KINDS = Kinds(
 )
 
 
-def scene_of(task: list[Any]) -> str:
-    """The scene of a task; "" if it has none."""
-    if task[0] == "budget":
-        return str(task[1])
-    return str(task[2]) if len(task) > 2 else ""
+def numbered(value: Any) -> Any:
+    """As `numbers`, but for what is text, which may be "nan"."""
+    if isinstance(value, list):
+        return [numbered(item) for item in value]
+    if isinstance(value, dict):
+        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
+    return numbers(value)
 
 
-def stranger(line: Mapping[str, Any], scenario: Scenario) -> str:
-    """Why a result does not belong to the scenario, as the end of a sentence; "" if it does."""
-    rows = line["result"] if isinstance(line["result"], list) else [line["result"]]
-    for k, row in enumerate(rows):
+def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
+    """Why a line belongs to none of the scenarios, as the end of a sentence; "" if it belongs to
+    one, or is of no scene."""
+    task = line["task"]
+    scene = "".join(map(str, task[1:2] if task[0] == "budget" else task[2:3]))
+    if not scene:
+        return ""
+    if scene not in scenarios:
+        return f"task = {str(task)[:60]}: must be of a scene that is measured"
+    scenario, result = scenarios[scene], numbered(line["result"])
+    for k, row in enumerate(result if isinstance(result, list) else [result]):
         if row["scenario"] != scenario.name:
             return f"result[{k}].scenario = {row['scenario']!r}: must be {scenario.name!r}"
         if "dt_s" in row and row.get("kind") not in (EMPTY, CALL, READ):  # these have no step size

@@ -3,7 +3,7 @@ noise floor."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -162,17 +162,23 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
     steps, how many were played, and failed, at how many of them a seed failed: what failed has no
     part in slope and verdict.
     """
+    found = measured.errors[measured.errors.kind == SCENE]
     rows = []
-    for keys, dt, errors, changes in ladders(measured):
+    for keys, group in found.groupby(["scenario", *WHO], sort=False):
+        errors, changes = (
+            group.pivot(index="seed", columns="substeps", values=value).to_numpy(float)
+            for value in ("error_radii", "change_radii")
+        )
+        dt = np.sort(group.dt_s.unique())[::-1]  # coarse to fine, as the columns
         failed = ~np.isfinite(errors)
         if failed.all() or len(dt) < 2:
-            found = Order(np.nan, np.nan, np.nan, FAILED if failed.all() else "")
+            order = Order(np.nan, np.nan, np.nan, FAILED if failed.all() else "")
         else:
-            found = order_of(dt, errors, changes, seed)
+            order = order_of(dt, errors, changes, seed)
         coarsest, finest = np.median(errors[:, [0, -1]], axis=0).tolist()
         rows.append(
             dict(zip(["scenario", *WHO], keys))
-            | found._asdict()
+            | order._asdict()
             | {
                 "finest_dt_s": dt[-1],
                 "steps": len(dt),
@@ -182,20 +188,6 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
-
-
-def ladders(
-    measured: Measured,
-) -> Iterator[tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]]:
-    """(scenario, engine, profile), dt (k,), errors and changes (seeds, k), coarse to fine."""
-    errors = measured.errors[measured.errors.kind == SCENE]
-    for keys, group in errors.groupby(["scenario", *WHO], sort=False):
-        wide = [
-            group.pivot(index="seed", columns="substeps", values=value)
-            for value in ("error_radii", "change_radii")
-        ]
-        dt = np.sort(group.dt_s.unique())[::-1]
-        yield tuple(keys), dt, wide[0].to_numpy(float), wide[1].to_numpy(float)
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:

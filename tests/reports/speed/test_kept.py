@@ -14,7 +14,8 @@ from reports.run.journal import Journal
 from reports.speed import ladder, measure
 from reports.speed.command import kept_of
 from reports.speed.effort import QUICK
-from reports.speed.kept import TEXT, Kept, numbered
+from reports.speed.kept import Kept
+from reports.speed.lines import TEXT, numbered
 from reports.speed.measure import done
 from reports.speed.plan import SpeedPlan
 from reports.terminal import progress as terminal
