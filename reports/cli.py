@@ -172,8 +172,7 @@ def run(
         run_command.resume(
             resume, means, alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT)
         )
-    command = as_typed()
-    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, command)
+    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, as_typed())
 
 
 @app.command()
@@ -462,15 +461,7 @@ def speed(
     """
     from reports.speed.command import run_speed
 
-    run_speed(
-        scenes or [],
-        engine or [],
-        full,
-        resume,
-        seed,
-        out,
-        as_typed(),
-    )
+    run_speed(scenes or [], engine or [], full, resume, seed, out, as_typed())
 
 
 @app.command()
@@ -516,13 +507,7 @@ def stability(
             help=f"What to vary in FILE.toml: {VARIED}. Repeatable. Default: each of them.",
         ),
     ] = None,
-    engine: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME[:PROFILE]|FILE",
-            help="Play only this engine: a name, or a file of your own. Repeatable.",
-        ),
-    ] = None,
+    engine: Engines = None,
     full: Annotated[
         bool,
         typer.Option(
@@ -540,8 +525,7 @@ def stability(
     """
     from reports.stability.command import find_limits
 
-    command = as_typed()
-    find_limits(cases or [], vary or [], engine or [], full, resume, out, workers, command)
+    find_limits(cases or [], vary or [], engine or [], full, resume, out, workers, as_typed())
 
 
 @app.command()

@@ -41,17 +41,16 @@ def said_of(engines: Sequence[str]) -> dict[str, list[Said]]:
     """The check of each solver's file among these engines, its sentences also printed on standard
     error: the game plays them with their faults."""
     tasks: dict[Hashable, Any] = {name: check for name, check in checks_of(engines).items()}
-    found: dict[str, list[Said]] = {}
     if not tasks:
-        return found
+        return {}
+    found: dict[str, list[Said]] = {}
     with closing(run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)) as results:
         for name, check in results:
-            late = f"It was not checked within {CHECKING:g} s: crosscheck check says more."
-            found[name] = (
-                with_lines([late], [])
-                if isinstance(check, Failure)
-                else with_lines(check.says, check.shown)
-            )
+            if isinstance(check, Failure):
+                late = f"It was not checked within {CHECKING:g} s: crosscheck check says more."
+                found[name] = with_lines([late], [])
+            else:
+                found[name] = with_lines(check.says, check.shown)
     found = {name: found[name] for name in engines if name in found}
     for line in lines({name: [sentence for sentence, _ in found[name]] for name in found}):
         say(line)
@@ -60,14 +59,9 @@ def said_of(engines: Sequence[str]) -> dict[str, list[Said]]:
 
 def lines(found: Mapping[str, list[str]]) -> list[str]:
     """Lines for a terminal: the file, then its sentences."""
-    return [
-        line
-        for name, says in found.items()
-        for line in (
-            f"{name.removesuffix(OWN)}, by crosscheck check:",
-            *(
-                f"  {k}. {sentence}" if len(says) > 1 else f"  {sentence}"
-                for k, sentence in enumerate(says, 1)
-            ),
-        )
-    ]
+    said = []
+    for name, says in found.items():
+        said.append(f"{name.removesuffix(OWN)}, by crosscheck check:")
+        for k, sentence in enumerate(says, 1):
+            said.append(f"  {k}. {sentence}" if len(says) > 1 else f"  {sentence}")
+    return said

@@ -135,20 +135,14 @@ def again(
     finally:
         worker.close()
     if outcome is None:
-        return (
-            "crashed",
-            "its process was ended from outside",
-            from_trail(worker.left(), scenario),
-        )
+        left = from_trail(worker.left(), scenario)
+        return "crashed", "its process was ended from outside", left
     if isinstance(outcome, bytes):
         outcome = pickle.loads(outcome)
     if isinstance(outcome, Failure):
         return outcome.status, outcome.reason, from_trail(outcome.trail, scenario)
-    return (
-        outcome.run.status,
-        outcome.run.reason,
-        load_trajectory(io.BytesIO(outcome.file)) if outcome.file else None,
-    )
+    played = load_trajectory(io.BytesIO(outcome.file)) if outcome.file else None
+    return outcome.run.status, outcome.run.reason, played
 
 
 def recorded(archive: Archive, record: dict[str, Any]) -> Trajectory | None:

@@ -95,15 +95,23 @@ def print_summary(report: Report, page: str) -> None:
 def medians(
     comparisons: Sequence[Comparison], untrusted: Set[str]
 ) -> tuple[list[str], list[list[str]], list[str]]:
-    """The headings and rows of the summary, and the engines without a row because they do not model
-    friction."""
+    """The headings and rows of the summary, the last with the numbers of scenes, and the engines
+    without a row because they do not model friction."""
     found = overview.summary(comparisons, overview.names_of(comparisons), untrusted)
     columns, shown = overview.with_numbers(found)
     without = [name for name, cells in found.items() if cells[-1].text == overview.NO_FRICTION]
     rows = [
         [name, *(c.text for c in cells)] for name, cells in shown.items() if name not in without
     ]
+    if rows and len(comparisons) > 1:
+        rows.append(["in scenes", *map(numbers_of_scenes, zip(*shown.values()))])
     return ["engine", *map(heading, columns)], rows, without
+
+
+def numbers_of_scenes(column: Sequence[overview.OverviewCell]) -> str:
+    """Of how many scenes the medians of a column are: "9", "5–8", or "" if there is none."""
+    counts = sorted({cell.scenes for cell in column if cell.scenes})
+    return "–".join(map(str, dict.fromkeys((*counts[:1], *counts[-1:]))))
 
 
 def heading(column: overview.SummaryColumn) -> str:
@@ -123,8 +131,8 @@ def title_of(scenes: int, rough: bool = False) -> str:
     if scenes == 1:
         return f"Largest error in the scene{kind}, at its middle step size; lower is better"
     return (
-        f"Largest error in a scene, at its middle step size: median of {scenes} scenes"
-        f"{kind}; lower is better"
+        f"Largest error in a scene, at its middle step size: median of up to {scenes} scenes"
+        f"{kind} (last row: of how many); lower is better"
     )
 
 

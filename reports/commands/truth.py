@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import partial
 from typing import Any, NoReturn
 
@@ -37,10 +36,8 @@ def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float
     scenario = open_scene(checked, seed)
     # In a worker, which can always be stopped.
     task = partial(record_here, checked, seed, timeout)
-    with (
-        waiting(f"the exact answer to {scenario.name}"),
-        closing(run_all({checked: task}, 1, timeout)) as results,
-    ):
+    with Progress() as progress, closing(run_all({checked: task}, 1, timeout)) as results:
+        progress.say(f"the exact answer to {scenario.name}")
         [(_, record)] = results
     if isinstance(record, Failure | str):
         why = (
@@ -55,17 +52,6 @@ def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float
     else:
         print_truth(scenario, record, every)
     sys.exit(DONE)
-
-
-@contextmanager
-def waiting(what: str) -> Iterator[None]:
-    """Show on a terminal what is being computed, and the time so far."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    with Progress() as progress:
-        progress.say(what)
-        yield
 
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:

@@ -34,7 +34,7 @@ NO_FRICTION = "no friction"  # text for an engine without a model of friction
 class OverviewCell(NamedTuple):
     """A cell of a table: text, a longer remark, a step of the heat ramp (-1: none), failed, the
     best, one of `pooled.flukes`, of how many collisions it speaks; for a median also its value, the
-    worst value as text and its scene."""
+    worst value as text, its scene, and of how many scenes it is."""
 
     text: str
     remark: str = ""
@@ -46,6 +46,7 @@ class OverviewCell(NamedTuple):
     value: float = np.nan
     worst: str = ""
     worst_in: str = ""
+    scenes: int = 0
 
 
 class TableNumber(NamedTuple):
@@ -288,7 +289,10 @@ def pool(
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
     worst = totals[worst_in]
     shown = "no result" if np.isinf(worst) else number(worst) if worst else ""
-    return OverviewCell(number(value), remark, value=value, worst=shown, worst_in=worst_in)
+    scenes = len(totals)
+    return OverviewCell(
+        number(value), remark, value=value, worst=shown, worst_in=worst_in, scenes=scenes
+    )
 
 
 def heat_map(

@@ -7,7 +7,6 @@ import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import groupby
 from math import inf, isfinite, isnan, log, nan
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
 from reports.compare.view import beside
+from reports.page.style import number
 from reports.run.machine import busy_cores
 from reports.run.scenes import open_scene
 from reports.run.stepping import Stepping
@@ -82,8 +82,8 @@ class Attempt:
     @property
     def make(self) -> Callable[[], Engine]:
         """A function that makes the engine."""
-        made = {(option.engine, option.change): option.make for option in OPTIONS}
-        return made.get((self.name, self.change)) or row_of(self.name).make
+        options = {option.change: option.make for option in OPTIONS if option.engine == self.name}
+        return options.get(self.change) or row_of(self.name).make
 
     @property
     def task(self) -> tuple[str, str, int]:
@@ -131,11 +131,12 @@ class OutOfReach(NamedTuple):
 
 @dataclass(frozen=True)
 class Advice:
-    """The result of `advise`.
+    """The result of `Inquiry.advice`.
 
     Attributes:
         scene: the name of the scene.
-        until, duration: s, how far the exact answer goes and how long the scene is.
+        until, duration: s, up to where errors are judged, and how long the scene is.
+        collisions: how many of the exact answer are judged.
         step_sizes: s, those that were tried, coarse to fine.
         keeping: for every engine that keeps the error, and plays the whole scene, the coarsest step
             size at which it keeps it, as at every finer one; cheapest first.
@@ -150,6 +151,7 @@ class Advice:
     scene: str
     until: float
     duration: float
+    collisions: int
     step_sizes: Sequence[float]
     keeping: Sequence[Attempt]
     short: Sequence[OutOfReach]
@@ -157,6 +159,13 @@ class Advice:
     changes: Sequence[ChangedOption]
     noise: float
     busy: float
+
+    @property
+    def judged(self) -> str:
+        """The part of the scene in which errors are judged, as the end of a sentence."""
+        early = self.until < self.duration and not self.collisions
+        part = f"up to {number(self.until)} of {number(self.duration)} s"
+        return f"{part}, before any collision" if early else part
 
     @property
     def quiet(self) -> bool:
@@ -169,72 +178,166 @@ class Advice:
         return max(self.noise, LOUD) if self.quiet else inf
 
 
-def advise(
-    scene: str,
-    seed: int,
-    purpose: str,
-    bound: float,
-    names: Sequence[str],
-    workers: int,
-    progress: Progress,
-) -> Advice:
-    """Which of the engines `names` keeps the error of a purpose of `PURPOSES` within `bound` at the
-    least cost.
-
-    Every engine is played at every step size of the scene's ladder, up to the horizon of the exact
-    answer. Those that keep the error play the whole scene and are timed in it, together with their
-    options, alone on the machine.
+@dataclass(frozen=True)
+class Inquiry:
+    """What is asked about a scene: which engine keeps an error of `purpose`, a key of `PURPOSES`,
+    at the least cost. `scenario` and `truth`: see `scored`.
 
     Raises:
-        NoAdvice: the scene has no exact answer, or the timing failed.
+        NoAdvice: the scene has no exact answer.
     """
-    run = partial(attempts, scene, seed, purpose, workers, progress)
-    scenario = scored_scenario(scene, seed)
-    step_sizes = ladder_of(scenario)
-    tried = run([(name, PLAIN, k) for name in names for k in step_sizes])
-    found = [(one, those_that_keep(one, bound)) for one in by_engine(tried)]
-    keeping, partly = to_the_end(
-        scene, seed, workers, progress, [kept[0] for _, kept in found if kept]
-    )
-    error_at = {one.task: one.error for one in [*tried, *run(options_of(keeping, step_sizes))]}
-    changed = [
-        replace(one, change=change, error=error_at[one.name, change, one.substeps])
-        for one in keeping
-        for change in changes(one)
-    ]
-    able, _ = to_the_end(scene, seed, workers, progress, changed)
-    priced, differences, busy = timed(scene, seed, [*keeping, *able], progress)
-    plain = {one.name: one for one in priced if one.change == PLAIN}
-    short = [
-        OutOfReach(min(one, key=smallest), one[-1].error, "") for one, kept in found if not kept
-    ]
-    return Advice(
-        scenario.name,
-        scenario.duration,
-        open_scene(scene, seed).duration,
-        [scenario.dt(k) for k in step_sizes],
-        sorted(plain.values(), key=lambda one: one.cost),
-        reasons(scene, seed, purpose, short, step_sizes[-1], workers, progress),
-        partly,
-        [
-            ChangedOption(plain[one.name], one, errors_nearby(one, step_sizes, error_at))
+
+    scene: str
+    seed: int
+    purpose: str
+    workers: int
+    progress: Progress
+
+    def __post_init__(self) -> None:
+        try:
+            scored(self.scene, self.seed)
+        except NoTruth as refusal:
+            raise NoAdvice(
+                f"no exact answer: {refusal}. To compare the engines with each other and with the"
+                f" laws of physics: crosscheck run {shlex.quote(self.scene)}"
+            ) from refusal
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario up to the horizon of its exact answer."""
+        return scored(self.scene, self.seed).scenario
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        """Steps in a sample interval, coarse to fine."""
+        return doublings(self.scenario, MOST_WORK // max(self.scenario.scene.n, FEW))
+
+    def advice(self, bound: float, names: Sequence[str]) -> Advice:
+        """Which of the engines `names` keeps the error within `bound` at the least cost.
+
+        Every engine is played at every step size of the scene's ladder, up to the horizon of the
+        exact answer. Those that keep the error play the whole scene and are timed in it, together
+        with their options, alone on the machine.
+
+        Raises:
+            NoAdvice: the timing failed.
+        """
+        ladder, scenario = self.ladder, self.scenario
+        tried = self.attempts([(name, PLAIN, k) for name in names for k in ladder])
+        by_engine = {name: [one for one in tried if one.name == name] for name in names}
+        kept = {name: those_that_keep(each, bound) for name, each in by_engine.items()}
+        keeping, partly = self.to_the_end([each[0] for each in kept.values() if each])
+        at = {one.name: one.substeps for one in keeping}
+        optional = self.attempts(
+            [
+                (option.engine, option.change, k)
+                for name in at
+                for option in OPTIONS
+                if option.engine == name
+                for k in (*neighbours(at[name], ladder), at[name])
+            ]
+        )
+        able, _ = self.to_the_end([one for one in optional if one.substeps == at[one.name]])
+        priced, differences, busy = self.timed([*keeping, *able])
+        plain = {one.name: one for one in priced if one.change == PLAIN}
+        error_at = {one.task: one.error for one in (*tried, *optional)}
+        return Advice(
+            scenario.name,
+            scenario.duration,
+            open_scene(self.scene, self.seed).duration,
+            len(scored(self.scene, self.seed).truth.collisions),
+            [scenario.dt(k) for k in ladder],
+            sorted(plain.values(), key=lambda one: one.cost),
+            self.reasons([each for name, each in by_engine.items() if not kept[name]]),
+            partly,
+            [
+                ChangedOption(plain[one.name], one, errors_nearby(one, ladder, error_at))
+                for one in priced
+                if one.change != PLAIN
+            ],
+            float(np.percentile([*differences.values()], 75)) if differences else nan,
+            busy,
+        )
+
+    def attempts(self, asked: Iterable[tuple[str, str, int]]) -> list[Attempt]:
+        """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
+        dt = self.scenario.dt
+        wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
+        tasks = {
+            one.task: partial(error_of, self.scene, self.seed, self.purpose, one) for one in wanted
+        }
+        outcomes = self.done(tasks, "playing")
+        return [
+            replace(one, error=inf, reason=f"{outcome.status}: {outcome.reason}")
+            if isinstance(outcome := outcomes[one.task], Failure)
+            else replace(one, error=outcome[0], reason=outcome[1])
+            for one in wanted
+        ]
+
+    def to_the_end(self, wanted: Sequence[Attempt]) -> tuple[list[Attempt], list[Attempt]]:
+        """The attempts that play the whole scene, beyond the horizon of its exact answer, too; and
+        those that do not, each with the reason."""
+        tasks = {one.task: partial(end_of, self.scene, self.seed, one) for one in wanted}
+        outcomes = self.done(tasks, "playing to the end")
+        able: list[Attempt] = []
+        partly: list[Attempt] = []
+        for one in wanted:
+            outcome = outcomes[one.task]
+            why = f"{outcome.status}: {outcome.reason}" if isinstance(outcome, Failure) else outcome
+            (partly if why else able).append(replace(one, reason=why))
+        return able, partly
+
+    def timed(
+        self, played: Sequence[Attempt]
+    ) -> tuple[list[Attempt], dict[tuple[str, int], float], float]:
+        """The attempts with their costs in the whole scene; for each engine and step size the
+        difference of two timings of the same engine, |log(cost / cost of its copy)|; and the number
+        of cores that others used."""
+        if not played:
+            return [], {}, nan
+        makes = {(one.task, one.substeps, 0): one.make for one in played}
+        twice = {(one.task, one.substeps, 1): one.make for one in played if one.change == PLAIN}
+        task = partial(times_of_whole, self.scene, self.seed, makes | twice)
+        busy = busy_cores()
+        [(_, samples)] = done({("time",): task}, 1, self.progress, "timing", ALL_ROUNDS)
+        if isinstance(samples, Failure):
+            raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
+        times = summed_up(pd.DataFrame(samples), ["key"])
+        cost = dict(zip(times.key, times.cost))
+        priced = [replace(one, cost=cost[one.task, one.substeps, 0]) for one in played]
+        differences = {
+            (one.name, one.substeps): abs(log(cost[one.task, one.substeps, 1] / one.cost))
             for one in priced
-            if one.change != PLAIN
-        ],
-        float(np.percentile([*differences.values()], 75)) if differences else nan,
-        busy,
-    )
+            if one.change == PLAIN
+        }
+        return priced, differences, busy
 
+    def reasons(self, ladders: Sequence[Sequence[Attempt]]) -> list[OutOfReach]:
+        """What each engine, of which all attempts are given, coarse to fine, comes to; and the
+        largest contribution to its error at the finest step, from the error budget."""
+        finest = self.ladder[-1]
+        best = [min(each, key=smallest) for each in ladders]
+        tasks = {
+            one.task: partial(budget_of, self.scene, self.seed, played_as(one.name), finest)
+            for one in best
+            if played_as(one.name) in MECHANISMS and isfinite(one.error)
+        }
+        budgets = self.done(tasks, "error budget")
+        measure = "energy" if self.purpose == "energy" else "position_radii"
+        return [
+            OutOfReach(
+                one,
+                each[-1].error,
+                one.reason
+                or (ASK_THE_EXERCISE if row_of(one.name).exercise else "")
+                or largest(budgets.get(one.task), measure),
+            )
+            for one, each in zip(best, ladders)
+        ]
 
-def options_of(keeping: Sequence[Attempt], ladder: Sequence[int]) -> list[tuple[str, str, int]]:
-    """The engines with each of their options changed, at the step size of each and its
-    neighbours."""
-    return [
-        (one.name, change, k)
-        for one in keeping
-        for change in changes(one)
-        for k in (*neighbours(one.substeps, ladder), one.substeps)
-    ]
+    def done(self, tasks: Mapping[Any, Any], what: str) -> dict[Any, Any]:
+        """The outcome of each task, from worker processes."""
+        return dict(done(tasks, self.workers, self.progress, what, PATIENCE))
 
 
 def neighbours(substeps: int, ladder: Sequence[int]) -> list[int]:
@@ -253,32 +356,6 @@ def errors_nearby(
     ]
 
 
-def scored_scenario(scene: str, seed: int) -> Scenario:
-    """The scenario up to the horizon of its exact answer; raises `NoAdvice` if it has none."""
-    try:
-        return scored(scene, seed).scenario
-    except NoTruth as refusal:
-        raise NoAdvice(
-            f"no exact answer: {refusal}. To compare the engines with each other and with the laws"
-            f" of physics: crosscheck run {shlex.quote(scene)}"
-        ) from refusal
-
-
-def ladder_of(scenario: Scenario) -> tuple[int, ...]:
-    """Steps in a sample interval, coarse to fine."""
-    return doublings(scenario, MOST_WORK // max(scenario.scene.n, FEW))
-
-
-def by_engine(tried: Iterable[Attempt]) -> list[list[Attempt]]:
-    """The attempts of each engine, which stand together, in their order."""
-    return [list(group) for _, group in groupby(tried, key=lambda one: one.name)]
-
-
-def changes(one: Attempt) -> list[str]:
-    """The options of its engine."""
-    return [option.change for option in OPTIONS if option.engine == one.name]
-
-
 def smallest(one: Attempt) -> float:
     """Sort key: the error; an attempt that failed or cannot be judged comes last."""
     return one.error if isfinite(one.error) else inf
@@ -293,27 +370,6 @@ def those_that_keep(ladder: Sequence[Attempt], bound: float) -> list[Attempt]:
     return [one for one, keeps in zip(ladder, kept) if keeps]
 
 
-def attempts(
-    scene: str,
-    seed: int,
-    purpose: str,
-    workers: int,
-    progress: Progress,
-    asked: Iterable[tuple[str, str, int]],
-) -> list[Attempt]:
-    """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
-    dt = scored_scenario(scene, seed).dt
-    wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
-    tasks = {one.task: partial(error_of, scene, seed, purpose, one) for one in wanted}
-    outcomes = dict(done(tasks, workers, progress, "playing", PATIENCE))
-    return [
-        replace(one, error=inf, reason=f"{outcome.status}: {outcome.reason}")
-        if isinstance(outcome := outcomes[one.task], Failure)
-        else replace(one, error=outcome[0], reason=outcome[1])
-        for one in wanted
-    ]
-
-
 def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, str]:
     """The error of one run up to the horizon; inf and the reason if it failed."""
     scenario, truth = scored(scene, seed)
@@ -322,22 +378,6 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
         return inf, f"{run.status}: {run.reason}"
     error = PURPOSES[purpose].error(beside(scenario, run, truth, jumps_of(truth, scenario)))
     return error, "" if not isnan(error) else "too little of it can be judged"
-
-
-def to_the_end(
-    scene: str, seed: int, workers: int, progress: Progress, wanted: Sequence[Attempt]
-) -> tuple[list[Attempt], list[Attempt]]:
-    """The attempts that play the whole scene, beyond the horizon of its exact answer, too; and
-    those that do not, each with the reason."""
-    tasks = {one.task: partial(end_of, scene, seed, one) for one in wanted}
-    outcomes = dict(done(tasks, workers, progress, "playing to the end", PATIENCE))
-    able: list[Attempt] = []
-    partly: list[Attempt] = []
-    for one in wanted:
-        outcome = outcomes[one.task]
-        why = f"{outcome.status}: {outcome.reason}" if isinstance(outcome, Failure) else outcome
-        (partly if why else able).append(replace(one, reason=why))
-    return able, partly
 
 
 def end_of(scene: str, seed: int, one: Attempt) -> str:
@@ -350,39 +390,10 @@ def end_of(scene: str, seed: int, one: Attempt) -> str:
     return f"{run.status}{until}: {run.reason}"
 
 
-def timed(
-    scene: str, seed: int, played: Sequence[Attempt], progress: Progress
-) -> tuple[list[Attempt], dict[tuple[str, int], float], float]:
-    """The attempts with their costs in the whole scene; for each engine and step size the
-    difference of two timings of the same engine, |log(cost / cost of its copy)|; and the number of
-    cores that others used."""
-    if not played:
-        return [], {}, nan
-    makes = {
-        ((one.name, one.change), one.substeps, copy): one.make
-        for one in played
-        for copy in ((0, 1) if one.change == PLAIN else (0,))
-    }
-    task = partial(times_of_whole, scene, seed, makes)
-    busy = busy_cores()
-    [(_, samples)] = done({("time",): task}, 1, progress, "timing", ALL_ROUNDS)
-    if isinstance(samples, Failure):
-        raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
-    times = summed_up(pd.DataFrame(samples), ["key"])
-    cost = dict(zip(times.key, times.cost))
-    differences = {
-        (who[0], k): abs(log(cost[who, k, 1] / cost[who, k, 0]))
-        for who, k, copy in cost
-        if copy == 1
-    }
-    priced = [replace(one, cost=cost[(one.name, one.change), one.substeps, 0]) for one in played]
-    return priced, differences, busy
-
-
 def times_of_whole(
     scene: str, seed: int, makes: Mapping[tuple[Any, int, int], Callable[[], Engine]]
 ) -> list[Sample]:
-    """Timing samples, s per simulated second, by (who, substeps, copy), over the whole scene: what
+    """Timing samples, s per simulated second, by (task, substeps, copy), over the whole scene: what
     comes after the horizon of its exact answer may cost more than what comes before."""
     scenario = open_scene(scene, seed)
     what = [
@@ -390,36 +401,6 @@ def times_of_whole(
         for key, make in makes.items()
     ]
     return interleaved(what, ROUNDS, BUDGET, seed)
-
-
-def reasons(
-    scene: str,
-    seed: int,
-    purpose: str,
-    short: Sequence[OutOfReach],
-    finest: int,
-    workers: int,
-    progress: Progress,
-) -> list[OutOfReach]:
-    """The largest contribution to the error of each engine at the finest step, from the error
-    budget."""
-    tasks = {
-        one.task: partial(budget_of, scene, seed, played_as(one.name), finest)
-        for one, _, _ in short
-        if played_as(one.name) in MECHANISMS and isfinite(one.error)
-    }
-    budgets = dict(done(tasks, workers, progress, "error budget", PATIENCE))
-    measure = "energy" if purpose == "energy" else "position_radii"
-    return [
-        OutOfReach(
-            one,
-            error,
-            one.reason
-            or (ASK_THE_EXERCISE if row_of(one.name).exercise else "")
-            or largest(budgets.get(one.task), measure),
-        )
-        for one, error, _ in short
-    ]
 
 
 ASK_THE_EXERCISE = (

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 from adapters.engines import ENGINES
 from reports.page.style import number
 from reports.run.arguments import checked_engines, checked_scenes, unknown
-from reports.speed.advice import BUSY, LOUD, Advice, Attempt, NoAdvice, advise
+from reports.speed.advice import BUSY, LOUD, Advice, Attempt, Inquiry, NoAdvice
 from reports.speed.purposes import PURPOSES
 from reports.terminal.console import Console
 from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
@@ -35,7 +35,8 @@ def give_advice(
     names = checked_engines(engines, ENGINES)
     with stoppable(), Progress() as progress:
         try:
-            advice = advise(checked, seed, purpose, bound, names, os.cpu_count() or 1, progress)
+            asked = Inquiry(checked, seed, purpose, os.cpu_count() or 1, progress)
+            advice = asked.advice(bound, names)
         except NoAdvice as why:
             say(f"{scene}: {why}")
             sys.exit(FAILED)
@@ -66,6 +67,7 @@ def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
         "error_at_most": bound,
         "until_s": advice.until,
         "duration_s": advice.duration,
+        "collisions_judged": advice.collisions,
         "dt_s_tried": list(advice.step_sizes),
         "cheapest_first": [row_of_attempt(one) for one in advice.keeping],
         "not_within": [
@@ -108,8 +110,7 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     times are."""
     console = Console()
     console.print(
-        f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)},"
-        f" up to {number(advice.until)} of {number(advice.duration)} s",
+        f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)}, {advice.judged}",
         highlight=False,
     )
     console.print()
@@ -144,7 +145,10 @@ def print_choices(console: Console, advice: Advice) -> None:
         for one in advice.keeping[:SHOWN]
     ]
     headings = ["engine", "dt, ms", "error", "µs per\nsimulated s"]
-    print_table(console, headings, rows, "Cheapest first, in the whole scene")
+    title = "Cheapest first, in the whole scene"
+    if advice.until < advice.duration:
+        title = f"Cheapest first: error {advice.judged}; cost of the whole scene"
+    print_table(console, headings, rows, title)
     if dearer := advice.keeping[SHOWN:]:
         names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for one in dearer)
         console.print(f"Also within it: {names}.", highlight=False)
@@ -177,7 +181,8 @@ def print_short(console: Console, advice: Advice) -> None:
 
 def print_changes(console: Console, advice: Advice, bound: float) -> None:
     """Print the effect of each option of the engines that keep the error."""
-    title = "What the scene does not need: one option changed, at the same step size"
+    what = "this part of the scene" if advice.until < advice.duration else "the scene"
+    title = f"What {what} does not need: one option changed, at the same step size"
     rows = [
         [
             f"{change.plain.name}, {change.changed.change}",

@@ -6,9 +6,10 @@ For each disk and sample, as vectors: engine - truth = contributions + interplay
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
+from operator import add
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -242,10 +243,8 @@ class Budget:
             for mechanism in self.mechanisms
             if not mechanism.parameters
         ]
-        summed, reached = (
-            added(contributions.values()),
-            added([self.reference(self.mechanisms), *outside]),
-        )
+        summed = reduce(add, contributions.values())
+        reached = reduce(add, outside, self.reference(self.mechanisms))
         return contributions | {
             INTERPLAY: reached - summed,
             RESIDUAL: self.total - reached,
@@ -276,11 +275,3 @@ class Budget:
         if names not in self.known:
             self.known[names] = self.at.offset(self.at.played(partial(with_mechanisms, mechanisms)))
         return self.known[names]
-
-
-def added(offsets: Iterable[Offset]) -> Offset:
-    """Their sum."""
-    first, *rest = offsets
-    for each in rest:
-        first = first + each
-    return first

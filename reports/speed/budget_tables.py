@@ -3,18 +3,19 @@ one scene side by side."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from adapters.mechanisms.table import NAMES
+from reports.compare.pooling import WHO
 from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
 from reports.speed.explained import LEAST, TO
 
 EXPLAINED = TO[0]  # of the engine's error: a residual below it is said to be none
 FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar is empty
-WHO = ["engine", "profile"]
 
 
 class BudgetCell(NamedTuple):
@@ -65,10 +66,8 @@ def of_scene(budget: pd.DataFrame, scenario: str) -> BudgetTable:
 
 def causes(budget: pd.DataFrame) -> list[str]:
     """The contributions that are causes, of any engine."""
-    return [
-        TIME,
-        *(contribution for contribution in NAMES if contribution in set(budget.contribution)),
-    ]
+    found = set(budget.contribution)
+    return [TIME, *(name for name in NAMES if name in found)]
 
 
 def cell(value: float) -> BudgetCell:
@@ -104,8 +103,8 @@ def overview(budget: pd.DataFrame) -> BudgetTable:
     return BudgetTable("", np.nan, np.nan, np.nan, columns, rows, {})
 
 
-def ablated_in_both(budget: pd.DataFrame) -> list[dict[str, Any]]:
+def ablated_in_both(budget: pd.DataFrame) -> list[dict[Hashable, Any]]:
     """Every mechanism that can be disabled in the engine, where that changes anything: the
     change in both."""
-    rows = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
-    return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]
+    changed = budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST
+    return budget[changed].to_dict("records")

@@ -3,7 +3,8 @@ options."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from reports.compare.pooling import without_idle
 from reports.page import style
 from reports.page.charts import ZERO, Figure, broken_axis, decades, marked_break, shortened, sized
 from reports.page.cost_picture import light_marks
+from reports.page.cost_points import by_engine
 from reports.speed.cheapest import KINDS
 from scenarios.model import Array
 
@@ -26,56 +28,67 @@ LOWEST = 1e-7
 TALL, TALLEST, PER_ROW = 400, 520, 19  # px
 
 
+@dataclass(frozen=True)
+class Axes:
+    """The axes of a figure, and where on y errors below `LOWEST` are drawn: below a break, if
+    `floor` is neither `ZERO` nor `LOWEST`."""
+
+    x: dict[str, Any]
+    y: dict[str, Any]
+    floor: float = ZERO
+
+    def lifted(self, errors: pd.Series) -> pd.Series:
+        """Where errors are drawn."""
+        return errors.where(~(errors < LOWEST), self.floor)
+
+
 def speed(points: pd.DataFrame, tall: bool = False) -> Figure:
     """Error against cost, a line for each engine over its ladder; `points` of one scene, or pooled
     and then `tall`."""
-    drawn = points[points.cost.notna() & np.isfinite(points.error)]
-    bare = (
-        drawn.bare
-        if tall
-        else pd.Series(without_idle(drawn.cost.to_numpy(), drawn.idle.to_numpy()))
-    )
-    x_axis = log_axis(COST, np.append(drawn.cost.to_numpy(float), bare.dropna().to_numpy(float)))
-    y_axis, floor = error_axis(drawn.error.to_numpy(float))
-    traces = fronts(drawn, x_axis, y_axis, floor)
+    drawn = points[measured(points)]
+    axes = error_axes(np.append(drawn.cost.to_numpy(float), bare(drawn)), drawn.error)
+    steps = drawn[~drawn.engine.isin(KINDS)]
+    traces = [front_of(drawn, FRONT, 9, axes), front_of(steps, FRONT_OF_STEPS, 3, axes)]
     for engine, profile, group in by_engine(points):
-        fine = group[group.cost.notna() & np.isfinite(group.error)]
-        spreads = (
-            {}
-            if tall
-            else {
-                "error_x": bars(fine.cost, fine.low, fine.high),
-                "error_y": bars(
-                    *(lifted(fine[name], floor) for name in ("error", "error_low", "error_high"))
-                ),
-            }
-        )
-        text = [hover_text(row) for row in records(fine)]
-        values = {"customdata": shortened(fine.error, 3)}  # what is saved as CSV
-        height = lifted(fine.error, floor)
-        cost = fine.cost.to_numpy(float)
-        left = fine.bare.to_numpy(float) if tall else without_idle(cost, fine.idle.to_numpy(float))
+        fine = group[measured(group)]
+        height, left = axes.lifted(fine.error), bare(fine)
         if np.isfinite(left).all():
+            cost = fine.cost.to_numpy(float)
             traces.append(light_marks(engine, profile, cost, left, height.to_numpy(float)))
-        traces.append(line(engine, profile, fine.cost, height, text, spreads | values))
-    lost = points[~(points.cost.notna() & np.isfinite(points.error))]
-    traces += at_the_edge(lost, drawn, x_axis, y_axis, floor)
-    return figure(traces, x_axis, y_axis, TALLEST if tall else TALL, floor)
+        text = [hover_text(row) for row in fine.to_dict("records")]
+        trace = line(engine, profile, fine.cost, height, text)
+        if not tall:
+            low, high = axes.lifted(fine.error_low), axes.lifted(fine.error_high)
+            trace["error_x"] = bars(fine.cost, fine.low, fine.high)
+            trace["error_y"] = bars(height, low, high)
+        trace["customdata"] = shortened(fine.error.to_numpy(float), 3)  # what is saved as CSV
+        traces.append(trace)
+    traces += at_the_edge(points, axes)
+    return figure(traces, axes, TALLEST if tall else TALL)
 
 
-def at_the_edge(
-    lost: pd.DataFrame,
-    drawn: pd.DataFrame,
-    x_axis: dict[str, Any],
-    y_axis: dict[str, Any],
-    floor: float,
-) -> list[dict[str, Any]]:
+def measured(points: pd.DataFrame) -> pd.Series:
+    """Whether a point has both an error and a cost."""
+    has: pd.Series = points.cost.notna() & np.isfinite(points.error)
+    return has
+
+
+def bare(points: pd.DataFrame) -> Array:
+    """µs per simulated second without idle steps, of one scene or pooled; nan where that is not
+    known."""
+    if "bare" in points:
+        return points.bare.to_numpy(float)
+    return without_idle(points.cost.to_numpy(float), points.idle.to_numpy(float))
+
+
+def at_the_edge(points: pd.DataFrame, axes: Axes) -> list[dict[str, Any]]:
     """Points without an error, on the upper edge, and without a cost, at their error: at the cost
-    extrapolated from the engine's other dts, else at the right edge. `floor`: of `error_axis`.
-    """
+    extrapolated from the engine's other dts, else at the right edge."""
+    lost, drawn = points[~measured(points)], points[measured(points)]
     if lost.empty:
         return []
-    top = edge(y_axis, FAILED) if np.isinf(lost.error).any() else np.nan
+    top = edge(axes.y, FAILED) if np.isinf(lost.error).any() else np.nan
+    corner = 10 ** (axes.x["range"][1] - 0.05)  # just inside the range
     traces = []
     for engine, profile, group in by_engine(lost):
         others = drawn[(drawn.engine == engine) & (drawn.profile == profile)]
@@ -83,44 +96,24 @@ def at_the_edge(
             float((others.cost / 2.0**others.step_size).median()) if len(others) else np.nan
         )
         cost = group.cost.where(group.cost.notna(), per_step_size * 2.0**group.step_size)
-        corner = 10 ** (x_axis["range"][1] - 0.05)  # just inside the range
         x = cost.fillna(corner).clip(upper=corner)
-        y = lifted(group.error, floor).where(np.isfinite(group.error), top)
-        trace = line(engine, profile, x, y, [hover_text(row) for row in records(group)])
-        traces.append(trace | {"mode": "markers", "cliponaxis": False})
+        y = axes.lifted(group.error).where(np.isfinite(group.error), top)
+        text = [hover_text(row) for row in group.to_dict("records")]
+        traces.append(marks(engine, profile, x, y, text) | {"cliponaxis": False})
     return traces
 
 
-def fronts(
-    drawn: pd.DataFrame, x_axis: dict[str, Any], y_axis: dict[str, Any], floor: float
-) -> list[dict[str, Any]]:
-    """The Pareto front of all engines and, narrower, that of the engines that take steps; drawn
-    behind the points."""
-    steps = drawn[~drawn.engine.isin(KINDS)]
-    return [
-        front_of(drawn, FRONT, 9, x_axis, y_axis, floor),
-        front_of(steps, FRONT_OF_STEPS, 3, x_axis, y_axis, floor),
-    ]
+def front_of(drawn: pd.DataFrame, name: str, width: int, axes: Axes) -> dict[str, Any]:
+    """The Pareto front as steps, drawn behind the points: every point above and right of it is
+    slower and less accurate than a point on it.
 
-
-def front_of(
-    drawn: pd.DataFrame,
-    name: str,
-    width: int,
-    x_axis: dict[str, Any],
-    y_axis: dict[str, Any],
-    floor: float,
-) -> dict[str, Any]:
-    """The Pareto front as steps: every point above and right of it is slower and less accurate than
-    a point on it.
-
-    Errors drawn at `floor`, below `LOWEST`, count as equal.
+    Errors drawn at the floor of the axes, below `LOWEST`, count as equal.
     """
-    cost, error = drawn.cost.to_numpy(float), lifted(drawn.error, floor).to_numpy(float)
+    cost, error = drawn.cost.to_numpy(float), axes.lifted(drawn.error).to_numpy(float)
     best = front(cost, error)
     x, y = cost[best], error[best]
     if best:
-        right, top = 10 ** x_axis["range"][1], 10 ** y_axis["range"][1]
+        right, top = 10 ** axes.x["range"][1], 10 ** axes.y["range"][1]
         x, y = np.array([x[0], *x, right]), np.array([top, *y, y[-1]])
     colour = style.look(style.TRUTH).light
     return {
@@ -148,18 +141,19 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> Figure:
     relative: both are divided by those of the matched engine, at the dt at which the parameter
         is swept.
     """
-    drawn = points[points.cost.notna() & np.isfinite(points.error)]
-    x_axis = log_axis("time / time as matched" if relative else COST, drawn.cost.to_numpy(float))
-    errors = drawn.error.to_numpy(float)
-    y_axis, floor = (
-        (log_axis("error / error as matched", errors), ZERO) if relative else error_axis(errors)
+    drawn = points[measured(points)]
+    cost, error = drawn.cost.to_numpy(float), drawn.error.to_numpy(float)
+    axes = (
+        Axes(log_axis("time / time as matched", cost), log_axis("error / error as matched", error))
+        if relative
+        else error_axes(cost, drawn.error)
     )
     traces = []
     for engine, profile, group in by_engine(drawn):
         what = profile.partition("+")[2]
-        text = [sweep_hover(what, row, relative) for row in records(group)]
-        error = group.error if relative else lifted(group.error, floor)
-        trace = line(engine, profile, group.cost, error, text)
+        text = [sweep_hover(what, row, relative) for row in group.to_dict("records")]
+        height = group.error if relative else axes.lifted(group.error)
+        trace = line(engine, profile, group.cost, height, text)
         if what:  # the first and the last are named
             values = group.change.tolist()
             named = [value if k in (0, len(values) - 1) else "" for k, value in enumerate(values)]
@@ -170,22 +164,16 @@ def sweeps(points: pd.DataFrame, relative: bool = False) -> Figure:
             }
             trace["textfont"] = {"color": trace["line"]["color"], "size": 11}
         traces.append(trace)
-    lost = points[~(points.cost.notna() & np.isfinite(points.error))]
-    traces += at_the_edge(lost, drawn, x_axis, y_axis, floor)
-    return figure(traces, x_axis, y_axis, TALLEST if relative else TALL, floor)
+    traces += at_the_edge(points, axes)
+    return figure(traces, axes, TALLEST if relative else TALL)
 
 
-def sweep_hover(what: str, row: dict[str, Any], relative: bool) -> str:
-    """The hover text of a point of a sweep."""
-    value = (
-        f"{what} {row['change']}<br>"
-        if what
-        else f"dt / {2.0 ** (row['step_size'] - 2):g}<br>"
-        if relative
-        else ""
-    )
+def sweep_hover(what: str, row: Mapping[Hashable, Any], relative: bool) -> str:
+    """The hover text of a point of a sweep; `what` is swept, "" for a ladder of dt."""
+    value = f"{what} {row['change']}<br>" if what else ""
     if not relative:
         return value + hover_text(row)
+    value = value or f"dt / {2.0 ** (row['step_size'] - 2):g}<br>"
     return (
         f"{value}{style.number(row['cost'])} × the time, {style.number(row['error'])} × the error"
     )
@@ -194,14 +182,13 @@ def sweep_hover(what: str, row: dict[str, Any], relative: bool) -> str:
 def matched(reached: pd.DataFrame, tall: bool = False) -> Figure:
     """The cost of each accuracy, a mark for each engine; at the top, engines that do not reach
     it."""
-    names = list(dict.fromkeys(zip(reached.engine, reached.profile)))
+    engines = list(by_engine(reached))
     y_axis = log_axis(COST, reached.cost.dropna().to_numpy(float))
     not_down = edge(y_axis, "not yet")
     never = edge(y_axis, "never")
     traces = []
-    for k, (engine, profile) in enumerate(names):
-        group = reached[(reached.engine == engine) & (reached.profile == profile)]
-        x = np.arange(len(group)) + (k - (len(names) - 1) / 2) * 0.8 / max(len(names), 1)
+    for k, (engine, profile, group) in enumerate(engines):
+        x = np.arange(len(group)) + (k - (len(engines) - 1) / 2) * 0.8 / len(engines)
         y = group.cost.where(group.cost.notna(), np.where(group.lost, never, not_down))
         text = [
             f"{row['accuracy']} of a radius: "
@@ -210,19 +197,19 @@ def matched(reached: pd.DataFrame, tall: bool = False) -> Figure:
                 if np.isnan(row["cost"])
                 else f"{style.number(row['cost'])} µs/s {at(row)}{row['why']}"
             )
-            for row in records(group)
+            for row in group.to_dict("records")
         ]
-        traces.append(line(engine, profile, x, y, text) | {"mode": "markers"})
+        traces.append(marks(engine, profile, x, y, text))
     x_axis = {
         "title": "accuracy (of a radius)",
         "tickvals": list(range(len(ACCURACIES))),
         "ticktext": list(ACCURACIES),
         "range": [-0.5, len(ACCURACIES) - 0.5],
     }
-    return figure(traces, x_axis, y_axis, TALL if tall else None)
+    return figure(traces, Axes(x_axis, y_axis), TALL if tall else None)
 
 
-def at(row: dict[str, Any]) -> str:
+def at(row: Mapping[Hashable, Any]) -> str:
     """ "at dt ..." where there is one."""
     return f"at dt {style.number(row['dt_s'])} s " if np.isfinite(row["dt_s"]) else ""
 
@@ -234,24 +221,15 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> Figure:
     traces = []
     stopped = edge(y_axis, "stopped") if (growth.stopped != "").any() else 0.0
     for engine, profile, group in by_engine(costs):
-        text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in records(group)]
-        traces.append(
-            line(
-                engine,
-                profile,
-                group.n,
-                group.cost,
-                text,
-                {
-                    "error_y": bars(group.cost, group.low, group.high),
-                },
-            )
-        )
-    for row in records(growth[growth.stopped != ""]):
+        rows = group.to_dict("records")
+        text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in rows]
+        trace = line(engine, profile, group.n, group.cost, text)
+        traces.append(trace | {"error_y": bars(group.cost, group.low, group.high)})
+    for row in growth[growth.stopped != ""].to_dict("records"):
         n, why = row["stopped"].split(": ", 1)
-        cross = line(row["engine"], row["profile"], [float(n)], [stopped], [f"{n} disks: {why}"])
-        traces.append(cross | {"mode": "markers", "cliponaxis": False})
-    return figure(traces, x_axis, y_axis, TALL)
+        cross = marks(row["engine"], row["profile"], [float(n)], [stopped], [f"{n} disks: {why}"])
+        traces.append(cross | {"cliponaxis": False})
+    return figure(traces, Axes(x_axis, y_axis), TALL)
 
 
 def options(table: pd.DataFrame, ratio: str, title: str) -> Figure:
@@ -297,23 +275,16 @@ def options(table: pd.DataFrame, ratio: str, title: str) -> Figure:
             f" {style.number(row['error_radii'])} radii, unchanged"
             f" {style.number(row['error_radii_plain'])}<br>{spread(row)} µs/s, unchanged"
             f" {style.number(row['cost_plain'])}"
-            for row in records(group)
+            for row in group.to_dict("records")
         ]
-        traces.append(line(engine, profile, x, y, text) | {"mode": "markers"})
-    return figure(traces, x_axis, y_axis, 110 + PER_ROW * len(rows))
+        traces.append(marks(engine, profile, x, y, text))
+    return figure(traces, Axes(x_axis, y_axis), 110 + PER_ROW * len(rows))
 
 
 TICKS = [a * 10.0**b for b in range(-8, 9) for a in (1, 2, 5)]
 
 
-def line(
-    engine: str,
-    profile: str,
-    x: Any,
-    y: Any,
-    text: Sequence[str],
-    more: dict[str, Any] | None = None,
-) -> dict[str, Any]:
+def line(engine: str, profile: str, x: Any, y: Any, text: Sequence[str]) -> dict[str, Any]:
     """A trace in the style of its engine, with the hover text of each point."""
     look = style.look(engine, profile)
     return {
@@ -326,13 +297,12 @@ def line(
         "hovertemplate": "%{text}",
         "line": {"color": look.light, "dash": look.plotly_dash, "width": 1.7},
         "marker": {"symbol": look.symbol, "size": 9, "color": look.light},
-    } | (more or {})
+    }
 
 
-def by_engine(table: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """(engine, profile, their rows), in the order of appearance."""
-    for (engine, profile), group in table.groupby(["engine", "profile"], sort=False):
-        yield str(engine), str(profile), group
+def marks(engine: str, profile: str, x: Any, y: Any, text: Sequence[str]) -> dict[str, Any]:
+    """The same without the line between its points."""
+    return line(engine, profile, x, y, text) | {"mode": "markers"}
 
 
 def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
@@ -350,7 +320,7 @@ def bars(middle: Any, low: Any, high: Any) -> dict[str, Any]:
     }
 
 
-def hover_text(row: dict[str, Any]) -> str:
+def hover_text(row: Mapping[Hashable, Any]) -> str:
     """The hover text of a point."""
     if row["failed"] and not np.isfinite(row["error"]):
         why = f": {row['status']}, {row['reason']}" if row["reason"] else ""
@@ -370,7 +340,7 @@ def hover_text(row: dict[str, Any]) -> str:
     return "<br>".join(lines)
 
 
-def spread(row: dict[str, Any]) -> str:
+def spread(row: Mapping[Hashable, Any]) -> str:
     """Median, quartiles and, of one scene's samples, the fastest of a cost."""
     fastest = f", fastest {style.number(row['best'])}" if np.isfinite(row["best"]) else ""
     return (
@@ -379,28 +349,18 @@ def spread(row: dict[str, Any]) -> str:
     )
 
 
-def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Its rows as dicts."""
-    return [{str(key): value for key, value in row.items()} for row in table.to_dict("records")]
-
-
 def log_axis(title: str, values: Array) -> dict[str, Any]:
     """A log axis with a tick a decade or so."""
     return {"title": title} | decades(np.append(values, 1.0) if not len(values) else values)
 
 
-def error_axis(errors: Array) -> tuple[dict[str, Any], float]:
-    """A log axis for errors, and where on it those below `LOWEST` are drawn: below a break of it,
-    if there are larger ones, else at `LOWEST`."""
-    if not (errors >= LOWEST).any():
-        return log_axis(ERROR, np.maximum(errors, LOWEST)), LOWEST
-    axis, floor = broken_axis(errors, LOWEST)
-    return {"title": ERROR} | axis, floor
-
-
-def lifted(errors: pd.Series, floor: float) -> pd.Series:
-    """Where errors are drawn on an `error_axis`: those below `LOWEST` at its `floor`."""
-    return errors.where(~(errors < LOWEST), floor)
+def error_axes(costs: Array, errors: pd.Series) -> Axes:
+    """Log axes for costs and errors; y is broken where only some errors are below `LOWEST`."""
+    x, drawn = log_axis(COST, costs), errors.to_numpy(float)
+    if not (drawn >= LOWEST).any():
+        return Axes(x, log_axis(ERROR, np.maximum(drawn, LOWEST)), LOWEST)
+    axis, floor = broken_axis(drawn, LOWEST)
+    return Axes(x, {"title": ERROR} | axis, floor)
 
 
 def edge(axis: dict[str, Any], label: str) -> float:
@@ -413,15 +373,9 @@ def edge(axis: dict[str, Any], label: str) -> float:
     return float(10**level)
 
 
-def figure(
-    traces: list[dict[str, Any]],
-    x_axis: dict[str, Any],
-    y_axis: dict[str, Any],
-    height: int | None,
-    floor: float = ZERO,
-) -> Figure:
-    """The figure, with a band where `floor` is below a break of y; page.js adds what all share."""
-    layout: dict[str, Any] = {"hovermode": "closest", "xaxis": x_axis, "yaxis": y_axis}
-    broken = floor not in (ZERO, LOWEST)
-    shaded = marked_break(y_axis, floor) if broken else {}
+def figure(traces: list[dict[str, Any]], axes: Axes, height: int | None) -> Figure:
+    """The figure, with a band below a break of y; page.js adds what all share."""
+    layout: dict[str, Any] = {"hovermode": "closest", "xaxis": axes.x, "yaxis": axes.y}
+    broken = axes.floor not in (ZERO, LOWEST)
+    shaded = marked_break(axes.y, axes.floor) if broken else {}
     return {"data": traces, "layout": layout | shaded | sized(height)}

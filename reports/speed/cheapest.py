@@ -25,18 +25,16 @@ def closed_form(scene: str, seed: int) -> dict[str, Any]:
     again.
     """
     scenario = scored(scene, seed).scenario
-    if (model := answered_by(scenario)) != CLOSED_FORM or scenario.truth is None:
-        return {"scenario": scenario.name, "truth": model, "closed_us": np.nan}
-    best, ends = np.inf, scenario.times[[0, -1]]  # an engine is not read on the way either
-    for _ in range(RUNS):
-        started = perf_counter()
-        scenario.truth(ends)
-        best = min(best, perf_counter() - started)
-    return {
-        "scenario": scenario.name,
-        "truth": CLOSED_FORM,
-        "closed_us": best / scenario.duration * 1e6,
-    }
+    model, cost = answered_by(scenario), np.nan
+    if model == CLOSED_FORM and scenario.truth is not None:
+        ends = scenario.times[[0, -1]]  # an engine is not read on the way either
+        best = np.inf
+        for _ in range(RUNS):
+            started = perf_counter()
+            scenario.truth(ends)
+            best = min(best, perf_counter() - started)
+        cost = best / scenario.duration * 1e6
+    return {"scenario": scenario.name, "truth": model, "closed_us": cost}
 
 
 def cheapest_models(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
@@ -49,20 +47,13 @@ def cheapest_models(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for row in truths.to_dict("records"):
         here = points[(points.scenario == row["scenario"]) & points.cost.notna()]
-        fine, loose = (best_of(here[here.error <= bound]) for bound in (FINEST, 0.01))
-        model = KINDS.get(fine[0].split(":")[0], STEPS) if fine[0] else ""
-        if np.isfinite(row["closed_us"]) and not row["closed_us"] > fine[1]:
+        engine, cost = best_of(here[here.error <= FINEST])
+        loose_engine, loose_cost = best_of(here[here.error <= 0.01])
+        model = KINDS.get(engine.split(":")[0], STEPS) if engine else ""
+        if np.isfinite(row["closed_us"]) and not row["closed_us"] > cost:
             model = CLOSED_FORM
-        rows.append(
-            row
-            | {
-                "model": model,
-                "engine": fine[0],
-                "cost_us": fine[1],
-                "loose_engine": loose[0],
-                "loose_us": loose[1],
-            }
-        )
+        row |= {"model": model, "engine": engine, "cost_us": cost}
+        rows.append(row | {"loose_engine": loose_engine, "loose_us": loose_cost})
     return pd.DataFrame(rows)
 
 

@@ -25,10 +25,10 @@ from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
 from reports.speed.kept import Kept
-from reports.speed.measure import measure
+from reports.speed.measure import Measured, Measuring
 from reports.speed.page import write_page
 from reports.speed.plan import SpeedPlan
-from reports.speed.results import Results
+from reports.speed.results import QUIET, Results
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
 from reports.terminal.exits import DONE, FAILED, broken_off, say
@@ -75,9 +75,10 @@ def run_speed(
         broken_off(part, lambda: f"The finished part is kept in {part}: ask again with --resume"),
         kept.journal,
     ):
-        results, header = carry_out(plan, header, kept, resume)
-        if not results.measured.errors.size:
-            nothing_measured(part, results)
+        measured, header = carry_out(plan, header, kept, resume)
+        if measured.errors.empty:
+            nothing_measured(part, measured)
+        results = Results(plan, measured)
         write_all(part, results, header)
         journal.close()
         replace_folder(part, out, SPEED)
@@ -85,10 +86,10 @@ def run_speed(
     sys.exit(DONE)
 
 
-def nothing_measured(part: Path, results: Results) -> NoReturn:
+def nothing_measured(part: Path, measured: Measured) -> NoReturn:
     """Delete the unfinished folder, and print why no error can be measured; exits 1."""
     discard(part, SPEED)
-    for what, why in results.left_out:
+    for what, why in measured.left_out:
         say(f"{what}: {why}")
     say("no scene that was asked for has an exact answer, so no error can be measured")
     sys.exit(FAILED)
@@ -117,14 +118,14 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume
 
 def carry_out(
     plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool
-) -> tuple[Results, dict[str, Any]]:
-    """The results, and the header of tables and page."""
+) -> tuple[Measured, dict[str, Any]]:
+    """What was measured, and the header of tables and page."""
     with Progress() as progress:
         if resume:
             progress.note(f"Kept from the interrupted run: {counted(len(kept), 'task')}.")
-        results = Results(plan, measure(plan, progress, kept))
+        measured = Measuring(plan, progress, kept).run()
         progress.say("writing the tables and the page")
-        return results, header | {"seconds": progress.seconds, "load": results.measured.busy}
+        return measured, header | {"seconds": progress.seconds, "load": measured.busy}
 
 
 def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
@@ -189,15 +190,15 @@ def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
 
 def said_of_noise(results: Results) -> str:
     """The noise floor in a sentence, and what to do where it is too loud."""
-    noise = results.noise_summary()
-    if not noise["pairs"]:
+    noise = results.noise_floor()
+    if not noise.pairs:
         return "No engine was timed against itself, so the noise floor is not known."
     said = (
-        f"Noise floor: the time of an engine over its own time again is {noise['median']:.3f}; for"
-        f" half of {noise['pairs']} pairs it is from {noise['low']:.3f} to"
-        f" {noise['high']:.3f}."
+        f"Noise floor: the time of an engine over its own time again is {noise.median:.3f}; for"
+        f" half of {noise.pairs} pairs it is from {noise.low:.3f} to"
+        f" {noise.high:.3f}."
     )
-    if noise["quiet"]:
+    if noise.floor <= QUIET:
         return said
     return (
         f"{said} It must stay between 0.95 and 1.05: measure again while nothing else runs before"

@@ -53,10 +53,8 @@ def step_of(scenario: Scenario) -> float:
 
 def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
     """s, to play all step sizes, read at every sample."""
-    scenario, samples = (
-        open_scene(measurement.scene, measurement.seed),
-        reach[measurement.scene, measurement.seed],
-    )
+    scenario = open_scene(measurement.scene, measurement.seed)
+    samples = reach[measurement.scene, measurement.seed]
     reading = len(measurement.step_sizes) * samples * (READ + scenario.scene.n * READ_DISK)
     return sum(measurement.step_sizes) * samples * LISTENING * step_of(scenario) + reading
 
@@ -64,16 +62,10 @@ def seconds_to_play(measurement: Measurement, reach: Reach) -> float:
 def seconds_to_time(measurement: Measurement, reach: Reach, effort: Effort) -> float:
     """s, for all rounds of all step sizes; on a ladder of a scene the middle step size is timed
     twice."""
-    scenario, samples = (
-        open_scene(measurement.scene, measurement.seed),
-        reach[measurement.scene, measurement.seed],
-    )
-    step_sizes = [
-        all_rounds(samples * k * step_of(scenario), effort) for k in measurement.step_sizes
-    ]
-    return sum(step_sizes) + (
-        step_sizes[len(step_sizes) // 2] if measurement.kind == SCENE else 0.0
-    )
+    step = step_of(open_scene(measurement.scene, measurement.seed))
+    samples = reach[measurement.scene, measurement.seed]
+    each = [all_rounds(samples * k * step, effort) for k in measurement.step_sizes]
+    return sum(each) + (each[len(each) // 2] if measurement.kind == SCENE else 0.0)
 
 
 def all_rounds(run: float, effort: Effort) -> float:

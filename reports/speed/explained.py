@@ -60,14 +60,10 @@ def explained(budget: pd.DataFrame) -> pd.DataFrame:
     and how far the scene was evaluated, its exact answer goes, and the scene goes; note: why the
     engine has no error.
     """
-    keys = COLUMNS[: COLUMNS.index("error_radii")]
-    wide = budget.pivot(index=keys, columns="contribution", values="position_radii").reindex(
-        columns=[TOTAL, RESIDUAL]
-    )
-    notes = budget[budget.contribution == TOTAL].set_index(keys).note
-    table = wide.set_axis(["error_radii", "residual_radii"], axis=1).join(notes)
-    order = budget[keys].drop_duplicates()
-    return order.merge(table.reset_index(), on=keys)[COLUMNS]
+    total, residual = (budget[budget.contribution == name] for name in (TOTAL, RESIDUAL))
+    errors = total.rename(columns={"position_radii": "error_radii"})
+    left = residual[[*WHOSE, "position_radii"]].set_axis([*WHOSE, "residual_radii"], axis=1)
+    return errors.merge(left, on=WHOSE, how="left")[COLUMNS]
 
 
 def extent(table: pd.DataFrame) -> Extent:

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from adapters.engines import DISTINCT, ENGINES
+from reports.compare.pareto import YARDSTICK
 from reports.speed.results import Results
 from reports.terminal.foreign_text import put_text
 
@@ -19,8 +20,7 @@ KEPT = Path(__file__).parent / "figures.csv"
 # of the same run, errors only
 ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
-YARDSTICK = ("reference", "exercise")
-AGAINST, AGAINST_BARE = "cost over reference:exercise", "the same less idle steps"
+AGAINST, AGAINST_BARE = f"cost over {YARDSTICK}", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
 # the largest factor by which a ratio may differ from the kept one: compilers and processors differ
 # by less, a lost optimisation by more
@@ -30,53 +30,46 @@ LOOSE = 3.0
 def figures(results: Results) -> pd.DataFrame:
     """Columns `COLUMNS`: the pooled points, the cost of each accuracy, the cost by number of
     disks with its exponent, and what a call costs."""
-    failed = results.pooled.failed
+    pooled, reached, sizes = results.pooled, results.pooled_reached, results.sizes
+    growth, driving = results.growth, results.driving
+    failed = pooled.failed.map("failed in {}".format) + pooled.of.map(" of {}".format)
     parts = [
-        results.pooled.assign(
+        pooled.assign(
             figure="pooled error",
-            at=results.pooled.step_size,
-            value=results.pooled.error,
-            low=results.pooled.error_low,
-            high=results.pooled.error_high,
+            at=pooled.step_size,
+            value=pooled.error,
+            low=pooled.error_low,
+            high=pooled.error_high,
             unit="radii",
-            note=failed.map("failed in {}".format) + results.pooled.of.map(" of {}".format),
+            note=failed,
         ),
-        results.pooled.assign(
-            figure="pooled cost",
-            at=results.pooled.step_size,
-            value=results.pooled.cost,
-            unit="us/s",
-        ),
-        results.pooled.assign(
+        pooled.assign(figure="pooled cost", at=pooled.step_size, value=pooled.cost, unit="us/s"),
+        pooled.assign(
             figure="pooled cost less idle steps",
-            at=results.pooled.step_size,
-            value=results.pooled.bare,
+            at=pooled.step_size,
+            value=pooled.bare,
             low=np.nan,
             high=np.nan,
             unit="us/s",
         ),
-        results.pooled_reached.assign(
+        reached.assign(
             figure="cost at accuracy",
-            at=results.pooled_reached.accuracy,
-            value=results.pooled_reached.cost,
-            note=results.pooled_reached.why,
+            at=reached.accuracy,
+            value=reached.cost,
+            note=reached.why,
             unit="us/s",
         ),
-        results.sizes.assign(
-            figure="cost of a step", at=results.sizes.n, value=results.sizes.cost, unit="us"
+        sizes.assign(figure="cost of a step", at=sizes.n, value=sizes.cost, unit="us"),
+        growth.assign(
+            figure="exponent", at=growth.most, value=growth.exponent, note=growth.stopped, unit="1"
         ),
-        results.growth.assign(
-            figure="exponent",
-            at=results.growth.most,
-            value=results.growth.exponent,
-            note=results.growth.stopped,
-            unit="1",
+        driving.assign(figure="idle step", value=driving.step_us, unit="us"),
+        driving.assign(figure="read-out", value=driving.read_us, unit="us"),
+        driving.assign(figure="idle call", value=driving.call_us, unit="us"),
+        cheaper(results.versus, AGAINST, "cheaper"),
+        cheaper(results.versus, AGAINST_BARE, "bare_cheaper").assign(
+            value=np.nan, low=np.nan, high=np.nan
         ),
-        results.driving.assign(figure="idle step", value=results.driving.step_us, unit="us"),
-        results.driving.assign(figure="read-out", value=results.driving.read_us, unit="us"),
-        results.driving.assign(figure="idle call", value=results.driving.call_us, unit="us"),
-        cheaper(results.versus, AGAINST, "cheaper", "ratio"),
-        cheaper(results.versus, AGAINST_BARE, "bare_cheaper", ""),
     ]
     table = pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
     # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
@@ -84,24 +77,20 @@ def figures(results: Results) -> pd.DataFrame:
     return table[~names.isin([name for name, row in ENGINES.items() if row.adds_friction])]
 
 
-def cheaper(versus: pd.DataFrame, figure: str, count: str, value: str) -> pd.DataFrame:
-    """A row for each engine and change of `versus`: in which scenes it costs less than `YARDSTICK`;
-    value: the ratio."""
+def cheaper(versus: pd.DataFrame, figure: str, count: str) -> pd.DataFrame:
+    """A row for each engine and change of `versus`: the ratio of its cost to that of `YARDSTICK`,
+    and the scenes in which it costs less."""
     rows = versus[versus[count].notna()]
-    numbers = {
-        name: rows[column] if value else np.nan
-        for name, column in (("value", "ratio"), ("low", "low"), ("high", "high"))
-    }
     said = (
         rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
     )
-    return rows.assign(figure=figure, at=rows.change, note=said, unit="1", **numbers)
+    return rows.assign(figure=figure, at=rows.change, value=rows.ratio, note=said, unit="1")
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
     """Write the figures as CSV, below comment lines with the machine, the versions and how quiet
     the machine was."""
-    noise = results.noise_summary()
+    noise = results.noise_floor()
     about = {
         "command": header["command"],
         "seed": header["seed"],
@@ -109,9 +98,7 @@ def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
         **header["machine"],
         **header["versions"],
         "busy cores": f"{header['load']:.2f}",
-        "an engine against itself": (
-            f"{noise['median']:.3f} ({noise['low']:.3f} to {noise['high']:.3f})"
-        ),
+        "an engine against itself": (f"{noise.median:.3f} ({noise.low:.3f} to {noise.high:.3f})"),
         "scenes": len(results.scenes),
     }
     lines = "".join(f"# {key}: {value}\n" for key, value in about.items())
@@ -151,11 +138,10 @@ def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
         (f"{row['engine']}:{row['profile']}", int(float(row["at"]))): float(row["best"])
         for row in rows.to_dict("records")
     }
-    yardstick = ":".join(YARDSTICK)
     return {
-        (name, n): cost / best[yardstick, n]
+        (name, n): cost / best[YARDSTICK, n]
         for (name, n), cost in best.items()
-        if n in GATED and name != yardstick and (yardstick, n) in best
+        if n in GATED and name != YARDSTICK and (YARDSTICK, n) in best
     }
 
 
@@ -173,7 +159,7 @@ def drifted(
         if not 1 / LOOSE <= change <= LOOSE:
             said.append(
                 f"{name}, {n} disks: a step costs {fresh[name, n]:.3g} times that of"
-                f" {':'.join(YARDSTICK)}, kept is {kept[name, n]:.3g}; allowed is a factor of"
+                f" {YARDSTICK}, kept is {kept[name, n]:.3g}; allowed is a factor of"
                 f" {LOOSE:g}"
             )
     return said

@@ -9,27 +9,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from reports.run.folders import may_go_on
-from reports.run.journal import Journal, numbers, plain
+from reports.run.journal import Journal, plain
 from reports.run.journal_lines import checked_lines, no_use
-from reports.speed.lines import KINDS, scene_of, stranger
+from reports.speed.lines import KINDS, misfit, numbered
 from scenarios.model import Scenario
-
-TEXT = frozenset(
-    (
-        "kind",
-        "scenario",
-        "engine",
-        "profile",
-        "change",
-        "status",
-        "reason",
-        "contribution",
-        "note",
-        "truth",
-        "stopped",
-        "task",
-    )
-)  # columns of results that hold text
 
 
 class Kept:
@@ -57,27 +40,27 @@ class Kept:
         self.journal, folder = journal, journal.path.parent
         lines = []
         for number, kind, line in checked_lines(folder, KINDS):
-            if (kind == "header") != (number == 1):
-                what = (
-                    "only the first line may be the header"
-                    if number > 1
-                    else "the first line must be the header"
-                )
+            if kind != "header" and number == 1:
                 raise ValueError(
-                    no_use(folder, number, what, KINDS.asked if number == 1 else KINDS.missed)
+                    no_use(folder, number, "the first line must be the header", KINDS.asked)
+                )
+            if kind == "header" and number > 1:
+                raise ValueError(
+                    no_use(folder, number, "only the first line may be the header", KINDS.missed)
                 )
             lines.append(line)
-        same = bool(lines) and lines[0]["header"] == json.loads(json.dumps(plain(header)))
-        may_go_on(folder, len(lines[1:]), same, resume)
-        for number, line in enumerate(lines[1:] if same else [], start=2):
-            if fault := misfit(line, scenarios):
-                raise ValueError(no_use(folder, number, fault, KINDS.missed))
-        self.results = (
-            {json.dumps(line["task"]): line["result"] for line in lines[1:]} if same else {}
-        )
+        header_before, tasks = (lines[0]["header"], lines[1:]) if lines else (None, [])
+        same = header_before == json.loads(json.dumps(plain(header)))
+        may_go_on(folder, len(tasks), same, resume)
+        self.results: dict[str, Any] = {}
         if not same:
             os.truncate(journal.path, 0)
             journal.append({"header": header})
+            return
+        for number, line in enumerate(tasks, start=2):
+            if fault := misfit(line, scenarios):
+                raise ValueError(no_use(folder, number, fault, KINDS.missed))
+            self.results[json.dumps(line["task"])] = line["result"]
 
     def __len__(self) -> int:
         """The number of tasks that the interrupted measurement finished."""
@@ -94,23 +77,3 @@ class Kept:
     def add(self, task: tuple[Any, ...], result: Any) -> None:
         """Store the result of a task."""
         self.journal.append({"task": task, "result": result})
-
-
-def numbered(value: Any) -> Any:
-    """As `numbers`, but for what is text, which may be "nan"."""
-    if isinstance(value, list):
-        return [numbered(item) for item in value]
-    if isinstance(value, dict):
-        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
-    return numbers(value)
-
-
-def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
-    """Why a line belongs to none of the scenarios, as the end of a sentence; "" if it belongs to
-    one."""
-    scene = scene_of(line["task"])
-    if not scene:
-        return ""
-    if scene not in scenarios:
-        return f"task = {str(line['task'])[:60]}: must be of a scene that is measured"
-    return stranger(numbered(line), scenarios[scene])

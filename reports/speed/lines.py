@@ -6,11 +6,12 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping
 from math import isnan
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from adapters.run import STATUSES
+from reports.run.journal import numbers
 from reports.run.journal_lines import (
     Count,
     EngineProfile,
@@ -127,21 +128,43 @@ class SampleRow(Row):
     runs: Annotated[int, Field(ge=1, le=10**6)]
 
 
-class Errors(Line):
-    """The line of the journal that holds the errors of an engine at several step sizes."""
+class TaskResult(Line):
+    """What the tasks of one kind give; `parts`: from and to how many parts their names have."""
 
+    parts: ClassVar[tuple[int, int]] = (3, 3)
+
+    def misfit(self, _: list[Any], /) -> str:
+        """Why it is not of the task of this name, as the end of a sentence; "" if it is."""
+        return ""
+
+
+class Errors(TaskResult):
+    """The errors of an engine at several step sizes."""
+
+    parts = 7, 64
     result: Annotated[list[ErrorRow], Field(min_length=1)]
 
+    def misfit(self, task: list[Any]) -> str:
+        """A row belongs to each step size."""
+        here = [(row.seed, row.name, row.substeps) for row in self.result]
+        if here == [(task[3], task[4], step_size) for step_size in task[6:]]:
+            return ""
+        return "result: must have a row for each step that the task names, of its seed and engine"
 
-class BudgetResult(Line):
-    """The line of the journal that holds the contributions to an error."""
+
+class BudgetResult(TaskResult):
+    """The contributions to an error."""
 
     result: Annotated[list[BudgetRow], Field(min_length=1)]
 
+    def misfit(self, task: list[Any]) -> str:
+        """All rows are of one engine."""
+        same = all(row.name == task[2] for row in self.result)
+        return "" if same else "result: must be of the engine that the task names"
 
-class Samples(Line):
-    """The line of the journal that holds what was timed together: every round of each thing,
-    the warm-up first."""
+
+class Samples(TaskResult):
+    """What was timed together: every round of each thing, the warm-up first."""
 
     result: list[SampleRow]
 
@@ -150,15 +173,8 @@ class Samples(Line):
         """No round is missing, and none is there twice."""
         rounds = defaultdict[tuple[Any, ...], list[int]](list[Any])
         for row in self.result:
-            what = (
-                row.kind,
-                row.scenario,
-                row.name,
-                row.change,
-                str(row.dt_s),
-                row.n,
-                row.copy_of,
-            )
+            whose = row.kind, row.scenario, row.name, row.change
+            what = (*whose, str(row.dt_s), row.n, row.copy_of)
             rounds[what].append(row.round)
         for what, those in rounds.items():
             if sorted(those) != list(range(WARM_UP, WARM_UP + len(those))):
@@ -168,6 +184,12 @@ class Samples(Line):
         if any((*what[:-1], 0) not in rounds for what in rounds):
             raise ValueError("result: must have a copy_of 0 of each engine")
         return self
+
+    def misfit(self, task: list[Any]) -> str:
+        """With the steps of a scene the overheads are timed, too."""
+        kinds = {task[1]} | ({EMPTY, CALL, READ} if task[1] == "scene" else set())
+        same = all(row.kind in kinds for row in self.result)
+        return "" if same else "result: must be of the kind that the task names"
 
 
 class SizesOf(Line):
@@ -194,9 +216,10 @@ class SizesOf(Line):
         return self
 
 
-class Sizes(Line):
-    """The line of the journal that holds the costs of a step by number of disks."""
+class Sizes(TaskResult):
+    """The costs of a step by number of disks."""
 
+    parts = 2, 2
     result: SizesOf
 
 
@@ -208,13 +231,13 @@ class Closed(Line):
     closed_us: Length
 
 
-class Truth(Line):
-    """The line of the journal that holds the cost of a closed form."""
+class Truth(TaskResult):
+    """The cost of a closed form."""
 
     result: Closed
 
 
-RESULTS: dict[tuple[str, ...], type[Line]] = {
+RESULTS: dict[tuple[str, ...], type[TaskResult]] = {
     ("error", "scene"): Errors,
     ("error", "option"): Errors,
     ("error", "sweep"): Errors,
@@ -226,8 +249,6 @@ RESULTS: dict[tuple[str, ...], type[Line]] = {
     ("time", "truth"): Truth,
 }
 """How a task begins -> what it gives."""
-# of its task, from and to
-PARTS = {Errors: (7, 64), BudgetResult: (3, 3), Samples: (3, 3), Sizes: (2, 2), Truth: (3, 3)}
 
 
 class SpeedTaskLine(Line):
@@ -246,28 +267,25 @@ class SpeedTaskLine(Line):
             raise ValueError(
                 f"task = {str(task)[:60]}: must begin as one of {', '.join(map(' '.join, RESULTS))}"
             )
-        low, high = PARTS[model]
+        low, high = model.parts
         if not low <= len(task) <= high:
             raise ValueError(f"task = {str(task)[:60]}: must have as many parts as one of its kind")
         try:
-            found: Any = model.model_validate({"result": self.result})
+            found = model.model_validate({"result": self.result})
         except ValidationError as error:
             raise ValueError(sentence(error.errors(include_url=False)[0])) from None
-        if begins[0] == "error":
-            here = [(row.seed, row.name, row.substeps) for row in found.result]
-            if here != [(task[3], task[4], step_size) for step_size in task[6:]]:
-                raise ValueError(
-                    "result: must have a row for each step that the task names, of its seed and"
-                    " engine"
-                )
-        if begins[0] == "budget" and any(row.name != task[2] for row in found.result):
-            raise ValueError("result: must be of the engine that the task names")
-        kinds = {begins[1]} | ({EMPTY, CALL, READ} if begins[1] == "scene" else set())
-        if model is Samples and any(row.kind not in kinds for row in found.result):
-            raise ValueError("result: must be of the kind that the task names")
+        if fault := found.misfit(task):
+            raise ValueError(fault)
         return self
 
 
+# columns of results that hold text, and what holds numbers and text
+TEXT = {"status", "stopped", "task"} | {
+    name
+    for row in (ErrorRow, BudgetRow, SampleRow, Closed)
+    for name, field in row.model_fields.items()
+    if field.annotation is str
+}
 KINDS = Kinds(
     {"header": SpeedHeaderLine, "task": SpeedTaskLine},
     "delete that line, and --resume measures again what it was of",
@@ -275,17 +293,26 @@ KINDS = Kinds(
 )
 
 
-def scene_of(task: list[Any]) -> str:
-    """The scene of a task; "" if it has none."""
-    if task[0] == "budget":
-        return str(task[1])
-    return str(task[2]) if len(task) > 2 else ""
+def numbered(value: Any) -> Any:
+    """As `numbers`, but for what is text, which may be "nan"."""
+    if isinstance(value, list):
+        return [numbered(item) for item in value]
+    if isinstance(value, dict):
+        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
+    return numbers(value)
 
 
-def stranger(line: Mapping[str, Any], scenario: Scenario) -> str:
-    """Why a result does not belong to the scenario, as the end of a sentence; "" if it does."""
-    rows = line["result"] if isinstance(line["result"], list) else [line["result"]]
-    for k, row in enumerate(rows):
+def misfit(line: Mapping[str, Any], scenarios: Mapping[str, Scenario]) -> str:
+    """Why a line belongs to none of the scenarios, as the end of a sentence; "" if it belongs to
+    one, or is of no scene."""
+    task = line["task"]
+    scene = "".join(map(str, task[1:2] if task[0] == "budget" else task[2:3]))
+    if not scene:
+        return ""
+    if scene not in scenarios:
+        return f"task = {str(task)[:60]}: must be of a scene that is measured"
+    scenario, result = scenarios[scene], numbered(line["result"])
+    for k, row in enumerate(result if isinstance(result, list) else [result]):
         if row["scenario"] != scenario.name:
             return f"result[{k}].scenario = {row['scenario']!r}: must be {scenario.name!r}"
         if "dt_s" in row and row.get("kind") not in (EMPTY, CALL, READ):  # these have no step size

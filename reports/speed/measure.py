@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import groupby
+from itertools import chain, groupby
+from math import nan
 from typing import Any
 
 import pandas as pd
@@ -52,12 +53,12 @@ class Measured:
     """
 
     errors: pd.DataFrame = field(default_factory=pd.DataFrame)
-    budget: pd.DataFrame = field(default_factory=pd.DataFrame)
+    budget: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=budget.COLUMNS))
     samples: pd.DataFrame = field(default_factory=lambda: samples_table([]))
     truths: pd.DataFrame = field(default_factory=pd.DataFrame)
     left_out: list[tuple[str, str]] = field(default_factory=list)
     stopped: dict[tuple[str, int], str] = field(default_factory=dict)
-    busy: float = float("nan")
+    busy: float = nan
 
 
 def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -65,60 +66,105 @@ def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*WORDS, *NUMBERS]).astype(NUMBERS)
 
 
-def measure(plan: SpeedPlan, progress: Progress, kept: Kept | None = None) -> Measured:
-    """Both passes of the plan; results `kept` from an interrupted measurement are not measured
-    again."""
-    measured = Measured()
-    reach = find_reach(plan, measured, progress)
-    measurements = list(plan.measurements(reach))
-    if any(measurement.kind == SCENE for measurement in measurements):
-        progress.note(estimate(plan, measurements, reach))
-        played = measure_errors(plan, measurements, measured, progress, kept)
-        measure_budget(plan, reach, measured, progress, kept)
-        measure_times(plan, played, measured, progress, kept)
-    return measured
+@dataclass
+class Measuring:
+    """A measurement under way: first the errors, then the times; results `kept` from an interrupted
+    one are not measured again."""
 
+    plan: SpeedPlan
+    progress: Progress
+    kept: Kept | None = None
+    measured: Measured = field(default_factory=Measured)
 
-def find_reach(plan: SpeedPlan, measured: Measured, progress: Progress) -> Reach:
-    """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
-    have none are reported."""
-    # In workers, which can be stopped at any time.
-    asked = {seeded: partial(scored_part.reach_of, *seeded) for seeded in plan.seeded_scenes}
-    results = dict(done(asked, plan.workers, progress, "exact answer"))
-    reach = {}
-    for (scene, seed), result in results.items():
-        reach[scene, seed], why = (0, result.reason) if isinstance(result, Failure) else result
-        if why:
-            measured.left_out.append((f"{scene}, seed {seed}", f"no exact answer: {why}"))
-    return reach
+    def run(self) -> Measured:
+        """Both passes of the plan."""
+        reach = self.find_reach()
+        measurements = list(self.plan.measurements(reach))
+        if any(measurement.kind == SCENE for measurement in measurements):
+            self.progress.note(estimate(self.plan, measurements, reach))
+            played = self.measure_errors(measurements)
+            self.measure_budget(reach)
+            self.measure_times(played)
+        return self.measured
 
+    def find_reach(self) -> Reach:
+        """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
+        have none are left out."""
+        # In workers, which can be stopped at any time.
+        asked = {
+            seeded: partial(scored_part.reach_of, *seeded) for seeded in self.plan.seeded_scenes
+        }
+        reach = {}
+        for seeded, result in done(asked, self.plan.workers, self.progress, "exact answer"):
+            reach[seeded], why = (0, result.reason) if isinstance(result, Failure) else result
+            if why:
+                self.leave_out("{}, seed {}".format(*seeded), f"no exact answer: {why}")
+        return reach
 
-def measure_errors(
-    plan: SpeedPlan,
-    measurements: Sequence[Measurement],
-    measured: Measured,
-    progress: Progress,
-    kept: Kept | None,
-) -> list[Measurement]:
-    """The errors of all engines; returns those of the first seed at the steps that were played
-    to the end."""
-    tasks = {measurement.task: measurement.errors for measurement in measurements}
-    results = dict(done(tasks, plan.workers, progress, "error", kept=kept))
-    rows: list[dict[str, Any]] = []
-    played = []
-    for measurement in measurements:
-        result = results[measurement.task]
-        found = (
-            one_step_size_at_a_time(measurement, plan.workers)
-            if isinstance(result, Failure)
-            else result
+    def leave_out(self, what: str, why: str | Failure) -> None:
+        """Report what could not be measured."""
+        why = f"{why.status}: {why.reason}" if isinstance(why, Failure) else why
+        self.measured.left_out.append((what, why))
+
+    def measure_errors(self, measurements: Sequence[Measurement]) -> list[Measurement]:
+        """The errors of all engines; returns those of the first seed at the steps that were played
+        to the end."""
+        workers = self.plan.workers
+        tasks = {measurement.task: measurement.errors for measurement in measurements}
+        results = dict(done(tasks, workers, self.progress, "error", kept=self.kept))
+        rows: list[dict[str, Any]] = []
+        played = []
+        for measurement in measurements:
+            found = results[measurement.task]
+            if isinstance(found, Failure):
+                found = one_step_size_at_a_time(measurement, workers)
+            rows += (
+                {"kind": measurement.kind, "change": measurement.change} | row for row in found
+            )
+            if measurement.seed == self.plan.seed:
+                well = tuple(row["substeps"] for row in found if row["status"] == "ok")
+                played.append(measurement._replace(step_sizes=well))
+        self.measured.errors = pd.DataFrame(rows)
+        return played
+
+    def measure_budget(self, reach: Reach) -> None:
+        """The error budgets of the engines whose mechanisms are known, at the middle dt."""
+        seed = self.plan.seed
+        tasks = {
+            ("budget", scene, name): partial(budget.budget_of, scene, seed, name, middle(scene))
+            for scene in self.plan.budget_scenes
+            for name in self.plan.engines
+            if name in MECHANISMS and reach[scene, seed]
+        }
+        results = dict(
+            done(tasks, self.plan.workers, self.progress, "error budget", kept=self.kept)
         )
-        rows += ({"kind": measurement.kind, "change": measurement.change} | row for row in found)
-        if measurement.seed == plan.seed:
-            well = tuple(row["substeps"] for row in found if row["status"] == "ok")
-            played.append(measurement._replace(step_sizes=well))
-    measured.errors = pd.DataFrame(rows)
-    return played
+        for task, result in results.items():
+            if isinstance(result, Failure):
+                self.leave_out(f"error budget of {' '.join(task[1:])}", result)
+        found = [results[task] for task in tasks if not isinstance(results[task], Failure)]
+        self.measured.budget = pd.DataFrame(chain.from_iterable(found), columns=budget.COLUMNS)
+
+    def measure_times(self, played: Sequence[Measurement]) -> None:
+        """The cost of everything that was played to the end, in one process and one thing at a
+        time."""
+        self.measured.busy = busy_cores()
+        rows: list[dict[str, Any]] = []
+        truths = []
+        tasks = timings(self.plan, played)
+        for task, result in done(tasks, 1, self.progress, "time", ALL_ROUNDS, self.kept):
+            kind = task[1]
+            if isinstance(result, Failure):
+                self.leave_out(f"timing of {' '.join(task[1:])}", result)
+            elif kind == TRUTH:
+                truths.append(result)
+            elif kind == SIZE:
+                rows += result["samples"]
+                self.measured.stopped = {(name, n): why for name, n, why in result["stopped"]}
+            else:
+                rows += result
+        self.measured.samples = samples_table(rows)
+        self.measured.truths = pd.DataFrame(truths)
 
 
 def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict[str, Any]]:
@@ -135,56 +181,6 @@ def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict
             result = [ladder.error_row(*asked, result.status, result.reason)]
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
-
-
-def measure_budget(
-    plan: SpeedPlan, reach: Reach, measured: Measured, progress: Progress, kept: Kept | None
-) -> None:
-    """The error budgets of the engines whose mechanisms are known, at the middle dt."""
-    tasks = {
-        ("budget", scene, name): partial(budget.budget_of, scene, plan.seed, name, middle(scene))
-        for scene in plan.budget_scenes
-        for name in plan.engines
-        if name in MECHANISMS and reach[scene, plan.seed]
-    }
-    results = dict(done(tasks, plan.workers, progress, "error budget", kept=kept))
-    for task, result in results.items():
-        if isinstance(result, Failure):
-            measured.left_out.append(
-                (f"error budget of {' '.join(task[1:])}", f"{result.status}: {result.reason}")
-            )
-    rows = [
-        row for task in tasks if not isinstance(results[task], Failure) for row in results[task]
-    ]
-    measured.budget = pd.DataFrame(rows, columns=budget.COLUMNS)
-
-
-def measure_times(
-    plan: SpeedPlan,
-    played: Sequence[Measurement],
-    measured: Measured,
-    progress: Progress,
-    kept: Kept | None,
-) -> None:
-    """The cost of everything that was played to the end, in one process and one thing at a time."""
-    measured.busy = busy_cores()
-    rows: list[dict[str, Any]] = []
-    truths = []
-    for task, result in done(timings(plan, played), 1, progress, "time", ALL_ROUNDS, kept):
-        kind = task[1]
-        if isinstance(result, Failure):
-            measured.left_out.append(
-                (f"timing of {' '.join(task[1:])}", f"{result.status}: {result.reason}")
-            )
-        elif kind == TRUTH:
-            truths.append(result)
-        elif kind == SIZE:
-            rows += result["samples"]
-            measured.stopped = {(name, n): why for name, n, why in result["stopped"]}
-        else:
-            rows += result
-    measured.samples = samples_table(rows)
-    measured.truths = pd.DataFrame(truths)
 
 
 def timings(
@@ -213,16 +209,12 @@ def in_turns(
 
     On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
     """
-    all_of_them = {}
-    for measurement in measurements:
-        for k in measurement.step_sizes:
-            twice = (
-                measurement.kind == SCENE
-                and k == measurement.step_sizes[len(measurement.step_sizes) // 2]
-            )
-            for copy in (0, 1) if twice else (0,):
-                all_of_them[(measurement.name, measurement.change), k, copy] = measurement.make
-    return all_of_them
+    return {
+        ((one.name, one.change), k, copy): one.make
+        for one in measurements
+        for place, k in enumerate(one.step_sizes)
+        for copy in ((0, 1) if one.kind == SCENE and place == len(one.step_sizes) // 2 else (0,))
+    }
 
 
 def scene_rows(
@@ -230,21 +222,17 @@ def scene_rows(
 ) -> list[dict[str, Any]]:
     """Rows of `Measured.samples` of measurements as `in_turns` gives them; where these are of a
     scene's ladders, of what is measured beside their steps, too."""
-    scenario, rows = open_scene(scene, seed), []
+    scenario = open_scene(scene, seed)
+    rows = []
     also = {who[0]: make for (who, _, _), make in measurements.items()} if kind == SCENE else {}
     for sample in ladder.times_of(scene, seed, measurements, **repeats, also=also):
         if len(sample.key) == 2:
             name, what = sample.key
             rows.append(sample_row(what, name, sample, scenario=scenario.name))
-            continue
-        (name, change), k, copy = sample.key
-        identity = {
-            "scenario": scenario.name,
-            "change": change,
-            "dt_s": scenario.dt(k),
-            "copy_of": copy,
-        }
-        rows.append(sample_row(kind, name, sample, **identity))
+        else:
+            (name, change), k, copy = sample.key
+            whose = {"scenario": scenario.name, "change": change, "dt_s": scenario.dt(k)}
+            rows.append(sample_row(kind, name, sample, **whose, copy_of=copy))
     return rows
 
 
@@ -263,25 +251,11 @@ def size_rows(
 def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
     """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
-    unknown = {
-        "scenario": "",
-        "change": PLAIN,
-        "dt_s": float("nan"),
-        "n": 0,
-        "copy_of": 0,
-    }
-    return (
-        {"kind": kind, "engine": engine, "profile": profile}
-        | unknown
-        | identity
-        | {
-            "round": sample.round,
-            "place": sample.place,
-            "cost": sample.cost,
-            "wrapping": sample.wrapping,
-            "runs": sample.runs,
-        }
-    )
+    row: dict[str, Any] = {"kind": kind, "engine": engine, "profile": profile}
+    row |= {"scenario": "", "change": PLAIN, "dt_s": nan, "n": 0, "copy_of": 0} | identity
+    row |= sample._asdict()
+    del row["key"]
+    return row
 
 
 def done(

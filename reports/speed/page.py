@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,9 +19,8 @@ from reports.page.links import neighbours
 from reports.run.scenes import open_scene
 from reports.speed import budget_tables, charts, explained, tables
 from reports.speed.budget import RESIDUAL, TOTALS
-from reports.speed.results import Results
+from reports.speed.results import QUIET, Results
 from reports.speed.scored_part import scored
-from reports.speed.versus import OWN
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import put_text
 
@@ -37,7 +36,7 @@ class SpeedSection(NamedTuple):
     text: str
     drawings: dict[str, Drawing]
     charts: str
-    orders: list[dict[str, Any]]
+    orders: list[dict[Hashable, Any]]
     names: list[str]
 
 
@@ -66,15 +65,16 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         sizes=sizes_section(results),
         options=options_section(results),
         sweeps=sweep_sections(results),
-        sweep_rows=charts.records(results.sweeps),
+        sweep_rows=results.sweeps.to_dict("records"),
         sections=[section_of(results, name) for name in results.scenes],
-        noise=results.noise_summary(),
-        growth=charts.records(results.growth),
-        models=charts.records(results.models),
-        driving=charts.records(results.driving),
-        option_rows=charts.records(results.options),
-        versus=charts.records(results.versus),
-        own=OWN,
+        noise=results.noise_floor(),
+        quiet=results.noise_floor().floor <= QUIET,
+        growth=results.growth.to_dict("records"),
+        models=results.models.to_dict("records"),
+        driving=results.driving.to_dict("records"),
+        option_rows=results.options.to_dict("records"),
+        versus=results.versus.to_dict("records"),
+        own=YARDSTICK,
         left_out=results.left_out,
         accuracies=list(ACCURACIES),
         flagged=FLAGGED,
@@ -126,7 +126,7 @@ def section(
         for trace in each.figure["data"]
     ]
     names = [name for name in dict.fromkeys(traces) if ":" in name]
-    rows = [] if orders is None else charts.records(orders)
+    rows = [] if orders is None else orders.to_dict("records")
     return SpeedSection(key, title, text, drawings, packed_charts(drawings), rows, names)
 
 
@@ -172,11 +172,11 @@ def section_of(results: Results, scene: str) -> SpeedSection:
         if seeds > 1
         else ""
     )
-    noise = results.noise_summary(scene)
-    low, high = (style.number(noise.get(end, np.nan)) for end in ("low", "high"))
+    noise = results.noise_floor(scene)
     floor = (
-        f" Noise floor: for half of the engines the ratio of two timings is {low} to {high}."
-        if noise["pairs"]
+        " Noise floor: for half of the engines the ratio of two timings is"
+        f" {style.number(noise.low)} to {style.number(noise.high)}."
+        if noise.pairs
         else ""
     )
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
@@ -282,7 +282,7 @@ def sweep_sections(results: Results) -> list[SpeedSection]:
         charts.sweeps(results.pooled_sweeps, relative=True),
     )
     each = {
-        str(scene): Drawing(str(scene), tables.asks_of(str(scene))[1], charts.sweeps(points))
+        str(scene): Drawing(str(scene), open_scene(str(scene), 0).asks, charts.sweeps(points))
         for scene, points in results.sweeps.groupby("scenario", sort=False)
     }
     return [

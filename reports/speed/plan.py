@@ -105,10 +105,8 @@ class SpeedPlan:
                 scenario = open_scene(scene, seed)
                 step_sizes = self.effort.ladder(scenario)
                 rows = {name: row_of(name) for name in self.engines}
-                yield from (
-                    Measurement(SCENE, scene, seed, name, PLAIN, rows[name].make, step_sizes)
-                    for name in told_apart(rows, scenario.scene)
-                )
+                for name in told_apart(rows, scenario.scene):
+                    yield unchanged(SCENE, scene, seed, name, step_sizes)
             if scene in self.option_scenes and seed == self.seed:
                 yield from self.changed(scene)
             if scene in self.sweep_scenes:
@@ -118,7 +116,7 @@ class SpeedPlan:
         """The engines with one option changed, after those without, at the dt the report shows."""
         step_sizes = (middle(scene),)
         for name in dict.fromkeys(option.engine for option in self.options):
-            yield Measurement(OPTION, scene, self.seed, name, PLAIN, row_of(name).make, step_sizes)
+            yield unchanged(OPTION, scene, self.seed, name, step_sizes)
         for one in self.options:
             yield Measurement(
                 OPTION, scene, self.seed, one.engine, one.change, one.make, step_sizes
@@ -129,13 +127,18 @@ class SpeedPlan:
         dt."""
         here = middle(scene)
         for sweep in self.sweeps:
-            yield Measurement(
-                SWEEP, scene, seed, sweep.engine, PLAIN, row_of(sweep.engine).make, around(here)
-            )
+            yield unchanged(SWEEP, scene, seed, sweep.engine, around(here))
             for value in sweep.parameter.values:
                 yield Measurement(
                     SWEEP, scene, seed, sweep.name, str(value), sweep.at(value), (here,)
                 )
+
+
+def unchanged(
+    kind: str, scene: str, seed: int, name: str, step_sizes: tuple[int, ...]
+) -> Measurement:
+    """That of an engine as it is."""
+    return Measurement(kind, scene, seed, name, PLAIN, row_of(name).make, step_sizes)
 
 
 def around(here: int) -> tuple[int, ...]:

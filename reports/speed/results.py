@@ -3,36 +3,63 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
-from reports.compare.pareto import (
-    ACCURACIES,
-    FAILED,
-    NOT_TIMED,
-    UNREACHABLE,
-    paired_cost,
-    yardstick_of,
-)
-from reports.compare.pooling import POOLED, pooled
+from reports.compare.pareto import ACCURACIES
+from reports.compare.pooling import pooled
 from reports.run.scenes import open_scene
+from reports.run.timing import Noise, noise_of
 from reports.speed import cheapest, explained, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
 from reports.terminal.foreign_text import put_text
+from scenarios.model import Scenario
 
-QUIET = 0.05  # how far from 1 an engine against itself may read
+QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 
 
 @dataclass
 class Results:
-    """What was measured, and the tables made from it on demand."""
+    """What was measured, which must be an error at least, and the tables made from it.
+
+    Attributes, beside the tables that a function of `tables` of the same name describes:
+        asks: scenario -> its question, for the measured scenarios in the order in which they were
+            asked for.
+        points: as of `tables`; and idle, what as many steps cost where there is nothing to do, µs
+            per simulated s.
+        pooled: see `pooling.pooled`; of scenes without friction, as is `pooled_reached`, unless
+            every scene has friction.
+        versus, models, explained: see `versus.against_own`, `cheapest.cheapest_models`,
+            `explained.explained`.
+    """
 
     plan: SpeedPlan
     measured: Measured
+
+    def __post_init__(self) -> None:
+        measured, seed = self.measured, self.plan.seed
+        scenarios = [open_scene(scene, seed) for scene in self.plan.scenes]
+        asked = {scenario.name: scenario for scenario in scenarios}
+        self.bindings = tables.bindings(measured)
+        self.driving = tables.driving(self.bindings)
+        points = tables.points(measured, seed)
+        self.points = points.assign(idle=tables.idle(self.bindings, points, asked))
+        self.asks = {name: asked[name].asks for name in asked if name in {*points.scenario}}
+        self.orders = tables.orders(measured, seed)
+        self.reached = tables.reached(self.points, self.orders)
+        self.pooled = pooled(poolable(self.points, asked))
+        self.pooled_reached = tables.pooled_reached(poolable(self.reached, asked), self.reached)
+        self.sizes = tables.sizes(measured)
+        self.growth = tables.growth(self.sizes, measured.stopped)
+        self.sweeps = tables.sweeps(measured, seed)
+        self.pooled_sweeps = tables.pooled_sweeps(self.sweeps)
+        self.options = tables.options(measured)
+        self.versus = versus.against_own(self.points, self.options)
+        self.models = cheapest.cheapest_models(measured.truths, self.points)
+        self.explained = explained.explained(measured.budget)
+        self.noise = tables.noise(measured)
 
     @property
     def names(self) -> list[str]:
@@ -44,196 +71,36 @@ class Results:
         """(what, why) of what could not be measured."""
         return self.measured.left_out
 
-    @cached_property
-    def asks(self) -> dict[str, str]:
-        """Scenario -> its question, for the measured scenarios in the order in which they were
-        asked for."""
-        named = dict(tables.asks_of(scene) for scene in self.plan.scenes)
-        return {name: asks for name, asks in named.items() if name in set(self.points.scenario)}
-
     @property
     def scenes(self) -> list[str]:
         """The measured scenarios."""
         return list(self.asks)
 
-    @cached_property
-    def points(self) -> pd.DataFrame:
-        """See `tables.points`; and idle, what as many steps cost where there is nothing to do, µs
-        per simulated s."""
-        points = tables.points(self.measured, self.plan.seed)
-        scenarios = {tables.asks_of(scene)[0]: scene for scene in self.plan.scenes}
-        return points.assign(idle=tables.idle(self.bindings, points, scenarios))
-
-    @cached_property
-    def orders(self) -> pd.DataFrame:
-        """See `tables.orders`."""
-        return tables.orders(self.measured, self.plan.seed)
-
-    @cached_property
-    def reached(self) -> pd.DataFrame:
-        """See `tables.reached`."""
-        return tables.reached(self.points, self.orders)
-
-    def poolable(self, table: pd.DataFrame) -> pd.DataFrame:
-        """The rows of scenes without friction, which alone are pooled; all rows if every scene
-        has friction."""
-        opened = [open_scene(scene, self.plan.seed) for scene in self.plan.scenes]
-        rough = table.scenario.isin([one.name for one in opened if one.scene.friction])
-        return table if rough.all() else table[~rough]
-
-    @cached_property
-    def pooled(self) -> pd.DataFrame:
-        """See `pooling.pooled`; of the `poolable` rows."""
-        return pooled(self.poolable(self.points))
-
-    @cached_property
-    def sweeps(self) -> pd.DataFrame:
-        """See `tables.sweeps`."""
-        return tables.sweeps(self.measured, self.plan.seed)
-
-    @cached_property
-    def pooled_sweeps(self) -> pd.DataFrame:
-        """See `tables.pooled_sweeps`."""
-        return tables.pooled_sweeps(self.sweeps)
-
-    @cached_property
-    def pooled_reached(self) -> pd.DataFrame:
-        """As `reached`, one cost for all scenarios where an engine gets there in more than half of
-        them: `paired_cost`, and how many do and do not.
-
-        A median over all of them would be that of other scenarios for each engine; with many out
-        of reach, of the dearest. Columns besides: of, how many scenarios; got, in how many it gets
-        there; never, at no dt; failed; untimed; in the others it does not down to the finest dt.
-        lost: half or more are never or failed.
-        """
-        rows = []
-        own = yardstick_of(self.reached)
-        for (engine, profile, accuracy), group in self.poolable(self.reached).groupby(
-            ["engine", "profile", "accuracy"], sort=False
-        ):
-            counts = {
-                "of": len(group),
-                "got": int(group.cost.notna().sum()),
-                "never": int((group.why == UNREACHABLE).sum()),
-                "failed": int((group.why == FAILED).sum()),
-                "untimed": int((group.why == NOT_TIMED).sum()),
-            }
-            most = 2 * counts["got"] > len(group)
-            others = [
-                f"{what} in {counts[what]}"
-                for what in ("never", "failed", "untimed")
-                if counts[what]
-            ]
-            rows.append(
-                {
-                    "scenario": POOLED,
-                    "engine": engine,
-                    "profile": profile,
-                    "accuracy": accuracy,
-                    "cost": paired_cost(group, own[own.accuracy == accuracy]) if most else np.nan,
-                    "dt_s": np.nan,
-                    "why": ", ".join([f"{counts['got']} of {len(group)}", *others]),
-                    "lost": 2 * int(group.lost.sum()) >= len(group),
-                    **counts,
-                }
-            )
-        return pd.DataFrame(rows)
-
-    @cached_property
-    def noise(self) -> pd.DataFrame:
-        """See `tables.noise`."""
-        return tables.noise(self.measured)
-
-    def noise_summary(self, scene: str = "") -> dict[str, float]:
-        """median, low, high (quartiles), least, most and pairs of an engine against itself; quiet:
-        within `QUIET`."""
+    def noise_floor(self, scene: str = "") -> Noise:
+        """That of an engine against itself, in one scene or in all; quiet up to `QUIET`."""
         ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
-        if ratios.empty:
-            return {"pairs": 0, "quiet": False}
-        low, median, high = np.percentile(ratios, [25, 50, 75])
-        quiet = max(abs(low - 1), abs(high - 1)) <= QUIET
-        return {
-            "median": float(median),
-            "low": float(low),
-            "high": float(high),
-            "least": float(ratios.min()),
-            "most": float(ratios.max()),
-            "pairs": len(ratios),
-            "quiet": bool(quiet),
-        }
-
-    @cached_property
-    def driving(self) -> pd.DataFrame:
-        """See `tables.driving`."""
-        return tables.driving(self.bindings)
-
-    @cached_property
-    def bindings(self) -> pd.DataFrame:
-        """See `tables.bindings`."""
-        return tables.bindings(self.measured)
-
-    @property
-    def sizes(self) -> pd.DataFrame:
-        """Costs of `tables.grown`."""
-        return self._grown[0]
-
-    @property
-    def growth(self) -> pd.DataFrame:
-        """Exponents of `tables.grown`."""
-        return self._grown[1]
-
-    @cached_property
-    def _grown(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        return tables.grown(self.measured)
-
-    @cached_property
-    def options(self) -> pd.DataFrame:
-        """See `tables.options`."""
-        return tables.options(self.measured)
-
-    @cached_property
-    def explained(self) -> pd.DataFrame:
-        """See `explained.explained`."""
-        budget = self.measured.budget
-        return (
-            explained.explained(budget) if len(budget) else pd.DataFrame(columns=explained.COLUMNS)
-        )
-
-    @cached_property
-    def versus(self) -> pd.DataFrame:
-        """See `versus.against_own`."""
-        return versus.against_own(self.points, self.options)
-
-    @cached_property
-    def models(self) -> pd.DataFrame:
-        """See `cheapest.cheapest_models`."""
-        return cheapest.cheapest_models(self.measured.truths, self.points)
+        return noise_of(ratios.to_numpy(float))
 
     def order_table(self, scene: str) -> pd.DataFrame:
         """A row for each engine: order with interval and verdict, and for every accuracy (cost, dt,
         why) as columns."""
         orders = self.orders[self.orders.scenario == scene]
         reached = self.reached[self.reached.scenario == scene]
-        wide = orders.assign(
-            **{
-                accuracy: [
-                    next(
-                        reached[
-                            (reached.engine == engine)
-                            & (reached.profile == profile)
-                            & (reached.accuracy == accuracy)
-                        ][["cost", "dt_s", "why"]].itertuples(index=False, name=None)
-                    )
-                    for engine, profile in zip(orders.engine, orders.profile)
-                ]
-                for accuracy in ACCURACIES
-            }
+        got = dict(
+            zip(
+                zip(reached.engine, reached.profile, reached.accuracy),
+                zip(reached.cost, reached.dt_s, reached.why),
+            )
         )
+        who = list(zip(orders.engine, orders.profile))
+        wide = orders.copy()
+        for accuracy in ACCURACIES:
+            wide[accuracy] = [got[*each, accuracy] for each in who]
         beside = self.bindings[self.bindings.scenario == scene].drop(columns="scenario")
         wide = wide.merge(beside, on=["engine", "profile"], how="left")
         return wide.assign(name=wide.engine + ":" + wide.profile)
 
-    @cached_property
+    @property
     def files(self) -> dict[str, pd.DataFrame]:
         """The tables, by the names of their CSV files."""
         tables = {
@@ -260,3 +127,10 @@ class Results:
         """The tables as CSV files."""
         for name, table in self.files.items():
             put_text(folder / name, table.to_csv(index=False))
+
+
+def poolable(table: pd.DataFrame, asked: dict[str, Scenario]) -> pd.DataFrame:
+    """The rows of scenes without friction, which alone are pooled; all rows if every scene has
+    friction."""
+    rough = table.scenario.isin([name for name, one in asked.items() if one.scene.friction])
+    return table if rough.all() else table[~rough]

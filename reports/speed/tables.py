@@ -3,7 +3,7 @@ noise floor."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,26 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.options import SWEEPS
-from reports.compare.order import FINEST, NEARER, Order, median_interval, order_of
-from reports.compare.pareto import ACCURACIES, FAILED, NOT_REACHED, UNREACHABLE, cost_to_reach
-from reports.compare.pooling import WHO, pooled
-from reports.run.scenes import open_scene
+from reports.compare.order import Order, median_interval, order_of
+from reports.compare.pareto import (
+    ACCURACIES,
+    FAILED,
+    NOT_REACHED,
+    NOT_TIMED,
+    UNREACHABLE,
+    cost_to_reach,
+    paired_cost,
+    yardstick_of,
+)
+from reports.compare.pooling import POOLED, WHO, pooled
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
 from reports.run.timing import WARM_UP
 from reports.speed.measure import SIZE, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.sizes import exponent
+from scenarios.model import Scenario
+
+NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
@@ -54,6 +65,8 @@ def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
     change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
     part in it.
     """
+    if found.empty:
+        return found
     both = found.merge(at_matched(found), on=["scenario", "engine"], suffixes=("", "_here"))
     both = both[measurable(both)]
     for of in ("cost", "error"):
@@ -149,56 +162,32 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
     steps, how many were played, and failed, at how many of them a seed failed: what failed has no
     part in slope and verdict.
     """
+    found = measured.errors[measured.errors.kind == SCENE]
     rows = []
-    for keys, dt, errors, changes in ladders(measured):
-        found = (
-            order_of(dt, errors, changes, seed)
-            if errors.shape[1] >= 2
-            else Order(np.nan, np.nan, np.nan, "")
+    for keys, group in found.groupby(["scenario", *WHO], sort=False):
+        errors, changes = (
+            group.pivot(index="seed", columns="substeps", values=value).to_numpy(float)
+            for value in ("error_radii", "change_radii")
         )
-        if not np.isfinite(errors).any():
-            found = Order(np.nan, np.nan, np.nan, FAILED)
+        dt = np.sort(group.dt_s.unique())[::-1]  # coarse to fine, as the columns
+        failed = ~np.isfinite(errors)
+        if failed.all() or len(dt) < 2:
+            order = Order(np.nan, np.nan, np.nan, FAILED if failed.all() else "")
+        else:
+            order = order_of(dt, errors, changes, seed)
+        coarsest, finest = np.median(errors[:, [0, -1]], axis=0).tolist()
         rows.append(
             dict(zip(["scenario", *WHO], keys))
-            | found._asdict()
+            | order._asdict()
             | {
                 "finest_dt_s": dt[-1],
                 "steps": len(dt),
-                **dict(
-                    zip(
-                        ("coarsest_error", "finest_error"),
-                        np.median(errors[:, [0, -1]], axis=0).tolist(),
-                    )
-                ),
-                "failed": int((~np.isfinite(errors)).any(axis=0).sum()),
+                "coarsest_error": coarsest,
+                "finest_error": finest,
+                "failed": int(failed.any(axis=0).sum()),
             }
         )
     return pd.DataFrame(rows)
-
-
-def no_nearer(fitted: pd.DataFrame) -> pd.Series:
-    """For each row of `orders`, whether the error falls by less than a tenth from the coarsest
-    to the finest step.
-
-    False if all steps failed, or if the finest one has an error of at most `FINEST`; True if
-    only the finest step failed.
-    """
-    falls = fitted.finest_error < NEARER * fitted.coarsest_error
-    return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
-
-
-def ladders(
-    measured: Measured,
-) -> Iterator[tuple[tuple[Any, ...], np.ndarray, np.ndarray, np.ndarray]]:
-    """(scenario, engine, profile), dt (k,), errors and changes (seeds, k), coarse to fine."""
-    errors = measured.errors[measured.errors.kind == SCENE]
-    for keys, group in errors.groupby(["scenario", *WHO], sort=False):
-        wide = [
-            group.pivot(index="seed", columns="substeps", values=value)
-            for value in ("error_radii", "change_radii")
-        ]
-        dt = np.sort(group.dt_s.unique())[::-1]
-        yield tuple(keys), dt, wide[0].to_numpy(float), wide[1].to_numpy(float)
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
@@ -226,6 +215,42 @@ def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
                     "lost": why in (UNREACHABLE, FAILED),
                 }
             )
+    return pd.DataFrame(rows)
+
+
+def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
+    """As `reached`, one cost for all scenarios where an engine gets there in more than half of
+    them: `paired_cost`, and how many do and do not.
+
+    A median over all of them would be that of other scenarios for each engine; with many out
+    of reach, of the dearest. Columns besides: of, how many scenarios; got, in how many it gets
+    there; never, at no dt; failed; untimed; in the others it does not down to the finest dt.
+    lost: half or more are never or failed. `part`: the rows of `found`, from `reached`, of the
+    scenarios that are pooled.
+    """
+    rows = []
+    own = yardstick_of(found)
+    for (engine, profile, accuracy), group in part.groupby([*WHO, "accuracy"], sort=False):
+        got = int(group.cost.notna().sum())
+        others = {name: int((group.why == why).sum()) for name, why in NOT_GOT.items()}
+        said = [f"{got} of {len(group)}"]
+        said += [f"{name} in {count}" for name, count in others.items() if count]
+        most = 2 * got > len(group)
+        rows.append(
+            {
+                "scenario": POOLED,
+                "engine": engine,
+                "profile": profile,
+                "accuracy": accuracy,
+                "cost": paired_cost(group, own[own.accuracy == accuracy]) if most else np.nan,
+                "dt_s": np.nan,
+                "why": ", ".join(said),
+                "lost": 2 * int(group.lost.sum()) >= len(group),
+                "of": len(group),
+                "got": got,
+                **others,
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -265,12 +290,10 @@ def driving(found: pd.DataFrame) -> pd.DataFrame:
     return in_order(medians.assign(read_most_us=each.read_us.max()).reset_index())
 
 
-def idle(found: pd.DataFrame, points: pd.DataFrame, scenes: Mapping[str, str]) -> pd.Series:
+def idle(found: pd.DataFrame, points: pd.DataFrame, scenarios: Mapping[str, Scenario]) -> pd.Series:
     """Of each row of `points` what its steps and calls cost where there is nothing to do, µs per
-    simulated second; nan where `found`, of `bindings`, does not say. scenes: by the name of the
-    scenario."""
+    simulated second; nan where `found`, of `bindings`, does not say."""
     both = points[["scenario", *WHO, "substeps"]].merge(found, on=["scenario", *WHO], how="left")
-    scenarios = {name: open_scene(scene, 0) for name, scene in scenes.items()}
     values = [
         binding_of(
             row["step_us"],
@@ -290,29 +313,26 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
     return table.loc[names.map(ranks).sort_values(kind="stable").index]
 
 
-def grown(measured: Measured) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """(engine, profile, n, cost in µs a step and so on) and (engine, profile, exponent, low, high,
-    stopped)."""
+def sizes(measured: Measured) -> pd.DataFrame:
+    """engine, profile, n, cost in µs a step, and the other columns of `summed_up`."""
     samples = measured.samples[measured.samples.kind == SIZE]
     costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
-    costs = in_order(costs.reset_index(drop=True))
+    return in_order(costs.reset_index(drop=True))
+
+
+def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:
+    """engine, profile, exponent of the costs of `sizes`, low, high, most (disks), and where and why
+    it was first stopped, `Measured.stopped`."""
+    first = {who: f"{n}: {why}" for (who, n), why in reversed([*stopped.items()])}
+    timed = costs.engine + ":" + costs.profile
     rows = []
-    timed = (costs.engine + ":" + costs.profile).tolist()
     # some engines were stopped at the smallest number of disks
-    for name in dict.fromkeys([*timed, *(name for name, _ in measured.stopped)]):
-        engine, profile = name.split(":")
-        group = costs[(costs.engine == engine) & (costs.profile == profile)]
+    for name in dict.fromkeys([*timed, *(name for name, _ in stopped)]):
+        group = costs[timed == name]
         fitted = exponent(group.n.to_numpy(float), group.cost.to_numpy(float))
-        ends = [f"{n}: {why}" for (who, n), why in measured.stopped.items() if who == name]
-        rows.append(
-            {"engine": engine, "profile": profile}
-            | dict(zip(("exponent", "low", "high"), fitted))
-            | {
-                "most": int(group.n.max()) if len(group) else 0,
-                "stopped": ends[0] if ends else "",
-            }
-        )
-    return costs, pd.DataFrame(rows)
+        most = int(group.n.max()) if len(group) else 0
+        rows.append([*name.split(":"), *fitted, most, first.get(name, "")])
+    return pd.DataFrame(rows, columns=[*WHO, "exponent", "low", "high", "most", "stopped"])
 
 
 def options(measured: Measured) -> pd.DataFrame:
@@ -351,9 +371,3 @@ def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
         }
     )
     return table.reset_index()
-
-
-def asks_of(scene: str) -> tuple[str, str]:
-    """Name and question of a scene."""
-    scenario = open_scene(scene, 0)
-    return scenario.name, scenario.asks

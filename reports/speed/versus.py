@@ -13,10 +13,10 @@ import pandas as pd
 
 from adapters.engines import ENGINES
 from adapters.mechanisms.table import MECHANISMS
+from reports.compare.pareto import YARDSTICK
 from reports.speed.plan import PLAIN
 
-OWN = "reference:exercise"
-COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != OWN)
+COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != YARDSTICK)
 COLUMNS = [
     "engine",
     "profile",
@@ -38,15 +38,15 @@ def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
     """A row for each engine with end-of-step detection, and one each of its changed settings, of
     `COLUMNS`.
 
-    ratio, low, high: its cost over that of `OWN` at the same steps, geometric mean, least and most
-        over the scenes;
+    ratio, low, high: its cost over that of `YARDSTICK` at the same steps, geometric mean, least
+        and most over the scenes;
     cheaper: in how many scenes it costs less, and bare_cheaper: less where an idle step is taken
     off both (nan where that is not known); scenes: in how many both were timed, and not_timed_in
     those in which one was not.
     """
     plain = points.assign(change=PLAIN, name=points.engine + ":" + points.profile)
     at = ["scenario", "dt_s"]
-    own = plain[plain.name == OWN][[*at, "cost", "idle"]].rename(
+    own = plain[plain.name == YARDSTICK][[*at, "cost", "idle"]].rename(
         columns={"cost": "own", "idle": "own_idle"}
     )
     both = plain[plain.name.isin(COMPARED)].merge(own, on=at, how="left")
@@ -61,7 +61,7 @@ def options_over_own(options: pd.DataFrame) -> pd.DataFrame:
     """scenario, engine, profile, change, cost and own of every changed setting of `COMPARED`, timed
     in the same rounds."""
     names = options.engine + ":" + options.profile
-    own = options[names == OWN].groupby("scenario").cost_plain.first()
+    own = options[names == YARDSTICK].groupby("scenario").cost_plain.first()
     changed = options[names.isin(COMPARED)]
     return changed.assign(own=changed.scenario.map(own), idle=np.nan, own_idle=np.nan)
 

@@ -178,7 +178,6 @@ def table(
     """
     rows: list[dict[str, Any]] = []
     for name, (_, what) in searched.settings.items():
-        of_it = [each for each in trials if list(each.change) == [name]]
         rows.append(
             {
                 "setting": name,
@@ -188,7 +187,7 @@ def table(
                 "why": what,
             }
         )
-        rows += [row_of(each) for each in of_it]
+        rows += [row_of(each) for each in trials if list(each.change) == [name]]
     rows += [row_of(each) for each in trials if len(each.change) > 1]
     rows += [
         {"setting": name, "chosen": False, "verdict": NO_SEARCH, "why": why}

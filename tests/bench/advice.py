@@ -17,14 +17,9 @@ from math import log
 from adapters.engines import ENGINES
 from reports.speed.advice import (
     LOUD,
+    Inquiry,
     NoAdvice,
-    advise,
-    attempts,
-    by_engine,
-    ladder_of,
-    scored_scenario,
     those_that_keep,
-    timed,
 )
 from reports.speed.plan import PLAIN
 from reports.terminal.progress import Progress
@@ -50,14 +45,14 @@ def main(scenes: list[str]) -> int:
 
 def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
     """What was advised and what costs least when all is measured again; whether they agree."""
-    workers = os.cpu_count() or 1
-    advice = advise(scene, SEED, PURPOSE, BOUND, list(ENGINES), workers, progress)
-    asked = [(name, PLAIN, k) for name in ENGINES for k in ladder_of(scored_scenario(scene, SEED))]
-    tried = attempts(scene, SEED, PURPOSE, workers, progress, asked)
-    keeping = [one for ladder in by_engine(tried) for one in those_that_keep(ladder, BOUND)]
+    asked = Inquiry(scene, SEED, PURPOSE, os.cpu_count() or 1, progress)
+    advice = asked.advice(BOUND, list(ENGINES))
+    keeping = []
+    for name in ENGINES:
+        keeping += those_that_keep(asked.attempts([(name, PLAIN, k) for k in asked.ladder]), BOUND)
     if not advice.keeping or not keeping:
         return "none", not advice.keeping and not keeping
-    again, apart, _ = timed(scene, SEED, keeping, progress)
+    again, apart, _ = asked.timed(keeping)
     cheapest = min(again, key=lambda one: one.cost)
     best = advice.keeping[0]
     same = [one for one in again if (one.name, one.substeps) == (best.name, best.substeps)]

@@ -11,11 +11,12 @@ import re
 import pandas as pd
 
 from adapters.engines import ENGINES
+from reports.compare.order import FINEST, NEARER
+from reports.compare.pareto import YARDSTICK
 from reports.run.scenes import open_scene
 from reports.speed import explained, figures
 from reports.speed.figures import AGAINST, AGAINST_BARE
-from reports.speed.tables import no_nearer
-from reports.speed.versus import COMPARED, OWN
+from reports.speed.versus import COMPARED
 from reports.terminal.counts import counted
 
 SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
@@ -29,7 +30,7 @@ def named(table: pd.DataFrame) -> pd.DataFrame:
 
 
 LATE_BY_KIND = {
-    f"`{OWN}` and the matched engines": (OWN, *MATCHED),
+    f"`{YARDSTICK}` and the matched engines": (YARDSTICK, *MATCHED),
     "`reference:lesson`": ("reference:lesson",),
     "the engines as shipped": SHIPPED,
 }
@@ -46,7 +47,7 @@ def caption(kept: pd.DataFrame) -> str:
     got = {name: of(rows.note[name])[0] for name in rows.index}
     failed = named(kept[kept.figure == "pooled error"])
     lost = max(int(of(note)[0]) for note in failed[failed.name == "event_driven:float64"].note)
-    reached = [got[name] for name in (OWN, *COMPARED)]
+    reached = [got[name] for name in (YARDSTICK, *COMPARED)]
     falls, grows = halving(kept)
     spans = [span(falls.loc[list(names)]) for names in LATE_BY_KIND.values()]
     by = ", ".join(f"by {text} for {kind}" for kind, text in zip(LATE_BY_KIND, spans))
@@ -88,8 +89,8 @@ def costs(kept: pd.DataFrame) -> str:
     total = max(int(of(note)[1]) for note in rows.note)
     less = scenes_of(rows)
     said = (
-        f"Of the engines with end-of-step detection, `{OWN}` costs least in {total - len(less)} of"
-        f" {total} scenes"
+        f"Of the engines with end-of-step detection, `{YARDSTICK}` costs least in"
+        f" {total - len(less)} of {total} scenes"
     )
     said += (
         ". In the others these cost less:\n\n| scene | engines |\n|---|---|\n" if less else ".\n"
@@ -150,11 +151,22 @@ def pooled(kept: pd.DataFrame) -> list[pd.DataFrame]:
 def as_far(kept: pd.DataFrame) -> str:
     """How far off the matched engines are at the same step, over our own solver."""
     error, _ = pooled(kept)
-    over = error.loc[list(MATCHED)] / error.loc[OWN]
+    over = error.loc[list(MATCHED)] / error.loc[YARDSTICK]
     return (
         f"At the same step the matched engines are {over.min(axis=None):.1f} to"
-        f" {over.max(axis=None):.1f} times as far off as `{OWN}`.\n"
+        f" {over.max(axis=None):.1f} times as far off as `{YARDSTICK}`.\n"
     )
+
+
+def no_nearer(fitted: pd.DataFrame) -> pd.Series:
+    """For each row of `orders`, whether the error falls by less than a tenth from the coarsest
+    to the finest step.
+
+    False if all steps failed, or if the finest one has an error of at most `FINEST`; True if
+    only the finest step failed.
+    """
+    falls = fitted.finest_error < NEARER * fitted.coarsest_error
+    return ~falls & (fitted.finest_error > FINEST) & (fitted.failed < fitted.steps)
 
 
 def nearer(orders: pd.DataFrame) -> str:

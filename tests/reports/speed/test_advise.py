@@ -4,11 +4,14 @@ purpose sees a wrong engine."""
 from __future__ import annotations
 
 import json
+import os
+import re
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import inf, nan
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from hypothesis import given
@@ -30,11 +33,10 @@ from reports.speed.advice import (
     Advice,
     Attempt,
     ChangedOption,
-    ladder_of,
+    Inquiry,
     those_that_keep,
-    to_the_end,
 )
-from reports.speed.advise import sentence_on_times
+from reports.speed.advise import print_advice, sentence_on_times
 from reports.speed.plan import PLAIN
 from reports.speed.purposes import PURPOSES
 from reports.speed.scored_part import scored
@@ -103,7 +105,7 @@ def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
         Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "pymunk:matched")
     ]
     with Progress() as progress:
-        able, partly = to_the_end("column_of_ten", 0, 1, progress, found)
+        able, partly = Inquiry("column_of_ten", 0, "trajectory", 1, progress).to_the_end(found)
 
     assert [one.name for one in able] == ["pymunk:matched"]
     assert [one.name for one in partly] == ["event_driven:float64"]
@@ -112,13 +114,54 @@ def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
 
 def test_it_says_why_times_cannot_be_compared():
     """A small difference of two timings is not given as the reason."""
-    advice = Advice("a", 1, 1, [1], [attempt(1, 0.1, 0.5)], [], [], [], noise=0.01, busy=1.9)
+    advice = Advice("a", 1, 1, 0, [1], [attempt(1, 0.1, 0.5)], [], [], [], noise=0.01, busy=1.9)
 
     assert sentence_on_times(advice).startswith("Other programs keep 1.9 of ")
     assert "differ" not in sentence_on_times(advice)
     loud = sentence_on_times(replace(advice, noise=0.2))
     assert loud.startswith("Two timings of the same engine differ by 20%, and other programs keep")
     assert sentence_on_times(replace(advice, busy=0.0)).startswith("Two timings of the same engine")
+
+
+@pytest.mark.parametrize(
+    ("until", "collisions", "says"),
+    [
+        (3.0, 0, ["up to 3 of 3 s\n", "Cheapest first, in the whole scene\n"]),
+        (
+            1.2,
+            4,
+            ["up to 1.2 of 3 s\n", "first: error up to 1.2 of 3 s; cost of the whole scene\n"],
+        ),
+        (
+            1.2,
+            0,
+            ["up to 1.2 of 3 s, before any collision\n", "collision; cost of the whole scene\n"],
+        ),
+    ],
+)
+def test_it_says_what_part_of_the_scene_is_judged(
+    until: float, collisions: int, says: list[str], capsys: pytest.CaptureFixture[str]
+):
+    """And that a cost is of the whole scene, beyond the exact answer, too."""
+    plain = attempt(1, 0.1, 0.5, cost=1.0)
+    changes = [ChangedOption(plain, replace(plain, change="sleeping"))]
+    advice = Advice("a", until, 3.0, collisions, [0.1, 0.05], [plain], [], [], changes, 0.0, 0.0)
+    with mock.patch.dict(os.environ, {"COLUMNS": "200"}):
+        print_advice(advice, "trajectory", 1.0)
+    printed = capsys.readouterr().out
+
+    assert all(each in re.sub(" *\n", "\n", printed) for each in says)
+    needed = "the scene" if until == 3.0 else "this part of the scene"
+    assert f"What {needed} does not need" in printed
+
+
+def test_the_part_of_a_scene_that_is_judged_is_that_of_its_exact_answer():
+    """With the collisions of that part alone: of those of the whole scene some are out of reach."""
+    scenario, truth = scored("falling_box", 0)
+
+    assert scenario.duration < open_scene("falling_box", 0).duration
+    assert len(truth.collisions) > 0
+    assert truth.collisions.t.max() <= scenario.duration
 
 
 @pytest.mark.parametrize("purpose", PURPOSES)
@@ -142,7 +185,7 @@ def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
     """Two step sizes at least, so that one finer can speak for a coarser."""
     for name in SCENARIOS:
         scenario = open_scene(name, 0)
-        steps = ladder_of(scenario)
+        steps = Inquiry(name, 0, "trajectory", 1, Progress()).ladder
         assert steps[0] == scenario.substeps[0]
         assert len(steps) >= 2
         assert all(fine == 2 * coarse for coarse, fine in pairwise(steps))

@@ -11,13 +11,14 @@ import pytest
 
 from adapters.engines import DISTINCT, ENGINES
 from adapters.mechanisms.table import MECHANISMS
+from reports.compare.pareto import YARDSTICK
 from reports.run.scenes import open_scene
 from reports.speed import budget, explained, figures, ladder, tables
 from reports.speed.budget import budget_of
 from reports.speed.effort import FULL, QUICK
 from reports.speed.measure import Measured
 from reports.speed.plan import SCENE, middle
-from reports.speed.versus import COMPARED, OWN
+from reports.speed.versus import COMPARED
 from scenarios.catalogue import SCENARIOS, scenario
 from tests.measured import MEASURED
 from tests.reports.speed import statements as speed_figures
@@ -139,7 +140,7 @@ def test_no_nearer_is_read_from_the_ends_of_the_ladder():
         columns=["coarsest_error", "finest_error", "failed"],
     ).assign(steps=4)
 
-    assert tables.no_nearer(table).tolist() == [False, True, True, False, False, False]
+    assert speed_figures.no_nearer(table).tolist() == [False, True, True, False, False, False]
 
 
 def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
@@ -170,8 +171,8 @@ def test_who_costs_less_than_our_own_solver_is_named():
     thrust = {"pymunk:matched": "1 of 2: ship_thrust"}
 
     assert (
-        alone
-        == f"Of the engines with end-of-step detection, `{OWN}` costs least in 2 of 2 scenes.\n\n"
+        alone == f"Of the engines with end-of-step detection, `{YARDSTICK}` costs least in 2 of 2"
+        " scenes.\n\n"
         "None of 1 changed settings of the matched engines costs less in any scene tried.\n"
     )
     said = speed_figures.costs(against(thrust, thrust))

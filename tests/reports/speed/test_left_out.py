@@ -11,10 +11,8 @@ import pytest
 from reports.compare.order import ORDER
 from reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
 from reports.speed import charts, tables, versus
-from reports.speed.effort import QUICK
 from reports.speed.measure import SIZE, Measured
-from reports.speed.plan import PLAIN, SCENE, SpeedPlan
-from reports.speed.results import Results
+from reports.speed.plan import PLAIN, SCENE
 
 DT = np.array([0.4, 0.2, 0.1])
 
@@ -70,16 +68,12 @@ def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
             "lost": [w in (UNREACHABLE, FAILED) for w in why],
         }
     )
-    results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
-    results.reached = reached
-    row = results.pooled_reached.iloc[0]
+    row = tables.pooled_reached(reached, reached).iloc[0]
 
     assert np.isnan(row.cost)
     assert row.why == "1 of 5, never in 1, failed in 1, untimed in 1"
     assert not row.lost  # two of five
-    results = Results(SpeedPlan((), (), QUICK, 0, 1), Measured())
-    results.reached = reached[1:4]
-    assert results.pooled_reached.iloc[0].lost  # two of three
+    assert tables.pooled_reached(reached[1:4], reached[1:4]).iloc[0].lost  # two of three
 
 
 def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_edge():
@@ -185,7 +179,8 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
     measured = Measured(
         samples=pd.DataFrame([sample]), stopped={("box2d:matched", 3): "refused: no"}
     )
-    costs, growth = tables.grown(measured)
+    costs = tables.sizes(measured)
+    growth = tables.growth(costs, measured.stopped)
     names = [trace.name for trace in go.Figure(charts.sizes(costs, growth)).data]
 
     assert growth.set_index("engine").stopped.to_dict() == {"pymunk": "", "box2d": "3: refused: no"}

@@ -23,7 +23,7 @@ from reports.speed import charts, figures
 from reports.speed.budget import budget_of
 from reports.speed.effort import QUICK
 from reports.speed.explained import extent
-from reports.speed.measure import Measured, measure
+from reports.speed.measure import Measured, Measuring
 from reports.speed.page import write_page
 from reports.speed.plan import SpeedPlan
 from reports.speed.results import Results
@@ -57,7 +57,7 @@ SAID = {"load": 0.0, "seconds": 1.0}
 def measured() -> Measured:
     """A little of everything, played and timed for real, in worker processes."""
     with Progress() as progress:
-        return measure(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), progress)
+        return Measuring(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), progress).run()
 
 
 @pytest.fixture(scope="module")

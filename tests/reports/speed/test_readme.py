@@ -8,8 +8,9 @@ from pathlib import Path
 import pandas as pd
 
 from adapters.engines import DISTINCT
+from reports.compare.pareto import YARDSTICK
 from reports.speed import figures
-from reports.speed.versus import COMPARED, OWN
+from reports.speed.versus import COMPARED
 from tests.measured import MEASURED
 from tests.reports.speed import statements as speed_figures
 
@@ -53,7 +54,7 @@ def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detectio
     The control: with a tenth of the coarsest error an engine falls out of its range, whichever it
     is.
     """
-    kept, late = figures.read(figures.KEPT), {OWN, *COMPARED}
+    kept, late = figures.read(figures.KEPT), {YARDSTICK, *COMPARED}
     spoken_of = [name for names in speed_figures.LATE_BY_KIND.values() for name in names]
     assert sorted(spoken_of) == sorted(late)
     ordered = {"reference:ordered", "event_driven:float64"}

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from adapters.engines import ENGINES
-from reports.commands.truth import waiting
 from reports.compare.metrics import METRICS
 from reports.compare.table import COLUMNS
+from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 from tests.reports.terminal.command_line import crosscheck, forked, process
 
@@ -203,8 +203,8 @@ def test_who_waits_for_an_exact_answer_sees_so_on_a_terminal_only(
 ):
     """A script reads the error stream."""
     monkeypatch.setattr("sys.stderr.isatty", lambda: terminal)
-    with waiting("the exact answer to it"):
-        pass
+    with Progress() as progress:
+        progress.say("the exact answer to it")
     assert ("the exact answer to it" in capsys.readouterr().err) == terminal
 
 
