@@ -15,7 +15,7 @@ from scenarios.model import Array
 
 Rule = Callable[[float, float, float, float], bool | None]
 
-
+WRONG_WAY = "the comparison is the wrong way round"
 # (dx, dy, size of A, size of B) in m -> whether they collide by the rule, None if either
 RULES: dict[str, Rule] = {
     "": lambda x, y, a, b: np.hypot(x, y) < a + b,
@@ -47,7 +47,7 @@ RULES: dict[str, Rule] = {
     "dx + dy is used as the distance": lambda x, y, a, b: abs(x + y) < a + b,
     "only x is compared": lambda x, y, a, b: abs(x) < a + b,
     "only y is compared": lambda x, y, a, b: abs(y) < a + b,
-    "the comparison is the wrong way round": lambda x, y, a, b: np.hypot(x, y) > a + b,
+    WRONG_WAY: lambda x, y, a, b: np.hypot(x, y) > a + b,
     "nothing is compared: all pairs collide": lambda x, y, a, b: True,
     "no pair is taken to collide": lambda x, y, a, b: False,
 }

@@ -127,6 +127,8 @@ class Marked:
         begin = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
         said = [begin, self.total]
         said += [f"{title} gives no points." for title in self.without_points]
+        if self.check.shared and not self.low:
+            said.append(self.check.shared)
         if self.beside:
             judged = f"{self.check.path.name} is judged; not judged: {', '.join(self.beside)}."
             said.append(judged)

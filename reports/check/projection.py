@@ -114,6 +114,13 @@ def reacts(answers: dict[str, SolverAnswer]) -> bool:
     )
 
 
+def overlap(answers: dict[str, SolverAnswer]) -> bool:
+    """Whether the pairs of these questions overlap."""
+    return all(
+        shift_of(answers[name].asked.balls, answers[name].last).overlap > 0 for name in COLLISIONS
+    )
+
+
 def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     """The rows of (b) if the function fails later, from the positions at the failure."""
     if not reacts(answers):

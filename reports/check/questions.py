@@ -217,14 +217,17 @@ def closer(question: Question, share: float) -> Question:
     return question._replace(balls=(a, b._replace(x=(float(place[0]), float(place[1])))))
 
 
-# The questions on 2b to 2d for a file that takes their overlaps for gaps: these are below the
-# smaller of the two sizes.
-CLOSER = {
-    name: closer(question, 0.35)
-    for name, question in QUESTIONS.items()
+ON_COLLISIONS = [
+    name
+    for name in QUESTIONS
     if name.startswith(("collision/", "swapped/", "at rest", "separate"))
     or name in ("slow", "even", "fast")
-}
+]
+# The questions on 2b to 2d for a file that takes their overlaps for gaps: these are below the
+# smaller of the two sizes.
+CLOSER = {name: closer(QUESTIONS[name], 0.35) for name in ON_COLLISIONS}
+# The same for a file in which only pairs with a gap between them collide.
+APART = {name: closer(QUESTIONS[name], 1.5) for name in ON_COLLISIONS}
 
 
 def ask(
