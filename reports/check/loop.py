@@ -40,10 +40,11 @@ def loop_rows(process: SolverProcess, faulty: bool, kicks_apart: bool) -> list[C
     that move apart get an impulse.
     """
     has = process.functions
-    if not (has["begin"] and has["step"]):
-        missing = "performSimStep" if not has["step"] else "initScene"
-        return [not_asked("step", "loop", f"the file has no function {missing}")]
+    if not has["step"]:
+        return [not_asked("step", "loop", "the file has no function performSimStep")]
     start, no_scene = scene_of(process)
+    if no_scene and not has["begin"]:
+        return [not_asked("step", "loop", "the file has no function initScene")]
     if no_scene:
         return [no_scene]
     asked = worlds(len(start), has["wrap"])
@@ -80,8 +81,8 @@ def box(changed: list[str]) -> CheckRow:
 
 
 def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None]:
-    """The numbers of the spheres that initScene makes in a fresh world, or a fault if it makes
-    none."""
+    """The numbers of the spheres that initScene makes in a fresh world, or the file when it is
+    loaded; or a fault if there are none."""
     *_, begun, start = process.request([*fresh_world(process), ("globals", None, LIMIT)])
     if isinstance(begun, SolverFailed):
         asked, got, expected = "Does initScene make a scene?", "it fails", "a scene"

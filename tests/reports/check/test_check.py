@@ -197,6 +197,27 @@ def test_a_step_without_a_scene_is_said_not_to_be_judged(tmp_path: Path):
     assert "performSimStep was not judged: the file has no function initScene" in one.sentences[0]
 
 
+def test_a_scene_that_is_made_on_loading_is_one(tmp_path: Path):
+    """A file without initScene whose ufo and asteroids are there once it is loaded has its step
+    judged, in both languages."""
+    for kind, ends in (("js", "start();\n"), ("py", "start()\n")):
+        text = (HERE / "correct" / f"plain.{kind}").read_text("utf-8")
+        text = text.replace("initScene", "start") + ends
+        wrong = text.replace("i + 1; j < numAsteroids", "i + 2; j < numAsteroids")
+        wrong = wrong.replace("asteroids[i + 1 :]", "asteroids[i + 2 :]")
+        (tmp_path / f"right.{kind}").write_text(text, "utf-8")
+        (tmp_path / f"wrong.{kind}").write_text(wrong, "utf-8")
+        checks = judged([tmp_path / f"right.{kind}", tmp_path / f"wrong.{kind}"])
+        right, wrong_one = checks.values()
+
+        assert right.passed
+        assert "performSimStep was not judged" not in right.sentences[0]
+        assert {row.verdict for row in right.of("loop")} == {"right"}
+        assert [row.cause for row in wrong_one.causes] == [
+            "a loop of performSimStep leaves pairs out"
+        ]
+
+
 def test_the_end_of_a_file_is_in_its_last_line(tmp_path: Path):
     """Where a bracket is missing V8 reads on, beyond the file's text."""
     (tmp_path / "a.js").write_text("function integrate(sphere, dt) {\n  if (dt) {\n}\n", "utf-8")
