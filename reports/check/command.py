@@ -8,7 +8,7 @@ import os
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -111,12 +111,10 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     for one in outputs:
         if one.path is not None:
             write(one, FORMATS[one.format].text(marked))
-    if page is not None and several:
-        make_class_page(page, marked)
-    elif page is not None:
-        if scenes and not printed:
+    if page is not None:
+        if scenes and not several and not printed:
             print_scene(scenes, page)
-        make_page(page, marked[0])
+        make_page(page, marked, several)
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
 
 
@@ -407,24 +405,14 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
     return [] if isinstance(found, Failure) else found  # the rows say how it failed
 
 
-def make_page(path: Path, marked: Marked) -> None:
-    """Write the page of a file."""
+def make_page(path: Path, marked: Sequence[Marked], several: bool) -> None:
+    """Write the page of a file, or that of a class, and print its path; exits 2 if that fails."""
+    # not needed without a page, and slow to import
+    from reports.check.class_page import write_class_page
     from reports.check.page import write_page
 
-    put_page(path, partial(write_page, path, marked))
-
-
-def make_class_page(path: Path, marked: Sequence[Marked]) -> None:
-    """Write the page of a class."""
-    from reports.check.class_page import write_class_page
-
-    put_page(path, partial(write_class_page, path, marked))
-
-
-def put_page(path: Path, put: Callable[[], None]) -> None:
-    """Write a page and print its path; exits 2 if that fails."""
     try:
-        put()
+        write_class_page(path, marked) if several else write_page(path, marked[0])
     except OSError as fault:
         say(f"--page {path}: {fault.strerror or fault}; name another file")
         sys.exit(BAD_INPUT)

@@ -192,7 +192,7 @@ def call_rows(
         judged(
             "all spheres",
             "loop",
-            "Does a step integrate every sphere once?",
+            EVERY_SPHERE,
             got,
             "yes",
             wrong is None,
@@ -203,7 +203,7 @@ def call_rows(
         judged(
             "pairs",
             "loop",
-            "Does a step let every pair collide, the ufo with each asteroid too?",
+            EVERY_PAIR,
             f"no call for {name_of(*missed)}" if missed else "yes",
             "yes",
             missed is None,
@@ -229,6 +229,8 @@ def collided(answer: SolverAnswer) -> set[frozenset[int]]:
     return {frozenset(call[1:]) for call in answer.calls if call[0] == "collide"}
 
 
+EVERY_SPHERE = "Does a step integrate every sphere once?"
+EVERY_PAIR = "Does a step let every pair collide, the ufo with each asteroid too?"
 FAULTY = "the functions that the step calls have faults"
 LEAVES_SPHERES_OUT = "a loop of performSimStep leaves spheres out"
 LEAVES_PAIRS_OUT = "a loop of performSimStep leaves pairs out"
@@ -237,7 +239,6 @@ NOT_WRAPPED = "performSimStep does not call projectObjects"
 
 def integrated(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on integration: every sphere moves as by one call of the file's own integrate."""
-    asked = "Does a step integrate every sphere once?"
     after, end = answers["free"].last, answers["alone"].last[0]
     moved = np.subtract(end.x, question.balls[0].x)
     wrong = [
@@ -246,12 +247,12 @@ def integrated(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow
         if not (near(a.x, np.add(b.x, moved)) and near(a.v, end.v) and near(a.w, end.w))
     ]
     if not wrong:
-        return judged("all spheres", "loop", asked, "yes", "yes", True)
+        return judged("all spheres", "loop", EVERY_SPHERE, "yes", "yes", True)
     first = wrong[0]
     got = f"{name_of(first)} moves at {shown(after[first].v)} m/s"
     got += f" (wrong: {len(wrong)} of {len(after)} spheres)"
     cause = integration_cause(first, question.balls[first], after[first], answers["watched"])
-    return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
+    return judged("all spheres", "loop", EVERY_SPHERE, got, f"{shown(end.v)} m/s", False, cause)
 
 
 def integration_cause(k: int, before: Ball, after: Ball, watched: SolverAnswer) -> str:
@@ -362,7 +363,7 @@ def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> Check
     return judged(
         "pairs",
         "loop",
-        "Does a step let every pair collide, the ufo with each asteroid too?",
+        EVERY_PAIR,
         got,
         "yes",
         not silent and not others,

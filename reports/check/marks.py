@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from adapters.own_solver.file import printable
+from reports.check.evidence import lines_and_formula
 from reports.check.outcomes import OUTCOMES, Status
 from reports.check.points import Points
 from reports.check.rows import TASKS, UNKNOWN, CheckRow
@@ -164,9 +165,7 @@ class Marked:
         if self.low:
             said = headline(row) if row.name in WITHOUT_NUMBERS else f"{row.name}: wrong answer."
             return [" ".join([said, *numbers_of(row)])]
-        lines = [" ".join([headline(row), *numbers_of(row)])]
-        lines += [f"line {line}: {text}" for line, text in row.lines]
-        return lines + [f"exercise: {row.formula}"] * bool(row.formula)
+        return [" ".join([headline(row), *numbers_of(row)]), *lines_and_formula(row)]
 
 
 def follows(row: CheckRow) -> bool:
