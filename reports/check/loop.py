@@ -4,7 +4,7 @@ give the expected results."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -149,6 +149,14 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
     return found
 
 
+def pairs_asked(asked: dict[str, Question], kind: str) -> Iterator[tuple[tuple[int, int], str]]:
+    """The pairs of spheres of the questions of a kind, each with the name of the question."""
+    for name in asked:
+        if name.startswith(kind):
+            i, j = map(int, name.split()[-2:])
+            yield (i, j), name
+
+
 def put(spheres: tuple[Ball, ...], i: int, a: Ball, j: int, b: Ball) -> tuple[Ball, ...]:
     """The spheres with a and b in the places i and j."""
     return tuple({i: a, j: b}.get(k, sphere) for k, sphere in enumerate(spheres))
@@ -179,10 +187,8 @@ def call_rows(
     missed = next(
         (
             pair
-            for name, answer in answers.items()
-            if name.startswith("calls for")
-            for pair in [tuple(map(int, name.split()[-2:]))]
-            if frozenset(pair) not in met | collided(answer)
+            for pair, name in pairs_asked(asked, "calls for")
+            if frozenset(pair) not in met | collided(answers[name])
         ),
         None,
     )
@@ -339,12 +345,9 @@ def edges_last(watched: SolverAnswer) -> list[CheckRow]:
 def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on pairs: every overlapping pair collides, and no other sphere changes."""
     silent, others, handled = [], [], []
-    for name, question in asked.items():
-        if not name.startswith("pair"):
-            continue
-        i, j = map(int, name.split()[1:])
-        struck = struck_in(question, answers[name])
-        if not met(question, answers[name], i, j):
+    for (i, j), name in pairs_asked(asked, "pair"):
+        struck = struck_in(asked[name], answers[name])
+        if not met(asked[name], answers[name], i, j):
             silent.append((i, j))
             continue
         handled.append((i, j))
@@ -408,10 +411,9 @@ def integration_first(asked: dict[str, Question], answers: dict[str, SolverAnswe
     """The row on order: a pair that touches only at the end of a step collides in it if all spheres
     are integrated first."""
     missed = [
-        name_of(*map(int, name.split()[-2:]))
-        for name, question in asked.items()
-        if name.startswith("about to meet")
-        and not met(question, answers[name], *map(int, name.split()[-2:]))
+        name_of(*pair)
+        for pair, name in pairs_asked(asked, "about to meet")
+        if not met(asked[name], answers[name], *pair)
     ]
     return judged(
         "integration first",

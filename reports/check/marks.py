@@ -13,7 +13,7 @@ from adapters.own_solver.file import printable
 from reports.check.evidence import lines_and_formula
 from reports.check.outcomes import OUTCOMES, Status
 from reports.check.points import Points
-from reports.check.rows import TASKS, UNKNOWN, CheckRow
+from reports.check.rows import TASKS, UNKNOWN, CheckRow, Verdict
 from reports.check.verdict import WITHOUT_NUMBERS, FileCheck, headline, numbers_of, task_title
 
 if TYPE_CHECKING:
@@ -21,6 +21,14 @@ if TYPE_CHECKING:
 
 # File names that do not identify the student; then the folder name does.
 ANYBODYS = ("exercise", "solver")
+
+
+# verdict -> what a student reads of a question, from its name and its cause, in this order
+FEEDBACK: dict[Verdict, str] = {
+    "follows": "{}: {}; it costs nothing",
+    "free choice": "{}: free choice: {}",
+    "not asked": "{}: not asked: {}",
+}
 
 
 class TaskMark(NamedTuple):
@@ -148,13 +156,8 @@ class Marked:
         rows = self.check.of(task)
         points = next((mark.not_judged for mark in self.tasks if mark.task == task), 0.0)
         lines = [line for row in self.check.causes if row.task == task for line in self.of(row)]
-        lines += [f"{row.name}: {row.cause}; it costs nothing" for row in rows if follows(row)]
-        lines += [
-            f"{row.name}: free choice: {row.cause}" for row in rows if row.verdict == "free choice"
-        ]
-        lines += [
-            f"{row.name}: not asked: {row.cause}" for row in rows if row.verdict == "not asked"
-        ]
+        for verdict, said in FEEDBACK.items():
+            lines += [said.format(row.name, row.cause) for row in rows if row.verdict == verdict]
         if not rows:
             lines += ["not asked: the file could not be used", *self.of(self.check.faults[0])]
         return lines + [waiting(points)] * bool(points)
@@ -166,11 +169,6 @@ class Marked:
             said = headline(row) if row.name in WITHOUT_NUMBERS else f"{row.name}: wrong answer."
             return [" ".join([said, *numbers_of(row)])]
         return [" ".join([headline(row), *numbers_of(row)]), *lines_and_formula(row)]
-
-
-def follows(row: CheckRow) -> bool:
-    """Whether a row is wrong because of a fault elsewhere."""
-    return row.verdict == "follows"
 
 
 def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark:
