@@ -103,6 +103,14 @@ def named_in(text: str) -> list[float]:
     return [float(number) for number in NAMED.findall(code_of(text))]
 
 
+def with_restitution(text: str, old: float, new: float) -> str:
+    """The text with `new` where the code has `old` as its restitution."""
+    for found in reversed([*NAMED.finditer(code_of(text))]):
+        if float(found[1]) == old:
+            text = f"{text[: found.start(1)]}{new}{text[found.end(1) :]}"
+    return text
+
+
 def numbers_in(text: str) -> list[float]:
     """All numbers of the code."""
     return [float(number) for number in NUMBER.findall(code_of(text))]

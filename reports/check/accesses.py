@@ -114,11 +114,10 @@ def part_of(seen: Sequence[Access], failed_at: int, text: str) -> str:
     again = set() if failed_at else repeated(seen)
     if "position" in again and not again & {"velocity", "mass"}:
         return "2b"
-    displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
-    before = [a for a in seen[displaced + 1 :] if not failed_at or a.line != failed_at]
+    before = [a for a in after_displacement(seen) if not failed_at or a.line != failed_at]
     if all((who, field) in {(a.sphere, a.field) for a in before} for who, field in FOR_IMPULSE):
         return "2d"  # everything that the impulse needs has been read
-    if displaced >= 0 or any(a.field == "velocity" for a in seen):
+    if any_write(seen, "position") or any(a.field == "velocity" for a in seen):
         return "2c"
     return "2b" if {(a.sphere, a.field) for a in before} >= FOR_DISTANCE else "2a"
 
@@ -141,6 +140,12 @@ def repeated(seen: Sequence[Access]) -> set[str]:
 
 
 LOOPS = 40  # accesses from one line; a right call needs a dozen
+
+
+def after_displacement(seen: Sequence[Access]) -> Sequence[Access]:
+    """The accesses after the last write of a position; all if there is none."""
+    displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
+    return seen[displaced + 1 :]
 
 
 def is_write(access: Access, field: str) -> bool:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.questions import Ball, direction
+from reports.check.questions import Ball, SolverAnswer, direction
 from scenarios.model import Array
 
 
@@ -62,3 +62,9 @@ Impulse = Callable[[PairCollision, float], Array]
 def changes(balls: tuple[Ball, ...], after: list[Ball]) -> Array:
     """(2, 2) m/s, the changes of both velocities."""
     return np.array([np.subtract(y.v, x.v) for x, y in zip(balls, after)])
+
+
+def outcome(answer: SolverAnswer) -> tuple[PairCollision, Array]:
+    """The pair of a question, and what the call changed: (2, 2) m/s."""
+    balls = answer.asked.balls
+    return collision_of(balls, answer.last), changes(balls, answer.last)

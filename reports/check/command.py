@@ -8,7 +8,7 @@ import os
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
@@ -81,13 +81,7 @@ class Grading(NamedTuple):
 def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Grading) -> None:
     """Check the file or folder `path` and print the result; exits 0, 1 (a fault was found) or 2
     (nothing to check)."""
-    for_one = [one for one in outputs if FORMATS[one.format].single]
-    single = bool(for_one)
-    if single and len(students := students_in(path)) > 1:
-        why = f"holds the folders of {len(students)} students: {named(students)}"
-        refuse(
-            [f"{path}: {why}; --format {for_one[0].format} is for one, --format csv for a class"]
-        )
+    single = any(FORMATS[one.format].single for one in outputs)
     files = submission_of(path) if single else files_of(path)
     several = path.is_dir() and not single
     if page is None and not path.is_dir() and all(one.option == "--junit" for one in outputs):
@@ -117,12 +111,10 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     for one in outputs:
         if one.path is not None:
             write(one, FORMATS[one.format].text(marked))
-    if page is not None and several:
-        make_class_page(page, marked)
-    elif page is not None:
-        if scenes and not printed:
+    if page is not None:
+        if scenes and not several and not printed:
             print_scene(scenes, page)
-        make_page(page, marked[0])
+        make_page(page, marked, several)
     sys.exit(DONE if all(one.passed for one in checks) else FAILED)
 
 
@@ -203,25 +195,20 @@ def marks_of(
 
 
 def submission_of(path: Path) -> list[Path]:
-    """The solver of one student: the file `path`, or the only solver in that folder, or the only
-    one there with a name of the exercise; else the folder itself."""
+    """The solver of one student: the file `path`, or `chosen_of` that folder. A folder of one
+    student with older versions in it looks like a class, so that no folder is refused."""
     if not path.is_dir():
         return files_of(path)
     return chosen_of(path, solvers_below(path))
 
 
 def chosen_of(folder: Path, found: Sequence[Path]) -> list[Path]:
-    """The solver of the student whose folder this is; the folder itself if it holds none, or
-    several of which not exactly one has a name of the exercise."""
-    named_so = [file for file in found if file.name.lower() in EXPECTED]
-    chosen = named_so if len(named_so) == 1 else list(found)
-    return chosen if len(chosen) == 1 else [folder]
-
-
-def students_in(folder: Path) -> list[str]:
-    """The names of the folders in it that hold a file with a name of the exercise."""
-    found = (file.relative_to(folder).parts for file in solvers_below(folder))
-    return sorted({parts[0] for parts in found if len(parts) > 1 and parts[-1].lower() in EXPECTED})
+    """The solver of the student whose folder this is, of those found in it: one with a name of the
+    exercise, if there are some, and of several the one whose folder holds all others, such as
+    older versions. The folder itself if none or two fit."""
+    fitting = [file for file in found if file.name.lower() in EXPECTED] or found
+    above = [one for one in fitting if all(file.is_relative_to(one.parent) for file in fitting)]
+    return above if len(above) == 1 else [folder]
 
 
 def student_of(file: Path, folder: Path) -> Path:
@@ -418,24 +405,14 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
     return [] if isinstance(found, Failure) else found  # the rows say how it failed
 
 
-def make_page(path: Path, marked: Marked) -> None:
-    """Write the page of a file."""
+def make_page(path: Path, marked: Sequence[Marked], several: bool) -> None:
+    """Write the page of a file, or that of a class, and print its path; exits 2 if that fails."""
+    # not needed without a page, and slow to import
+    from reports.check.class_page import write_class_page
     from reports.check.page import write_page
 
-    put_page(path, partial(write_page, path, marked))
-
-
-def make_class_page(path: Path, marked: Sequence[Marked]) -> None:
-    """Write the page of a class."""
-    from reports.check.class_page import write_class_page
-
-    put_page(path, partial(write_class_page, path, marked))
-
-
-def put_page(path: Path, put: Callable[[], None]) -> None:
-    """Write a page and print its path; exits 2 if that fails."""
     try:
-        put()
+        write_class_page(path, marked) if several else write_page(path, marked[0])
     except OSError as fault:
         say(f"--page {path}: {fault.strerror or fault}; name another file")
         sys.exit(BAD_INPUT)

@@ -9,13 +9,13 @@ import numpy as np
 
 from adapters.own_solver.restitution import code_of
 from reports.check.functions import failed_calls
-from reports.check.questions import QUESTIONS, Ball, Question, SolverAnswer, named
+from reports.check.questions import Ball, SolverAnswer
 from reports.check.rows import CheckRow, judged, near, shown
 from scenarios.model import Array
 
 Rule = Callable[[float, float, float, float], bool | None]
 
-
+WRONG_WAY = "the comparison is the wrong way round"
 # (dx, dy, size of A, size of B) in m -> whether they collide by the rule, None if either
 RULES: dict[str, Rule] = {
     "": lambda x, y, a, b: np.hypot(x, y) < a + b,
@@ -47,7 +47,7 @@ RULES: dict[str, Rule] = {
     "dx + dy is used as the distance": lambda x, y, a, b: abs(x + y) < a + b,
     "only x is compared": lambda x, y, a, b: abs(x) < a + b,
     "only y is compared": lambda x, y, a, b: abs(y) < a + b,
-    "the comparison is the wrong way round": lambda x, y, a, b: np.hypot(x, y) > a + b,
+    WRONG_WAY: lambda x, y, a, b: np.hypot(x, y) > a + b,
     "nothing is compared: all pairs collide": lambda x, y, a, b: True,
     "no pair is taken to collide": lambda x, y, a, b: False,
 }
@@ -105,10 +105,15 @@ def acts(question: tuple[Ball, ...], after: list[Ball]) -> bool:
     return any(not (near(b.x, a.x) and near(b.v, a.v)) for a, b in zip(question, after))
 
 
-def reacted(question: Question, answer: SolverAnswer) -> bool:
+def reached(answers: Mapping[str, SolverAnswer]) -> list[SolverAnswer]:
+    """The answers on pairs at many distances."""
+    return [answer for name, answer in answers.items() if name.startswith("reach/")]
+
+
+def reacted(answer: SolverAnswer) -> bool:
     """Whether a pair collides according to the solver: it changes, or the call fails after the
     comparison."""
-    return bool(answer.failed) or acts(question.balls, answer.last)
+    return bool(answer.failed) or acts(answer.asked.balls, answer.last)
 
 
 def detection_rows(answers: dict[str, SolverAnswer], text: str) -> list[CheckRow]:
@@ -124,10 +129,10 @@ def reach(answers: dict[str, SolverAnswer], rules: Mapping[str, Rule]) -> CheckR
     """The row on which of many pairs react; its cause is the first of the rules that gives this
     pattern."""
     seen = []
-    for question, answer in named(answers, "reach/"):
-        a, b = question.balls
+    for answer in reached(answers):
+        a, b = answer.asked.balls
         (dx, dy), size = np.subtract(a.x, b.x), (a.r, b.r)
-        seen.append(((dx, dy, *size), reacted(question, answer)))
+        seen.append(((dx, dy, *size), reacted(answer)))
     cause = next(
         (name for name, rule in rules.items() if all(rule(*q) in (was, None) for q, was in seen)),
         None,
@@ -159,8 +164,8 @@ ASKED = "Which pairs collide, according to the file?"
 
 def no_number(answers: dict[str, SolverAnswer]) -> bool:
     """Whether the positions of all pairs, near or far, become NaN or infinite."""
-    reached = [answer.last for _, answer in named(answers, "reach/") if answer.balls]
-    return bool(reached) and not np.isfinite([[b.x for b in balls] for balls in reached]).any()
+    places = [[b.x for b in answer.last] for answer in reached(answers) if answer.balls]
+    return bool(places) and not np.isfinite(places).any()
 
 
 # (position of A, position of B) -> a wrong vector between them
@@ -179,7 +184,7 @@ MIXED: dict[str, Callable[[Array, Array], Array]] = {
 def mixed_up(answers: dict[str, SolverAnswer]) -> str | None:
     """The cause that the vector between the centres has the wrong terms; None if no vector of
     `MIXED` gives the pairs that react."""
-    seen = [(q.balls, reacted(q, answer)) for q, answer in named(answers, "reach/")]
+    seen = [(answer.asked.balls, reacted(answer)) for answer in reached(answers)]
     for name, vector in MIXED.items():
         if all(
             (np.hypot(*vector(np.array(a.x), np.array(b.x))) < a.r + b.r) == was
@@ -213,7 +218,7 @@ def margin(seen: list[tuple[tuple[float, float, float, float], bool]]) -> str | 
 
 def touch(answer: SolverAnswer) -> CheckRow:
     """Whether spheres that just touch collide: a free choice."""
-    reacts = reacted(QUESTIONS["touch"], answer)
+    reacts = reacted(answer)
     asked = "Do spheres collide whose distance is exactly the sum of the sizes?"
     sign = "<=" if reacts else "<"
     said = f"the comparison is {sign}"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
 from adapters.own_solver.restitution import code_of
-from reports.check.questions import QUESTIONS, Ball, SolverAnswer, was_stopped
+from reports.check.questions import Ball, SolverAnswer, was_stopped
 from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
@@ -29,9 +29,7 @@ def implemented(
     if failed_calls(answers):
         return [failure(task, task, answers)], False
     if not any(
-        changed(QUESTIONS[name].balls, answer.last)
-        for name, answer in answers.items()
-        if answer.balls
+        changed(answer.asked.balls, answer.last) for answer in answers.values() if answer.balls
     ):
         idle = why_unchanged(function, answers.values())
         return [not_implemented(task, "nothing is changed", idle)], False

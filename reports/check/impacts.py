@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.collisions import Impulse, PairCollision, changes, collision_of
+from reports.check.collisions import Impulse, PairCollision, changes, collision_of, outcome
 from reports.check.new_speeds import speed_mistakes
 from reports.check.parts import Change, components, damping, scalar_products
 from reports.check.questions import COLLISIONS, SolverAnswer, finite
@@ -425,10 +425,7 @@ def multiplied(
 def impulse_if_separating(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether pairs that move apart get the impulse of the printed formula, or its opposite."""
     for name in SEPARATING:
-        h, changed = (
-            collision_of(answers[name].asked.balls, answers[name].last),
-            changes(answers[name].asked.balls, answers[name].last),
-        )
+        h, changed = outcome(answers[name])
         right = np.array(UPDATES[""].change(h, IMPULSES[""](h, e), e))
         if not (near(right, changed, 0.1) or near(-right, changed, 0.1)):
             return False

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from adapters.own_solver.restitution import EXERCISE
-from reports.check.collisions import PairCollision, changes, collision_of
+from reports.check.collisions import PairCollision, outcome
 from reports.check.impacts import (
     IMPULSES,
     MASSLESS,
@@ -192,10 +192,7 @@ def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     known: no row."""
     if not all(answers[name].balls for name in COLLISIONS):
         return []
-    seen = [
-        (collision_of(q.balls, answers[name].last), changes(q.balls, answers[name].last))
-        for name, q in ((name, answers[name].asked) for name in COLLISIONS)
-    ]
+    seen = [outcome(answers[name]) for name in COLLISIONS]
     right = [IMPULSES[""](pair, EXERCISE) for pair, _ in seen]
     for_a = [pair.ma * change[0] for pair, change in seen]
     for_b = [-pair.mb * change[1] for pair, change in seen]
@@ -219,7 +216,7 @@ def case_to_show(
     """The collision to show, with the mistakes in it."""
     e = found.e if found else restitution.own
     name = next(iter(wrong_collisions(answers, e) or COLLISIONS))
-    balls, after = answers[name].asked.balls, answers[name].last
+    pair, _ = outcome(answers[name])
     for_one = right_for_one(answers, e)
     if found:
         impulse, update = found.impulse, found.update if found.task == "2d" else ""
@@ -229,8 +226,8 @@ def case_to_show(
         known = partly(answers, e)
         impulse, update = ("", known) if for_one else (known, "")
     return CollisionCase(
-        collision_of(balls, after),
-        np.array([b.v for b in after]),
+        pair,
+        np.array([b.v for b in answers[name].last]),
         found,
         e,
         restitution.mistake or impulse,
@@ -283,9 +280,8 @@ def right_for_one(answers: dict[str, SolverAnswer], e: float) -> bool:
 def opposite_impulses(answers: dict[str, SolverAnswer]) -> bool:
     """Whether every pair keeps its momentum, whichever sphere is called A."""
     for name in (*COLLISIONS, *SWAPPED):
-        balls = answers[name].asked.balls
-        a, b = changes(balls, answers[name].last)
-        if not near(balls[0].m * a, -balls[1].m * b):
+        h, (a, b) = outcome(answers[name])
+        if not near(h.ma * a, -h.mb * b):
             return False
     return True
 
@@ -383,8 +379,8 @@ def no_number(answers: dict[str, SolverAnswer], e: float) -> list[CheckRow]:
         name: [not np.isfinite(ball.v).all() for ball in answers[name].last] for name in COLLISIONS
     }
     name = next(name for name in COLLISIONS if any(lost[name]))
-    balls, after = answers[name].asked.balls, answers[name].last
-    collision, changed = collision_of(balls, after), changes(balls, after)
+    after = answers[name].last
+    collision, changed = outcome(answers[name])
     P = IMPULSES[""](collision, e)
     a, b = (any(both) for both in zip(*lost.values()))
     why = "(a field that does not exist, a division by zero?)"
@@ -438,9 +434,7 @@ FRICTION = "the velocities along the tangent are changed, too: the exercise has 
 def only_across(answers: dict[str, SolverAnswer], e: float) -> bool:
     """Whether the impulse along the normal is right in every collision, and momentum is kept."""
     for name in COLLISIONS:
-        question = answers[name].asked
-        h = collision_of(question.balls, answers[name].last)
-        changed = changes(question.balls, answers[name].last)
+        h, changed = outcome(answers[name])
         along = h.ma * changed[0] @ h.n
         if not (
             near(along, IMPULSES[""](h, e) @ h.n) and near(h.ma * changed[0], -h.mb * changed[1])
@@ -453,12 +447,8 @@ def wrong_collisions(answers: dict[str, SolverAnswer], e: float) -> list[str]:
     """The questions of `COLLISIONS` whose velocities differ from the formula."""
     wrong = []
     for name in COLLISIONS:
-        question = answers[name].asked
-        h = collision_of(question.balls, answers[name].last)
-        if not near(
-            UPDATES[""].change(h, IMPULSES[""](h, e), e),
-            changes(question.balls, answers[name].last),
-        ):
+        h, changed = outcome(answers[name])
+        if not near(UPDATES[""].change(h, IMPULSES[""](h, e), e), changed):
             wrong.append(name)
     return wrong
 
@@ -476,13 +466,7 @@ def separating(answers: dict[str, SolverAnswer], case: CollisionCase) -> CheckRo
     found, e = case.found, case.e
     asked = "Which impulse acts on a pair that overlaps and moves apart?"
     expected = "none, or that of the formula"
-    seen = [
-        (
-            collision_of(answers[n].asked.balls, answers[n].last),
-            changes(answers[n].asked.balls, answers[n].last),
-        )
-        for n in SEPARATING
-    ]
+    seen = [outcome(answers[name]) for name in SEPARATING]
 
     def chosen(got: str, said: str) -> CheckRow:
         return CheckRow("separating", "2c", asked, got, expected, "free choice", said)

@@ -11,6 +11,7 @@ from reports.check.accesses import (
     LOOPS,
     Access,
     accesses_of,
+    after_displacement,
     any_write,
     is_write,
     part_of,
@@ -84,19 +85,27 @@ def assigned(statement: str) -> list[str]:
     return [name for side in sides for name in re.findall(r"\w+(?=\s*(?:,|\]|$))", side)]
 
 
+def lines_writing(seen: Sequence[Access], field: str) -> list[int]:
+    """The line of each write of this field."""
+    return [a.line for a in seen if is_write(a, field)]
+
+
+def before_writes(seen: Sequence[Access]) -> Sequence[Access]:
+    """The accesses before the first write."""
+    return seen[: next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))]
+
+
 def detection_lines(seen: Sequence[Access]) -> list[int]:
     """The lines that first read the size of either sphere, before any write."""
-    first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
-    sizes = [a for a in seen[:first_write] if a.field == "size"]
+    sizes = [a for a in before_writes(seen) if a.field == "size"]
     both = next((k + 1 for k, a in enumerate(sizes) if a.sphere != sizes[0].sphere), 1)
     return [a.line for a in sizes[:both]]
 
 
 def distance_lines(seen: Sequence[Access]) -> list[int]:
     """The lines that read positions before any write, with those of the helpers that do it."""
-    first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
     written = {a.line for a in seen if a.kind == "w"}
-    reads = [a for a in seen[:first_write] if a.field == "position" and a.line not in written]
+    reads = [a for a in before_writes(seen) if a.field == "position" and a.line not in written]
     return [line for a in reads for line in (*a.helpers, a.line)]
 
 
@@ -121,7 +130,7 @@ def displacement_lines(seen: Sequence[Access], cause: str) -> list[int]:
 def first_writes(seen: Sequence[Access], writes: Sequence[Access]) -> list[int]:
     """The lines of those writes of velocities that come before the last line that only reads
     velocities."""
-    written = {a.line for a in seen if is_write(a, "velocity")}
+    written = lines_writing(seen, "velocity")
     reads = [k for k, a in enumerate(seen) if a.field == "velocity" and a.line not in written]
     early = {a.line for a in seen[: max(reads, default=0)] if is_write(a, "velocity")}
     return [a.line for a in writes if a.line in early] or [a.line for a in writes]
@@ -130,16 +139,14 @@ def first_writes(seen: Sequence[Access], writes: Sequence[Access]) -> list[int]:
 def impulse_lines(seen: Sequence[Access], cause: str) -> list[int]:
     """The lines that compute the impulse: those that read velocities or masses, depending on the
     cause. If there are none, the lines that write velocities."""
-    displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
-    moving = {a.line for a in seen if is_write(a, "position")}
-    writes = [a.line for a in seen if is_write(a, "velocity")]
+    moving, writes = lines_writing(seen, "position"), lines_writing(seen, "velocity")
     about: tuple[str, ...] = ("velocity", "mass")
     if re.search(r"velocit|scalar product|relative", cause):
         about = ("velocity",)
     elif re.search(r"mass|m[AB]|\be is|bracket|\(1 [+-] e\)|e = ", cause):
         about = ("mass",)
     for fields in (about, ("velocity", "mass")):
-        for after in (seen[displaced + 1 :], seen):
+        for after in (after_displacement(seen), seen):
             used = [a.line for a in after if a.kind == "r" and a.field in fields]
             if found := [line for line in used if line not in {*writes, *moving}]:
                 return found
@@ -170,6 +177,7 @@ class Source:
 
     def __init__(self, process: SolverProcess, text: str) -> None:
         self.process, self.text, self.lines = process, text, text.splitlines()
+        self.code = code_of(text).splitlines()  # the lines without comments
         self.traced: dict[str, list[Access]] = {}
         self.questions = dict(QUESTIONS)
 
@@ -190,7 +198,7 @@ class Source:
         """Whether the collision function reads this field on lines that do not write it; True if
         its accesses are not known."""
         seen = self.accesses(SHOWN["2"])
-        written = {a.line for a in seen if is_write(a, field)}
+        written = lines_writing(seen, field)
         return not seen or any(a.field == field and a.line not in written for a in seen)
 
     def writes(self, field: str) -> bool:
@@ -255,17 +263,11 @@ class Source:
             return made or displacement_lines(seen, row.cause)
         if row.task == "2c" and SIGN_OF_J in row.cause:
             # The displacement has the same normal, and is judged by itself: J comes first.
-            return [
-                *impulse_lines(seen, "mass"),
-                *(a.line for a in seen if is_write(a, "velocity")),
-            ]
+            return [*impulse_lines(seen, "mass"), *lines_writing(seen, "velocity")]
         if row.task == "2c" and ONE_PLACE in row.cause:
-            return [
-                *impulse_lines(seen, "velocities"),
-                *(a.line for a in seen if is_write(a, "velocity")),
-            ]
+            return [*impulse_lines(seen, "velocities"), *lines_writing(seen, "velocity")]
         if row.task == "2c" and row.cause.startswith(AS_IF_EQUAL):
-            return [*self.lines_of_j(seen), *(a.line for a in seen if is_write(a, "velocity"))]
+            return [*self.lines_of_j(seen), *lines_writing(seen, "velocity")]
         if row.task == "2c" and row.cause == APPROACH:
             velocities = [a.line for a in seen if a.field == "velocity"]
             return self.branches(velocities) or impulse_lines(seen, row.cause)
@@ -273,36 +275,33 @@ class Source:
             return self.lines_of_j(seen) or impulse_lines(seen, row.cause)
         if row.task == "2c":
             return made or self.with_results(impulse_lines(seen, row.cause), seen, row.cause)
-        return [a.line for a in seen if is_write(a, "velocity")] if row.task == "2d" else []
+        return lines_writing(seen, "velocity") if row.task == "2d" else []
 
     def branches(self, lines: Sequence[int]) -> list[int]:
         """The first line from the last of these on that compares two numbers in a condition."""
         last = max(lines, default=0)
-        code = code_of(self.text).splitlines()
-        after = range(last, min(last + MOST, len(code)) + 1) if last else ()
-        return [k for k in after if BRANCH.search(code[k - 1])][:1]
+        after = range(last, min(last + MOST, len(self.code)) + 1) if last else ()
+        return [k for k in after if BRANCH.search(self.code[k - 1])][:1]
 
     def endless_lines(self, seen: Sequence[Access]) -> list[int]:
         """The head of the loop that a call does not leave, and the lines in it that are known."""
         if not seen:
             return []
-        code = code_of(self.text).splitlines()
         # The call was stopped anywhere: its latest access is not the same every time.
         body = sorted({a.line for a in seen[-LOOPS:-1]}) if repeated(seen) else []
-        ahead = range(seen[-1].line, len(code) + 1)
+        ahead = range(seen[-1].line, len(self.code) + 1)
         around = range(body[0] if body else 0, 0, -1)
-        heads = (k for k in (around or ahead) if k and HEAD_OF_LOOP.search(code[k - 1]))
+        heads = (k for k in (around or ahead) if k and HEAD_OF_LOOP.search(self.code[k - 1]))
         return [next(heads, seen[-1].line), *body]
 
     def lines_of_j(self, seen: Sequence[Access]) -> list[int]:
         """The lines that set a variable after the last that reads a velocity, up to the first that
         writes one: those of J, if it reads no number of a sphere."""
-        writes = [a.line for a in seen if is_write(a, "velocity")]
+        writes = lines_writing(seen, "velocity")
         reads = [a.line for a in seen if a.field == "velocity" and a.line not in writes]
         if not (reads and writes):
             return []
-        code = code_of(self.text).splitlines()
-        return [k for k in range(max(reads) + 1, min(writes)) if assigned(code[k - 1])]
+        return [k for k in range(max(reads) + 1, min(writes)) if assigned(self.code[k - 1])]
 
     def normal_lines(self, seen: Sequence[Access], cause: str) -> list[int]:
         """The lines that compute the normal or the distance, if the cause is about these.
@@ -312,36 +311,33 @@ class Source:
         """
         if ABOUT_OTHERS.search(cause) or not (ABOUT_NORMAL.search(cause) or "square" in cause):
             return []
-        code = code_of(self.text).splitlines()
         written = {a.line for a in seen if a.kind == "w"}
-        first_write = next((k for k, a in enumerate(seen) if a.kind == "w"), len(seen))
-        displaced = max((k for k, a in enumerate(seen) if is_write(a, "position")), default=-1)
         before, after = (
             [
                 line
                 for line in dict.fromkeys(a.line for a in part if a.field == "position")
                 if line and line not in written
             ]
-            for part in (seen[:first_write], seen[displaced + 1 :])
+            for part in (before_writes(seen), after_displacement(seen))
         )
         reads = (after if AFTER in cause else []) or before
         if not reads:
             return []
-        made = {name for line in reads for name in assigned(code[line - 1])}
-        kicks = [a.line for a in seen if is_write(a, "velocity") and a.line > max(reads)]
+        made = {name for line in reads for name in assigned(self.code[line - 1])}
+        kicks = [k for k in lines_writing(seen, "velocity") if k > max(reads)]
         between = [
             k
             for k in range(max(reads) + 1, min(kicks, default=max(reads) + 1))
-            if k not in written and not code[k - 1].lstrip().startswith("if")
+            if k not in written and not self.code[k - 1].lstrip().startswith("if")
         ]
-        changes = [k for k in between if made & {*assigned(code[k - 1])}]
+        changes = [k for k in between if made & {*assigned(self.code[k - 1])}]
         if ABOUT_NORMAL.search(cause):
             changes = changes or self.derived(reads, min(kicks, default=0), NOT_OF_NORMAL)
             return [*reads, *changes] if len(reads + changes) <= MOST else [*changes, *reads]
         used = rf"\b(?:{'|'.join(made)})\b"
-        sums = [k for k in range(max(reads) + 1, max(reads) + 5) if k - 1 < len(code)]
-        sums = [k for k in sums if k not in changes and not GUARD.search(code[k - 1])]
-        return [k for k in sums if made and re.search(used, code[k - 1])][:2]
+        sums = [k for k in range(max(reads) + 1, max(reads) + 5) if k - 1 < len(self.code)]
+        sums = [k for k in sums if k not in changes and not GUARD.search(self.code[k - 1])]
+        return [k for k in sums if made and re.search(used, self.code[k - 1])][:2]
 
     def with_results(self, lines: list[int], seen: Sequence[Access], cause: str) -> list[int]:
         """Lines that read the numbers for the impulse; if they are several, or only the beginning
@@ -349,18 +345,17 @@ class Source:
         that writes a velocity."""
         if len({*lines}) < 2 and "relative speed" not in cause:
             return lines
-        ends = [a.line for a in seen if is_write(a, "velocity") and a.line > max(lines, default=0)]
+        ends = [k for k in lines_writing(seen, "velocity") if k > max(lines, default=0)]
         return [*lines, *self.derived(lines, min(ends, default=0), NOT_OF_IMPULSE)]
 
     def derived(self, lines: Sequence[int], end: int, others: re.Pattern[str]) -> list[int]:
         """The lines before `end` that set a variable from those that these lines set; without
         lines that name `others`, and without those that use what such lines set."""
-        code = code_of(self.text).splitlines()
-        made = {name for line in lines for name in assigned(code[line - 1])}
+        made = {name for line in lines for name in assigned(self.code[line - 1])}
         found, apart = [], set[str]()
         for k in range(min(lines, default=end), end):
-            names, used = {*assigned(code[k - 1])}, names_in(code[k - 1])
-            if others.search(code[k - 1]) or used & apart:
+            names, used = {*assigned(self.code[k - 1])}, names_in(self.code[k - 1])
+            if others.search(self.code[k - 1]) or used & apart:
                 apart |= names
             elif k not in lines and names and made & used - names:
                 made |= names
@@ -370,59 +365,72 @@ class Source:
     def feeding(self, lines: Sequence[int]) -> list[int]:
         """The lines above these that last set a variable used in them, the nearest first; a line
         of a function only feeds those below it in the same function."""
-        code = code_of(self.text).splitlines()
         found: list[int] = []
         for line in lines:
-            if not 0 < line <= len(code):
+            if not 0 < line <= len(self.code):
                 continue
-            heads = [k for k in range(1, line) if HEAD_OF_FUNCTION.search(code[k - 1])]
+            heads = [k for k in range(1, line) if HEAD_OF_FUNCTION.search(self.code[k - 1])]
             begin = max(heads, default=0)
-            for name in names_in(code[line - 1]):
-                above = (k for k in range(line - 1, begin, -1) if name in assigned(code[k - 1]))
+            for name in names_in(self.code[line - 1]):
+                above = (
+                    k for k in range(line - 1, begin, -1) if name in assigned(self.code[k - 1])
+                )
                 found += [k for k in [next(above, 0)] if k and k not in (*found, *lines)]
         return sorted(found, reverse=True)
 
     def returns(self, function: str) -> list[int]:
         """The lines on which a function returns something."""
-        code = code_of(self.text).splitlines()
-        begin = next(iter(self.heads(function)), len(code))
-        ends = (k for k in range(begin + 1, len(code) + 1) if HEAD_OF_FUNCTION.search(code[k - 1]))
-        body = range(begin, next(ends, len(code) + 1))
-        return [k for k in body if re.search(r"\breturn\s+[\w\[{(]", code[k - 1])]
+        begin = next(iter(self.heads(function)), len(self.code))
+        ends = (
+            k
+            for k in range(begin + 1, len(self.code) + 1)
+            if HEAD_OF_FUNCTION.search(self.code[k - 1])
+        )
+        body = range(begin, next(ends, len(self.code) + 1))
+        return [k for k in body if re.search(r"\breturn\s+[\w\[{(]", self.code[k - 1])]
 
     def calls(self, name: str) -> list[int]:
         """The lines of performSimStep that a row of the step is about; for a row about the edges
         the head of projectObjects."""
         if name not in CALLED:
             return self.heads("projectObjects" if name in ("edges", "ufo") else "performSimStep")
-        code, function = code_of(self.text).splitlines(), CALLED[name]
-        begin = next(iter(self.heads("performSimStep")), 0)
+        function = CALLED[name]
         found = [
             k
-            for k, line in enumerate(code[begin:], begin + 1)
-            if re.search(rf"\b{function}\s*\(", line) and k not in self.heads(function)
+            for k, line in enumerate(self.code, 1)
+            if k > self.step_head
+            and re.search(rf"\b{function}\s*\(", line)
+            and k not in self.heads(function)
         ]
-        if found and name in ("itself", "each pair once"):  # the loop over j stands last
-            heads = (k for k in range(found[-1], begin, -1) if HEAD_OF_LOOP.search(code[k - 1]))
-            return [next(heads, found[-1]), found[-1]]
-        if found and name in ("all spheres", "pairs"):  # the bounds of a loop may leave some out
-            return [*self.loops_around(found), *found]
+        if name in ("itself", "each pair once"):  # the loop over j stands last
+            return [*self.loops_around(found[-1:]), *found[-1:]] or self.heads("performSimStep")
+        if name in ("all spheres", "pairs"):  # the bounds of a loop may leave some out
+            found = [*self.loops_around(found), *found]
         return found or self.heads("performSimStep")
 
     def loops(self) -> list[int]:
         """The lines of performSimStep that collide pairs, and the heads of their loops."""
-        begin = next(iter(self.heads("performSimStep")), 0)
-        return [k for k in self.calls("pairs") if k > begin]
+        return [k for k in self.calls("pairs") if k > self.step_head]
 
     def loops_around(self, calls: Sequence[int]) -> list[int]:
         """The nearest head of a loop at or above each of these lines of performSimStep; 0 if there
         is none."""
-        code = code_of(self.text).splitlines()
-        begin = next(iter(self.heads("performSimStep")), 0)
         return [
-            next((k for k in range(call, begin, -1) if HEAD_OF_LOOP.search(code[k - 1])), 0)
+            next(
+                (
+                    k
+                    for k in range(call, self.step_head, -1)
+                    if HEAD_OF_LOOP.search(self.code[k - 1])
+                ),
+                0,
+            )
             for call in calls
         ]
+
+    @property
+    def step_head(self) -> int:
+        """The line where performSimStep is defined; 0 if there is none."""
+        return next(iter(self.heads("performSimStep")), 0)
 
     def heads(self, function: str) -> list[int]:
         """The lines where a function is defined."""
@@ -432,5 +440,4 @@ class Source:
     def assignment_lines(self, names: Sequence[str]) -> list[int]:
         """The lines that change one of these variables."""
         change = re.compile(rf"\b(?:{'|'.join(names)}){CHANGED}")
-        code = code_of(self.text).splitlines()
-        return [k for k, line in enumerate(code, 1) if names and change.search(line)]
+        return [k for k, line in enumerate(self.code, 1) if names and change.search(line)]

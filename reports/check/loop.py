@@ -4,7 +4,7 @@ give the expected results."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -40,10 +40,11 @@ def loop_rows(process: SolverProcess, faulty: bool, kicks_apart: bool) -> list[C
     that move apart get an impulse.
     """
     has = process.functions
-    if not (has["begin"] and has["step"]):
-        missing = "performSimStep" if not has["step"] else "initScene"
-        return [not_asked("step", "loop", f"the file has no function {missing}")]
+    if not has["step"]:
+        return [not_asked("step", "loop", "the file has no function performSimStep")]
     start, no_scene = scene_of(process)
+    if no_scene and not has["begin"]:
+        return [not_asked("step", "loop", "the file has no function initScene")]
     if no_scene:
         return [no_scene]
     asked = worlds(len(start), has["wrap"])
@@ -80,8 +81,8 @@ def box(changed: list[str]) -> CheckRow:
 
 
 def scene_of(process: SolverProcess) -> tuple[list[list[float]], CheckRow | None]:
-    """The numbers of the spheres that initScene makes in a fresh world, or a fault if it makes
-    none."""
+    """The numbers of the spheres that initScene makes in a fresh world, or the file when it is
+    loaded; or a fault if there are none."""
     *_, begun, start = process.request([*fresh_world(process), ("globals", None, LIMIT)])
     if isinstance(begun, SolverFailed):
         asked, got, expected = "Does initScene make a scene?", "it fails", "a scene"
@@ -148,6 +149,14 @@ def worlds(n: int, wraps: bool) -> dict[str, Question]:
     return found
 
 
+def pairs_asked(asked: dict[str, Question], kind: str) -> Iterator[tuple[tuple[int, int], str]]:
+    """The pairs of spheres of the questions of a kind, each with the name of the question."""
+    for name in asked:
+        if name.startswith(kind):
+            i, j = map(int, name.split()[-2:])
+            yield (i, j), name
+
+
 def put(spheres: tuple[Ball, ...], i: int, a: Ball, j: int, b: Ball) -> tuple[Ball, ...]:
     """The spheres with a and b in the places i and j."""
     return tuple({i: a, j: b}.get(k, sphere) for k, sphere in enumerate(spheres))
@@ -178,10 +187,8 @@ def call_rows(
     missed = next(
         (
             pair
-            for name, answer in answers.items()
-            if name.startswith("calls for")
-            for pair in [tuple(map(int, name.split()[-2:]))]
-            if frozenset(pair) not in met | collided(answer)
+            for pair, name in pairs_asked(asked, "calls for")
+            if frozenset(pair) not in met | collided(answers[name])
         ),
         None,
     )
@@ -191,7 +198,7 @@ def call_rows(
         judged(
             "all spheres",
             "loop",
-            "Does a step integrate every sphere once?",
+            EVERY_SPHERE,
             got,
             "yes",
             wrong is None,
@@ -202,7 +209,7 @@ def call_rows(
         judged(
             "pairs",
             "loop",
-            "Does a step let every pair collide, the ufo with each asteroid too?",
+            EVERY_PAIR,
             f"no call for {name_of(*missed)}" if missed else "yes",
             "yes",
             missed is None,
@@ -228,6 +235,8 @@ def collided(answer: SolverAnswer) -> set[frozenset[int]]:
     return {frozenset(call[1:]) for call in answer.calls if call[0] == "collide"}
 
 
+EVERY_SPHERE = "Does a step integrate every sphere once?"
+EVERY_PAIR = "Does a step let every pair collide, the ufo with each asteroid too?"
 FAULTY = "the functions that the step calls have faults"
 LEAVES_SPHERES_OUT = "a loop of performSimStep leaves spheres out"
 LEAVES_PAIRS_OUT = "a loop of performSimStep leaves pairs out"
@@ -236,7 +245,6 @@ NOT_WRAPPED = "performSimStep does not call projectObjects"
 
 def integrated(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on integration: every sphere moves as by one call of the file's own integrate."""
-    asked = "Does a step integrate every sphere once?"
     after, end = answers["free"].last, answers["alone"].last[0]
     moved = np.subtract(end.x, question.balls[0].x)
     wrong = [
@@ -245,12 +253,12 @@ def integrated(question: Question, answers: dict[str, SolverAnswer]) -> CheckRow
         if not (near(a.x, np.add(b.x, moved)) and near(a.v, end.v) and near(a.w, end.w))
     ]
     if not wrong:
-        return judged("all spheres", "loop", asked, "yes", "yes", True)
+        return judged("all spheres", "loop", EVERY_SPHERE, "yes", "yes", True)
     first = wrong[0]
     got = f"{name_of(first)} moves at {shown(after[first].v)} m/s"
     got += f" (wrong: {len(wrong)} of {len(after)} spheres)"
     cause = integration_cause(first, question.balls[first], after[first], answers["watched"])
-    return judged("all spheres", "loop", asked, got, f"{shown(end.v)} m/s", False, cause)
+    return judged("all spheres", "loop", EVERY_SPHERE, got, f"{shown(end.v)} m/s", False, cause)
 
 
 def integration_cause(k: int, before: Ball, after: Ball, watched: SolverAnswer) -> str:
@@ -337,12 +345,9 @@ def edges_last(watched: SolverAnswer) -> list[CheckRow]:
 def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> CheckRow:
     """The row on pairs: every overlapping pair collides, and no other sphere changes."""
     silent, others, handled = [], [], []
-    for name, question in asked.items():
-        if not name.startswith("pair"):
-            continue
-        i, j = map(int, name.split()[1:])
-        struck = struck_in(question, answers[name])
-        if not met(question, answers[name], i, j):
+    for (i, j), name in pairs_asked(asked, "pair"):
+        struck = struck_in(asked[name], answers[name])
+        if not met(asked[name], answers[name], i, j):
             silent.append((i, j))
             continue
         handled.append((i, j))
@@ -361,7 +366,7 @@ def pairs(asked: dict[str, Question], answers: dict[str, SolverAnswer]) -> Check
     return judged(
         "pairs",
         "loop",
-        "Does a step let every pair collide, the ufo with each asteroid too?",
+        EVERY_PAIR,
         got,
         "yes",
         not silent and not others,
@@ -406,10 +411,9 @@ def integration_first(asked: dict[str, Question], answers: dict[str, SolverAnswe
     """The row on order: a pair that touches only at the end of a step collides in it if all spheres
     are integrated first."""
     missed = [
-        name_of(*map(int, name.split()[-2:]))
-        for name, question in asked.items()
-        if name.startswith("about to meet")
-        and not met(question, answers[name], *map(int, name.split()[-2:]))
+        name_of(*pair)
+        for pair, name in pairs_asked(asked, "about to meet")
+        if not met(asked[name], answers[name], *pair)
     ]
     return judged(
         "integration first",

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from adapters.own_solver.file import printable
+from reports.check.evidence import lines_and_formula
 from reports.check.outcomes import OUTCOMES, Status
 from reports.check.points import Points
-from reports.check.rows import TASKS, UNKNOWN, CheckRow
+from reports.check.rows import TASKS, UNKNOWN, CheckRow, Verdict
 from reports.check.verdict import WITHOUT_NUMBERS, FileCheck, headline, numbers_of, task_title
 
 if TYPE_CHECKING:
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
 
 # File names that do not identify the student; then the folder name does.
 ANYBODYS = ("exercise", "solver")
+
+
+# verdict -> what a student reads of a question, from its name and its cause, in this order
+FEEDBACK: dict[Verdict, str] = {
+    "follows": "{}: {}; it costs nothing",
+    "free choice": "{}: free choice: {}",
+    "not asked": "{}: not asked: {}",
+}
 
 
 class TaskMark(NamedTuple):
@@ -127,6 +136,8 @@ class Marked:
         begin = self.check.sentences[0] if self.check.passed else "There are faults; see the tasks."
         said = [begin, self.total]
         said += [f"{title} gives no points." for title in self.without_points]
+        if self.check.shared and not self.low:
+            said.append(self.check.shared)
         if self.beside:
             judged = f"{self.check.path.name} is judged; not judged: {', '.join(self.beside)}."
             said.append(judged)
@@ -145,13 +156,8 @@ class Marked:
         rows = self.check.of(task)
         points = next((mark.not_judged for mark in self.tasks if mark.task == task), 0.0)
         lines = [line for row in self.check.causes if row.task == task for line in self.of(row)]
-        lines += [f"{row.name}: {row.cause}; it costs nothing" for row in rows if follows(row)]
-        lines += [
-            f"{row.name}: free choice: {row.cause}" for row in rows if row.verdict == "free choice"
-        ]
-        lines += [
-            f"{row.name}: not asked: {row.cause}" for row in rows if row.verdict == "not asked"
-        ]
+        for verdict, said in FEEDBACK.items():
+            lines += [said.format(row.name, row.cause) for row in rows if row.verdict == verdict]
         if not rows:
             lines += ["not asked: the file could not be used", *self.of(self.check.faults[0])]
         return lines + [waiting(points)] * bool(points)
@@ -162,14 +168,7 @@ class Marked:
         if self.low:
             said = headline(row) if row.name in WITHOUT_NUMBERS else f"{row.name}: wrong answer."
             return [" ".join([said, *numbers_of(row)])]
-        lines = [" ".join([headline(row), *numbers_of(row)])]
-        lines += [f"line {line}: {text}" for line, text in row.lines]
-        return lines + [f"exercise: {row.formula}"] * bool(row.formula)
-
-
-def follows(row: CheckRow) -> bool:
-    """Whether a row is wrong because of a fault elsewhere."""
-    return row.verdict == "follows"
+        return [" ".join([headline(row), *numbers_of(row)]), *lines_and_formula(row)]
 
 
 def mark_of(check: FileCheck, task: str, worth: Mapping[str, float]) -> TaskMark:

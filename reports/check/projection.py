@@ -83,13 +83,13 @@ TOTALS: dict[str, Callable[[Shift, Ball, Ball], float]] = {
 
 def moved_together(answers: dict[str, SolverAnswer]) -> bool:
     """Whether colliding pairs are moved into each other."""
-    shifts = [shift_of(answers[name].asked.balls, answers[name].last) for name in COLLISIONS]
+    shifts = [shift_of(answers[name]) for name in COLLISIONS]
     return all(s.a + s.b < 0 and near(s.across, 0.0, 0.1) for s in shifts)
 
 
-def shift_of(question: tuple[Ball, ...], after: list[Ball]) -> Shift:
+def shift_of(answer: SolverAnswer) -> Shift:
     """The displacement of a pair, relative to its normal."""
-    a, b = question
+    (a, b), after = answer.asked.balls, answer.last
     n, distance = direction(a, b)
     t = np.array([-n[1], n[0]])
     da, db = np.subtract(after[0].x, a.x), np.subtract(after[1].x, b.x)
@@ -114,25 +114,28 @@ def reacts(answers: dict[str, SolverAnswer]) -> bool:
     )
 
 
+def overlap(answers: dict[str, SolverAnswer]) -> bool:
+    """Whether the pairs of these questions overlap."""
+    return all(shift_of(answers[name]).overlap > 0 for name in COLLISIONS)
+
+
 def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:
     """The rows of (b) if the function fails later, from the positions at the failure."""
     if not reacts(answers):
         return [not_asked("one point", "2b", TAKEN_TO_BE_APART)]
     readable = all(answers[name].balls for name in DISPLACED)
-    if not readable or not all(
-        displaced(answers[name].asked.balls, answers[name]) for name in COLLISIONS
-    ):
+    if not readable or not all(displaced(answers[name]) for name in COLLISIONS):
         return [not_asked("one point", "2b", "the call fails before it has moved both spheres")]
     return projection_rows(answers, None)
 
 
-def displaced(before: tuple[Ball, ...], answer: SolverAnswer) -> bool:
+def displaced(answer: SolverAnswer) -> bool:
     """Whether a failed call had finished the displacement of a pair: the pair is in the right
     place, or all four coordinates changed. Otherwise the failure may have come in between."""
     if not answer.failed:
         return True
-    shift = shift_of(before, answer.last)
-    moved = np.not_equal([b.x for b in before], [b.x for b in answer.last])
+    shift = shift_of(answer)
+    moved = np.not_equal([b.x for b in answer.asked.balls], [b.x for b in answer.last])
     return bool(moved.all()) or in_one_point(shift)
 
 
@@ -151,8 +154,8 @@ def projection_rows(
 ) -> list[CheckRow]:
     """The rows of (b); `found`: the explanation of the velocities."""
     seen = [
-        (q.balls, shift_of(q.balls, answers[name].last), answers[name].last)
-        for name, q in ((name, answers[name].asked) for name in COLLISIONS)
+        (answers[name].asked.balls, shift_of(answers[name]), answers[name].last)
+        for name in COLLISIONS
     ]
     met = [near(distance_of(after), shift.sizes, 0.1) for _, shift, after in seen]
     balls, shift, after = seen[met.index(False) if False in met else 0]
@@ -422,7 +425,7 @@ ONE = (
 
 def separation(answer: SolverAnswer) -> CheckRow:
     """The row on a pair that overlaps and moves apart: whether to displace it is a free choice."""
-    shift = shift_of(answer.asked.balls, answer.last)
+    shift = shift_of(answer)
     moved = abs(shift.a) + abs(shift.b) > 1e-9
     if answer.failed and not moved:
         return not_asked("separating pair", "2b", "the call fails before it moves such a pair")

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from adapters.own_solver.engine import BEGIN_LIMIT
 from adapters.own_solver.file import SolverFailed
 from adapters.own_solver.process import Request, SolverProcess
 from reports.check.rows import TOLERANCE
@@ -18,7 +19,6 @@ from scenarios.model import Array
 
 LIMIT = 1.0  # s a question may take: it needs a few microseconds
 TOGETHER = 50  # fresh worlds in a request, because its time is limited, too
-BEGINNING = 2.0  # s that initScene may take
 LOADING = 3.0  # s that loading the file again may take
 
 
@@ -217,14 +217,17 @@ def closer(question: Question, share: float) -> Question:
     return question._replace(balls=(a, b._replace(x=(float(place[0]), float(place[1])))))
 
 
-# The questions on 2b to 2d for a file that takes their overlaps for gaps: these are below the
-# smaller of the two sizes.
-CLOSER = {
-    name: closer(question, 0.35)
-    for name, question in QUESTIONS.items()
+ON_COLLISIONS = [
+    name
+    for name in QUESTIONS
     if name.startswith(("collision/", "swapped/", "at rest", "separate"))
     or name in ("slow", "even", "fast")
-}
+]
+# The questions on 2b to 2d for a file that takes their overlaps for gaps: these are below the
+# smaller of the two sizes.
+CLOSER = {name: closer(QUESTIONS[name], 0.35) for name in ON_COLLISIONS}
+# The same for a file in which only pairs with a gap between them collide.
+APART = {name: closer(QUESTIONS[name], 1.5) for name in ON_COLLISIONS}
 
 
 def ask(
@@ -253,7 +256,7 @@ def batched(names: Iterable[str], size: int) -> Iterator[list[str]]:
 
 def fresh_world(process: SolverProcess) -> list[Request]:
     """Requests that load the file again and call its initScene."""
-    begin: list[Request] = [("begin", None, BEGINNING)] if process.functions["begin"] else []
+    begin: list[Request] = [("begin", None, BEGIN_LIMIT)] if process.functions["begin"] else []
     return [("renew", None, LOADING), *begin]
 
 
@@ -343,8 +346,3 @@ def finite(answers: dict[str, SolverAnswer], part: str) -> bool:
     return bool(
         np.isfinite([getattr(b, part) for name in COLLISIONS for b in answers[name].last]).all()
     )
-
-
-def named(answers: dict[str, SolverAnswer], prefix: str) -> Iterator[tuple[Question, SolverAnswer]]:
-    """The questions whose names start with `prefix`, with their answers."""
-    return ((QUESTIONS[name], answers[name]) for name in answers if name.startswith(prefix))

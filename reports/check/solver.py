@@ -8,12 +8,19 @@ from pathlib import Path
 
 from adapters.own_solver.file import SolverFailed, SolverText, read_solver
 from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of, own_text
+from adapters.own_solver.restitution import code_of, own_text, with_restitution
 from reports.check.consequences import with_consequences
-from reports.check.detection import detection_rows
+from reports.check.detection import WRONG_WAY, detection_rows
 from reports.check.failing import rows_until_failure
 from reports.check.functions import failed_calls, implemented, same_again
-from reports.check.impacts import APPROACH, BACKWARDS, explain
+from reports.check.impacts import (
+    APPROACH,
+    BACKWARDS,
+    NEVER,
+    CollisionExplanation,
+    explain,
+    in_call,
+)
 from reports.check.impulse import AS_PRINTED, impulse_rows
 from reports.check.lines import Source, named_line
 from reports.check.loop import loop_rows
@@ -22,11 +29,15 @@ from reports.check.projection import (
     DISPLACES_VELOCITY,
     TAKEN_TO_BE_APART,
     moved_together,
+    overlap,
     projection_rows,
     reacts,
 )
 from reports.check.questions import (
+    APART,
     CLOSER,
+    COLLISIONS,
+    ON_COLLISIONS,
     QUESTIONS,
     SolverAnswer,
     ask,
@@ -35,7 +46,7 @@ from reports.check.questions import (
     was_stopped,
 )
 from reports.check.restitution import Restitution, restitution_of
-from reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, not_asked
+from reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, near, not_asked
 from reports.check.scenes import scene_rows
 
 
@@ -57,7 +68,7 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
         return [replace(row, lines=named_line(row.cause, solver.text))], None
     try:
         with process:
-            return rows_of(process, solver.text, own_text(solver))
+            return rows_of(process, solver)
     except SolverFailed as failure:
         lost = judged(
             "answers",
@@ -74,14 +85,10 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
 LOADS = "Can the file be loaded, and does it leave the built-in functions as they are?"
 
 
-def rows_of(
-    process: SolverProcess, text: str, with_beside: str
-) -> tuple[list[CheckRow], float | None]:
-    """The rows of a loaded file, and its restitution.
-
-    text: of the file; with_beside: the same with the modules that it imports from its folder.
-    Raises `SolverFailed` if its process is lost.
-    """
+def rows_of(process: SolverProcess, solver: SolverText) -> tuple[list[CheckRow], float | None]:
+    """The rows of a loaded file, and its restitution. Raises `SolverFailed` if its process is
+    lost."""
+    text = solver.text
     asked = {
         k: q
         for k, q in QUESTIONS.items()
@@ -90,7 +97,7 @@ def rows_of(
     answers, others = ask_in_two_orders(process, asked)
     source = Source(process, text)
     rows = [loads(process), *task_1(process, answers, others, text)]
-    contact, restitution = task_2(process, answers, others, source, with_beside)
+    contact, restitution = task_2(process, answers, others, source, solver)
     rows += contact
     faulty = any(row.verdict == "fault" for row in rows)
     if was_stopped(answers):
@@ -169,7 +176,7 @@ def task_2(
     answers: dict[str, SolverAnswer],
     others: dict[str, SolverAnswer],
     source: Source,
-    with_beside: str,
+    solver: SolverText,
 ) -> tuple[list[CheckRow], Restitution | None]:
     """The rows of the collision function, and its restitution if its collisions have one."""
     mine, text = {k: answer for k, answer in answers.items() if k not in MOTION}, source.text
@@ -180,17 +187,21 @@ def task_2(
         return with_not_asked(rows, NO_FURTHER), None
     rows += detection_rows(mine, text)
     if not reacts(mine):
+        wrong_way = any(row.cause == WRONG_WAY for row in rows)
+        source.questions |= (instead := APART if wrong_way else CLOSER)
         renew(process)
-        mine |= ask(process, CLOSER)
-        source.questions |= CLOSER
+        mine |= ask(process, instead)
     if failed_calls(mine) or not reacts(mine):
         return with_not_asked(rows, TAKEN_TO_BE_APART), None
-    restitution = restitution_of(with_beside, mine)
+    restitution = restitution_of(own_text(solver), mine)
     found = explain(mine, restitution)
+    if found is not None and found.impulse == NEVER and restitution.own == 1:
+        found = zero_at_one(solver) or found
     if found is not None and found.impulse == APPROACH and moved_together(mine):
         found = replace(found, impulse=BACKWARDS)
     rows += same_again("sphereSphereCollisionHandling", mine, others, text)
-    rows += projection_rows(mine, found)
+    projected = projection_rows(mine, found)
+    rows += projected if overlap(mine) else [seen_apart(row) for row in projected]
     computed, written = source.computes_with("velocity"), source.writes("velocity")
     rows += impulse_rows(mine, restitution, found, computed, written)
     if not any((row.name, row.verdict) == ("impulse", "right") for row in rows):
@@ -198,6 +209,33 @@ def task_2(
     if any(row.name == "rest kept" and row.verdict == "fault" for row in rows):
         rows = [integrating(row) if source.integrates else row for row in rows]
     return sorted(rows, key=lambda row: row.task), restitution
+
+
+def zero_at_one(solver: SolverText) -> CollisionExplanation | None:
+    """The mistake of a file with e = 1 by which its J is 0 only because of this number: the one
+    that explains the collisions of the same text with e = 0.75. None if there is none."""
+    changed = with_restitution(solver.text, 1.0, 0.75)
+    asked = {name: QUESTIONS[name] for name in ON_COLLISIONS}
+    try:
+        with SolverProcess(replace(solver, text=changed)) as process:
+            answers = ask(process, asked)
+    except SolverFailed:
+        return None
+    if failed_calls(answers):
+        return None
+    found = explain(answers, restitution_of(changed, answers))
+    pair, _ = in_call(answers[next(iter(COLLISIONS))])
+    if found is None or found.impulse == NEVER or not near(found.law(pair, 1.0), 0.0):
+        return None
+    return replace(found, e=1.0)
+
+
+def seen_apart(row: CheckRow) -> CheckRow:
+    """A row of (b) on pairs with a gap, which a right displacement closes: a wrong answer may be
+    that to the gap only, so that it is no fault."""
+    if row.verdict != "fault":
+        return row
+    return not_asked(row.name, row.task, TAKEN_TO_BE_APART)
 
 
 def unknown_at_touch(row: CheckRow) -> CheckRow:

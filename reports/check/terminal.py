@@ -52,6 +52,8 @@ def print_file(marked: Marked) -> None:
         return
     for k, row in enumerate(one.findings, 1):
         print_fault(console, k, row, one.also(row))
+    if one.shared:
+        console.print(f"\n{one.shared}", highlight=False)
     console.print()
     print_tasks(console, marked)
     if more := one.causes[len(one.findings) :]:

@@ -13,6 +13,7 @@ from adapters.own_engine.surface import is_engine
 from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
 from adapters.own_solver.gl_matrix import lacks_gl_matrix
 from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
+from reports.check.shared import shared_functions
 from reports.check.solver import examine
 
 ENGINE = "is an engine (create, step, read), and check is for solvers of the exercise"
@@ -109,6 +110,12 @@ class FileCheck:
             said = f"No fault found: {self.tally().asked} questions, {len(self.choices)} of them"
             return [f"{said} about free choices.{self.own_step}"]
         return [sentence(row) for row in self.findings]
+
+    @property
+    def shared(self) -> str:
+        """A sentence with the functions in which one mistake may be behind several faults; "" if
+        there are none."""
+        return "" if self.solver is None else shared_functions(self.rows, self.solver.text)
 
     @property
     def own_step(self) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,79 @@ def test_a_file_with_a_short_reach_is_asked_about_deeper_overlaps(tmp_path: Path
     assert (mark.points, mark.not_judged) == (18.0, 0.0)
 
 
+def test_a_comparison_the_wrong_way_round_leaves_nothing_unjudged(tmp_path: Path):
+    """Such a file is asked about pairs with a gap; a displacement that is right for overlaps only
+    is no fault, and a second mistake is found."""
+    plain = (HERE / "correct" / "plain.js").read_text("utf-8")
+    turned = plain.replace("distance >= sphereA.size", "distance < sphereA.size")
+    sizes = "sphereA.size + sphereB.size - distance"
+    texts = {
+        "turned.js": turned,
+        "clamped.js": turned.replace(f"= {sizes};", f"= Math.max(0, {sizes});"),
+        "factor.js": turned.replace("-(1 + restitution)", "-restitution"),
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    checks = judged([tmp_path / name for name in texts])
+    marks = marks_of(*checks.values())
+
+    assert {(one.points, one.not_judged) for one in marks[:1]} == {(18.0, 0.0)}
+    assert [(row.task, row.cause) for row in marks[0].check.causes] == [
+        ("2a", "the comparison is the wrong way round")
+    ]
+    assert [row.task for row in marks[1].check.causes] == ["2a"]
+    assert (marks[1].points, marks[1].not_judged) == (17.0, 1.0)
+    assert [row.task for row in marks[2].check.causes] == ["2a", "2c"]
+    assert marks[2].check.causes[1].cause == "the factor is e, not (1 + e)"
+
+
+def test_a_wrong_sign_of_e_is_found_at_e_of_one(tmp_path: Path):
+    """There the impulse is 0, as if there were none: the same text with another e tells it. An
+    update that never changes a velocity stays a fault of that."""
+    plain = (HERE / "correct" / "plain.js").read_text("utf-8")
+    plain = plain.replace("restitution = 0.9", "restitution = 1")
+    texts = {
+        "sign.js": plain.replace("-(1 + restitution)", "-(1 - restitution)"),
+        "nothing.js": plain.replace("J = -(1 + restitution)", "J = -0 * (1 + restitution)"),
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    sign, nothing = judged([tmp_path / name for name in texts]).values()
+    (mark,) = marks_of(sign)
+
+    assert [(row.task, row.cause) for row in sign.causes] == [
+        ("2c", "the factor is (1 - e), not (1 + e)")
+    ]
+    assert (mark.points, mark.not_judged) == (17.0, 0.0)
+    assert sign.causes[0].lines == [
+        (63, "var J = -(1 - restitution) * vn / (1 / sphereA.mass + 1 / sphereB.mass);")
+    ]
+    assert [row.task for row in nothing.causes] == ["2d"]
+
+
+def test_a_mistake_in_a_shared_function_is_named_as_one(tmp_path: Path):
+    """Without those that a right integrate calls, too; with them if it is wrong; and nothing is
+    said of a file with one fault, or of one whose faults have causes of their own."""
+    right = (HERE / "correct" / "helpers.js").read_text("utf-8")
+    texts = {
+        "minus.js": right.replace("y: a.y - b.y }", "y: a.y + b.y }"),
+        "times.js": right.replace("y: k * a.y }", "y: k * a.x }"),
+        "one.js": right.replace("(1 + e) * closing", "e * closing"),
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    minus, times, one = judged([tmp_path / name for name in texts]).values()
+    said = "One mistake may be behind these faults, in a function that they share: "
+
+    assert minus.shared == f"{said}minus (line 38), dot (line 40), norm (line 41)."
+    assert times.shared == f"{said}plus (line 37), times (line 39)."
+    assert one.faults
+    assert one.shared == ""
+    (mark,) = marks_of(minus)
+    assert minus.shared in mark.summary
+    assert minus.shared not in replace(mark, low=True).summary
+
+
 def test_a_step_without_a_scene_is_said_not_to_be_judged(tmp_path: Path):
     """In the same sentence that says that no fault was found."""
     text = (HERE / "correct" / "plain.js").read_text("utf-8")
@@ -121,6 +195,27 @@ def test_a_step_without_a_scene_is_said_not_to_be_judged(tmp_path: Path):
 
     assert one.passed
     assert "performSimStep was not judged: the file has no function initScene" in one.sentences[0]
+
+
+def test_a_scene_that_is_made_on_loading_is_one(tmp_path: Path):
+    """A file without initScene whose ufo and asteroids are there once it is loaded has its step
+    judged, in both languages."""
+    for kind, ends in (("js", "start();\n"), ("py", "start()\n")):
+        text = (HERE / "correct" / f"plain.{kind}").read_text("utf-8")
+        text = text.replace("initScene", "start") + ends
+        wrong = text.replace("i + 1; j < numAsteroids", "i + 2; j < numAsteroids")
+        wrong = wrong.replace("asteroids[i + 1 :]", "asteroids[i + 2 :]")
+        (tmp_path / f"right.{kind}").write_text(text, "utf-8")
+        (tmp_path / f"wrong.{kind}").write_text(wrong, "utf-8")
+        checks = judged([tmp_path / f"right.{kind}", tmp_path / f"wrong.{kind}"])
+        right, wrong_one = checks.values()
+
+        assert right.passed
+        assert "performSimStep was not judged" not in right.sentences[0]
+        assert {row.verdict for row in right.of("loop")} == {"right"}
+        assert [row.cause for row in wrong_one.causes] == [
+            "a loop of performSimStep leaves pairs out"
+        ]
 
 
 def test_the_end_of_a_file_is_in_its_last_line(tmp_path: Path):

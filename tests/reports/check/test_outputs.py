@@ -22,6 +22,7 @@ from playwright.sync_api import Browser
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check import command
+from reports.check.formats.formats import FORMATS
 from reports.check.formats.questions_json import SCHEMA
 from reports.check.rows import CheckRow
 from reports.check.smallest import smallest_scene, smallest_scenes
@@ -291,14 +292,39 @@ def test_a_submission_is_a_file_or_its_folder_and_is_always_answered(folder: Pat
     assert "holds 3 solvers" in rows["fay"]["refused"]
 
 
-def test_a_class_is_no_submission(folder: Path):
-    """Exit 2 and nothing written: the results of one student would name the others."""
-    done = crosscheck("check", ".", "--format", "gradescope", "--out", "g.json", cwd=folder)
+def test_a_submission_with_folders_in_it_is_always_answered(tmp_path: Path):
+    """In every format of an autograder: of older versions the file above them is judged; where no
+    file is above the others, the results name all, and the one to hand in."""
+    for where in ("v1", "v2"):
+        (tmp_path / "dora" / where).mkdir(parents=True)
+        WRONG.write(tmp_path / "dora" / where).rename(tmp_path / "dora" / where / "Exercise.js")
+    kinds = [name for name, kind in FORMATS.items() if kind.single]
 
-    assert done.returncode == 2
-    assert done.stderr.startswith(".: holds the folders of 4 students: anna, ben, cem and 1 more")
-    assert done.stderr.endswith("--format gradescope is for one, --format csv for a class\n")
-    assert not (folder / "g.json").exists()
+    def results() -> tuple[int, str, dict[str, Any]]:
+        words = [word for kind in kinds for word in ("--format", kind, "--out", f"{kind}.json")]
+        done = crosscheck("check", "dora", *words, cwd=tmp_path)
+        texts = {kind: (tmp_path / f"{kind}.json").read_text() for kind in kinds}
+        return done.returncode, done.stderr, {kind: json.loads(texts[kind]) for kind in kinds}
+
+    status, said, several = results()
+    shutil.copy(RIGHT, tmp_path / "dora" / "Exercise.js")
+    judged_status, _, judged = results()
+    why = "holds 2 solvers: v1/Exercise.js, v2/Exercise.js; hand in one, named Exercise.js or"
+
+    assert status == 1
+    assert "dora: holds several solvers; for a class: --format csv" in said
+    assert several["gradescope"]["output"].startswith(why)
+    assert several["gradescope"]["score"] == 0
+    assert not several["prairielearn"]["gradable"]
+    assert several["prairielearn"]["format_errors"][0].startswith(why)
+    assert all(one["message"].startswith(why) for one in several["classroom"]["tests"])
+    assert judged_status == 0
+    assert judged["gradescope"]["score"] == 20
+    assert judged["gradescope"]["output"].endswith(
+        "Exercise.js is judged; not judged: v1/Exercise.js, v2/Exercise.js."
+    )
+    assert judged["prairielearn"]["score"] == 1
+    assert judged["classroom"]["status"] == "pass"
 
 
 @pytest.mark.slow

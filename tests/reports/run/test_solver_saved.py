@@ -234,7 +234,7 @@ def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
     check = check_file(path)
     path.unlink()
     (marked,) = marks_of(check)
-    make_page(tmp_path / "check.html", replace(marked, scenes=scenes_of(check)))
+    make_page(tmp_path / "check.html", [replace(marked, scenes=scenes_of(check))], several=False)
     page = (tmp_path / "check.html").read_text()
 
     assert check.faults
