@@ -8,7 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import NoReturn
 
-from reports.run.diff import FACTOR, Change, Difference, Timing, difference
+from reports.run.diff import FACTOR, ROUNDING, Change, Difference, Timing, difference
 from reports.run.folders import found
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
@@ -21,6 +21,7 @@ HEADINGS = (
     "status\nworse",
     "status\nbetter",
     "numbers\nthe same",
+    "in\nrounding",
     "numbers\nworse",
     "numbers\nbetter",
     "numbers\nother",
@@ -45,9 +46,7 @@ def show_difference(before: Path, after: Path) -> NoReturn:
         sys.exit(FAILED)
     console = Console()
     for warning in changed.warnings:
-        console.print(
-            f"differs in {warning}" if ":" in warning else warning, style="yellow", highlight=False
-        )
+        console.print(warning, style="yellow", highlight=False)
     title = "What changed; a number between two engines counts for both"
     print_table(console, HEADINGS, by_engine(changed), title, left=HEADINGS[-1:])
     console.print()
@@ -80,6 +79,7 @@ def by_engine(changed: Difference) -> list[list[str]]:
             count(statuses, "worse"),
             count(statuses, "better"),
             str(changed.same[engine]),
+            count(numbers, ROUNDING),
             count(numbers, "worse"),
             count(numbers, "better"),
             count(numbers, "other"),
@@ -109,9 +109,15 @@ def said_of(timing: Timing | None) -> str:
     return f"×{timing.factor:.2f} ({timing.low:.2f}–{timing.high:.2f}){verdict}"
 
 
-def severity(change: Change) -> tuple[bool, bool, float]:
-    """The sort key of the list: worse changes first, among them statuses first, then by size."""
-    return change.verdict != "worse", not change.what.endswith("status"), -change.factor
+def severity(change: Change) -> tuple[bool, bool, bool, float]:
+    """The sort key of the list: worse changes first, rounding last, then statuses first, then by
+    size."""
+    return (
+        change.verdict != "worse",
+        change.verdict == ROUNDING,
+        not change.what.endswith("status"),
+        -change.factor,
+    )
 
 
 def sentence(changed: Difference) -> str:

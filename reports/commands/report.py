@@ -78,7 +78,7 @@ def print_summary(report: Report, page: str) -> None:
     for comparisons in filter(None, by_friction(report.comparisons)):
         headings, rows, without = medians(comparisons, report.untrusted)
         rough = any(each.scenario.scene.friction for each in comparisons)
-        if rows:
+        if rows and len(headings) > 1:
             print_table(console, headings, rows, title_of(len(comparisons), rough))
         if without:
             console.print(f"Without a model of friction: {', '.join(without)}.", highlight=False)

@@ -245,13 +245,19 @@ def beside(
     """The view of a run and `other` over their common samples; `silent`: that engine reports no
     collisions."""
     assert run.trajectory is not None
-    known = ENGINES | FETCHED
-    # the numbers of a solver's file are float64
-    rounding = known[run.name].rounding if run.name in known else FLOAT64
     k = len(run.trajectory) if other is None else min(len(run.trajectory), len(other))
     other = None if other is None else cut(other, k)
     silent = silent or run.silent
-    return View(scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding, silent)
+    return View(
+        scenario, run.dt, cut(run.trajectory, k), other, jumps, rounding_of(run.name), silent
+    )
+
+
+def rounding_of(name: str) -> float:
+    """The relative rounding of the numbers of an `engine:profile`; those of a solver's file are
+    float64."""
+    row = (ENGINES | FETCHED).get(name)
+    return row.rounding if row else FLOAT64
 
 
 def cut(trajectory: Trajectory, k: int) -> Trajectory:

@@ -19,11 +19,15 @@ from scenarios.catalogue import SCENARIOS
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
     """The closest engines, the effect of settings, the failures. Before them come the reader's own
-    solvers, after them the solvers with time-of-impact ordering, the ends of the exact answers, and
-    last the closest engines in scenes with friction, if there are others. Engines in `untrusted`
-    are left out."""
+    solvers, after them the solvers with time-of-impact ordering, the ends of the exact answers, the
+    refusals, and last the closest engines in scenes with friction, if there are others. Engines in
+    `untrusted` are left out."""
     smooth, rough = by_friction(comparisons)
-    sentences = [*findings_alike(smooth, untrusted), *early_ends(comparisons)]
+    sentences = [
+        *findings_alike(smooth, untrusted),
+        *early_ends(comparisons),
+        *refusals(comparisons),
+    ]
     if not rough:
         return sentences
     scores = pooled.scores(rough)
@@ -49,15 +53,15 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
         run.status
         for comparison in comparisons
         for run in comparison.runs
-        if comparison.scenario.name not in refused.get(run.name, {})
+        if comparison.scenario.name not in refused.get(run.name, ())
     ]
     everyone, engines = engines is off, engines.dropna(axis="columns", how="all")
     sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
     own = [
-        unranked_sentence(name, off, FAR_OFF, refused.get(name, {}))
+        unranked_sentence(name, off, FAR_OFF, len(refused.get(name, ())))
         for name in groups.get(YOURS, [])
     ]
-    exact = [unranked_sentence(name, off, RIGHT, {}) for name in groups.get(EXACT, [])]
+    exact = [unranked_sentence(name, off, RIGHT, 0) for name in groups.get(EXACT, [])]
     return sentences if everyone else [*own, *sentences, *exact]
 
 
@@ -72,6 +76,20 @@ def early_ends(comparisons: Sequence[Comparison]) -> list[str]:
     ]
 
 
+def refusals(comparisons: Sequence[Comparison]) -> list[str]:
+    """A sentence for each reason for which cells were refused. That an engine does not model
+    friction stands in the summary of the scenes with friction."""
+    whose: dict[str, list[str]] = {}
+    for comparison in comparisons:
+        for run in comparison.runs:
+            if run.status == "unsupported" and REFUSAL not in run.reason:
+                whose.setdefault(run.reason, []).append(run.name.removesuffix(OWN_PROFILE))
+    return [
+        f"{listed(list(dict.fromkeys(names)))} refused {counted(len(names), 'cell')}: {reason}."
+        for reason, names in whose.items()
+    ]
+
+
 def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFrame:
     """The columns of `position_errors` of the ranked engines: all but the reader's own solver and
     solvers with time-of-impact ordering. If nothing else was played, these."""
@@ -79,17 +97,16 @@ def ranked(off: pd.DataFrame, groups: Mapping[str, Sequence[str]]) -> pd.DataFra
     return off if len(unranked) == off.shape[1] else off.drop(columns=unranked)
 
 
-def not_asked(comparisons: Sequence[Comparison]) -> dict[str, dict[str, str]]:
-    """Engine -> the scenes whose refusal is no failure, and why: those that a solver's own file
-    refuses, as the exercise does not ask for them, and those with friction, which an engine need
-    not model."""
-    found: dict[str, dict[str, str]] = {}
+def not_asked(comparisons: Sequence[Comparison]) -> dict[str, set[str]]:
+    """Engine -> the scenes whose refusal is no failure: those that a solver's own file refuses, as
+    the exercise does not ask for them, and those with friction, which an engine need not model."""
+    found: dict[str, set[str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
             if run.status == "unsupported" and (
                 run.name.endswith(OWN_PROFILE) or REFUSAL in run.reason
             ):
-                found.setdefault(run.name, {})[comparison.scenario.name] = run.reason
+                found.setdefault(run.name, set()).add(comparison.scenario.name)
     return found
 
 
@@ -114,12 +131,10 @@ def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> 
     return table.reindex(index=scored, columns=names)
 
 
-def unranked_sentence(
-    name: str, off: pd.DataFrame, within: float, refused: Mapping[str, str]
-) -> str:
+def unranked_sentence(name: str, off: pd.DataFrame, within: float, refused: int) -> str:
     """A sentence on an engine that is not ranked: the number of scenes with an error of at most
-    `within` radii; those with an error above a radius, the worst first; those without a result;
-    those not played by design, and why."""
+    `within` radii; those with an error above a radius, the worst first; those without a result; and
+    the number `refused` of those not played by design."""
     errors = off[name].dropna()
     far = errors[(errors > FAR_OFF) & np.isfinite(errors)].sort_values(ascending=False)
     lost = list(errors.index[np.isinf(errors)])
@@ -138,8 +153,7 @@ def unranked_sentence(
         more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
         parts.append(f"without a result in {', '.join(lost[:3])}{more}")
     if refused:
-        why = "; ".join(dict.fromkeys(refused.values()))
-        parts.append(f"not asked in {counted(len(refused), 'scene')} ({why})")
+        parts.append(f"not asked in {counted(refused, 'scene')}")
     return f"{', '.join(parts)}. It is not ranked among the engines."
 
 

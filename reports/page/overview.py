@@ -172,8 +172,9 @@ def summary(
     of them; the last cell counts the scenarios not played.
 
     A scene that a solver's own file refuses, because the file is written for another restitution,
-    does not count. The best is the lowest of its group (`situations.grouped`), and all that show
-    the same number. Engines in `untrusted` broke the protocol of the harness and are not scored.
+    does not count; a file that refuses all of them was not asked. The best is the lowest of its
+    group (`situations.grouped`), and all that show the same number. Engines in `untrusted` broke
+    the protocol of the harness and are not scored.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
@@ -198,8 +199,12 @@ def summary(
             cells = [broken] * len(cells)
         asked = [each for each in failed if not refused_by_file(name, each)]
         count = sum(name in each for each in asked)
-        cells.append(OverviewCell(f"{count} of {len(asked)}", failed=count > 0, value=count))
-        if asked and all(not_modelled(each.get(name)) for each in asked):
+        cells.append(
+            OverviewCell(f"{count} of {len(asked)}", failed=count > 0, value=count)
+            if asked
+            else OverviewCell("not asked", "the file refuses every scene")
+        )
+        if failed and all(not_modelled(each.get(name)) for each in failed):
             cells = [OverviewCell("–", REFUSAL) for _ in cells[:-1]] + [OverviewCell(NO_FRICTION)]
         rows[name] = cells
     groups = situations.grouped(names)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,11 +14,13 @@ import pandas as pd
 
 from reports.compare.metrics import METRICS
 from reports.compare.table import COLUMNS
-from reports.compare.view import NOT_JUDGED
+from reports.compare.view import NOT_JUDGED, rounding_of
 from reports.run.archive import Archive
 from reports.run.tables import is_sealed
 from reports.run.timing_pass import is_busy, noise_floor
+from reports.terminal.counts import listed
 from reports.terminal.foreign_text import encoded
+from scenarios.truth.horizon import DIVERGED
 
 # Measured on two busy cores (load 15 to 20), with 3 scenes and five rounds of timings. Eight runs
 # of one build, compared with each other, gave 280 verdicts from 4200 ratios of rounds: 4 were
@@ -28,13 +30,19 @@ from reports.terminal.foreign_text import encoded
 # "worse". Under such a load the interval is too wide; more rounds and more scenes narrow it.
 FACTOR = 1.25
 CONFIDENCE = 0.99
+# Of the rounding of an engine's numbers. If each coordinate of the start is moved by one rounding,
+# the numbers of scenes with few collisions move by up to 56 roundings. Where collisions follow each
+# other it is more: up to the horizon of the exact answer `DIVERGED`, which is how the horizon is
+# defined. Both are relative to a number above 1, in whatever unit.
+ROUNDINGS = 100
+ROUNDING = "differs in rounding"
 WHOSE = ["scenario", "engine", "profile", "dt_s", "metric", "versus"]
 MACHINE = ("system", "architecture", "processor", "cores")
 
 
 class Change(NamedTuple):
     """A difference: the engine, what changed, its value before and after, and the verdict "better",
-    "worse" or "other"; of a number between two engines also the other one."""
+    "worse", "other" or `ROUNDING`; of a number between two engines also the other one."""
 
     engine: str
     what: str
@@ -112,10 +120,15 @@ def difference(before: Path, after: Path) -> Difference:
     warnings, like = warnings_of(one, other)
     cells = by_name(one), by_name(other)
     tables = table_of(before), table_of(after)
-    numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set())
-    statuses = changed_statuses(*cells) + changed_judgement(
-        *tables, cells[0].keys() & cells[1].keys()
-    )
+    both = cells[0].keys() & cells[1].keys()
+    edited = edited_scenes(*cells)
+    if edited:
+        warnings.append(
+            f"differs in scene: {listed(edited)}: edited between the runs, so that no result in it"
+            " is called worse or better"
+        )
+    numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set(), edited)
+    statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, both, edited)
     busy = [archive for archive in (one, other) if archive.timings and is_busy(archive)]
     warnings += [
         f"{archive.folder}: its times are not compared: two timings of the same engine"
@@ -123,15 +136,14 @@ def difference(before: Path, after: Path) -> Difference:
         for archive in busy
     ]
     timed = timings_of(one, other, *cells) if like and not busy else []
-    shared = len(cells[0].keys() & cells[1].keys())
-    return Difference(warnings, statuses, numbers, same, shared, timed)
+    return Difference(warnings, statuses, numbers, same, len(both), timed)
 
 
 def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
     """Warnings about machines, versions and completeness; and whether the machine is the same."""
     before, after = one.header, other.header
     said = [
-        f"machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
+        f"differs in machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
         for key in MACHINE
         if before["machine"][key] != after["machine"][key]
     ]
@@ -139,9 +151,9 @@ def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
     for name in sorted({*before["versions"], *after["versions"]}):
         versions = before["versions"].get(name, "missing"), after["versions"].get(name, "missing")
         if versions[0] != versions[1]:
-            said.append(f"version: {name}: {versions[0]} before, {versions[1]} after")
+            said.append(f"differs in version: {name}: {versions[0]} before, {versions[1]} after")
     if before["seed"] != after["seed"]:
-        said.append(f"seed: {before['seed']} before, {after['seed']} after")
+        said.append(f"differs in seed: {before['seed']} before, {after['seed']} after")
     said += [
         f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete
     ]
@@ -171,26 +183,37 @@ def equal_keys(before: Cells, after: Cells) -> set[Name]:
     }
 
 
-def changed_statuses(before: Cells, after: Cells) -> list[Change]:
-    """The cells that ended differently. A cell that was not played again also counts as worse."""
+def edited_scenes(before: Cells, after: Cells) -> list[str]:
+    """The names that stand for another scene in each run: a file was edited, or the seed of a
+    random scene is another."""
+    hashes = [
+        {(name[0], record["scene_hash"]) for name, record in cells.items()}
+        for cells in (before, after)
+    ]
+    common = {scene for scene, _ in hashes[0]} & {scene for scene, _ in hashes[1]}
+    return sorted({scene for scene, _ in hashes[0] ^ hashes[1]} & common)
+
+
+def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> list[Change]:
+    """The cells that ended differently. A cell that was not played again also counts as worse; in
+    an edited scene nothing does."""
     changes = []
     for name, record in before.items():
         scenario, engine, dt = name
         was, now = record["status"], after[name]["status"] if name in after else "not played"
         if was != now:
-            verdict = (
-                "worse"
-                if was == "ok" or now == "not played"
-                else "better"
-                if now == "ok"
-                else "other"
-            )
+            if scenario in edited:
+                verdict = "other"
+            elif was == "ok" or now == "not played":
+                verdict = "worse"
+            else:
+                verdict = "better" if now == "ok" else "other"
             changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
     return changes
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name]
+    before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name], edited: Collection[str]
 ) -> list[Change]:
     """The cells that `both` runs played but only one judged, so that only that one has numbers."""
     was, now = reasons(before), reasons(after)
@@ -199,7 +222,7 @@ def changed_judgement(
         if cell in both:
             scenario, engine, dt = cell
             what, key = f"{scenario}  dt {dt:.4g} s  against {versus}: status", (cell, versus)
-            verdict = "worse" if key in now else "better"
+            verdict = "other" if scenario in edited else "worse" if key in now else "better"
             changes.append(
                 Change(engine, what, was.get(key, "judged"), now.get(key, "judged"), verdict)
             )
@@ -236,13 +259,16 @@ def table_of(folder: Path) -> pd.DataFrame:
 
 
 def changed_numbers(
-    before: pd.DataFrame, after: pd.DataFrame, equal: set[Name]
+    before: pd.DataFrame,
+    after: pd.DataFrame,
+    equal: Collection[Name],
+    edited: Collection[str],
 ) -> tuple[list[Change], Counter[str]]:
     """Every number that differs between the tables, and how many are equal, by engine.
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
-    says which value is better. A deviation between two engines, or a number that only one run
-    judges, is "other".
+    says which value is better, unless they differ in rounding. A deviation between two engines, a
+    number that only one run judges, or one of an edited scene is "other".
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile
@@ -251,7 +277,14 @@ def changed_numbers(
     for row in both[differs].to_dict("records"):
         was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
         must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in engines_of(row))
-        verdict = "worse" if must else verdict_of(row["metric"], row["versus"], was, now)
+        if must:
+            verdict = "worse"
+        elif row["scenario"] in edited:
+            verdict = "other"
+        elif is_rounding(engines_of(row), was, now):
+            verdict = ROUNDING
+        else:
+            verdict = verdict_of(row["metric"], row["versus"], was, now)
         what = (
             f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against"
             f" {row['versus']}"
@@ -289,6 +322,15 @@ def engines_of(row: Mapping[Hashable, Any]) -> list[str]:
     return [row["name"]] + ([row["versus"]] if ":" in row["versus"] else [])
 
 
+def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
+    """Whether two values differ by no more than the rounding of the engines' numbers explains; see
+    `ROUNDINGS`."""
+    if not (math.isfinite(was) and math.isfinite(now)):
+        return False
+    bound = max(DIVERGED, *(ROUNDINGS * rounding_of(name) for name in engines))
+    return abs(now - was) <= bound * max(1.0, abs(was), abs(now))
+
+
 def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
     """Whether a number got better or worse, by the row of its metric."""
     better = METRICS[metric].better if metric in METRICS else ""
@@ -320,6 +362,8 @@ def timings_of(
         was = one.timings.get(before[name]["cell"], {}).get(0)
         now = other.timings.get(after[name]["cell"], {}).get(0)
         if was is None or now is None or was["timed_s"] != now["timed_s"]:
+            continue
+        if before[name]["scene_hash"] != after[name]["scene_hash"]:
             continue
         rounds = [*zip(was["cost"], now["cost"])]
         if rounds and min(min(rounds)) > 0:

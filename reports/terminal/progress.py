@@ -122,10 +122,11 @@ class Progress:
         self.begin(what, total, total - missing)
 
     def done(self, what: str, status: str = "ok", reason: str = "") -> None:
-        """One more is done."""
-        if status != "ok":
-            why = f" ({reason})" if status not in ("unsupported", "ok") else ""
-            self.bar.console.print(f"  {what}: {status}{why}", style="yellow", highlight=False)
+        """One more is done. The refusals of cells are told together at the end of a run."""
+        if status not in ("ok", "unsupported"):
+            self.bar.console.print(
+                f"  {what}: {status} ({reason})", style="yellow", highlight=False
+            )
         self.counted += 1
         now = perf_counter()
         each = (now - self.since) / self.counted

@@ -207,10 +207,10 @@ def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp
         each.table.to_csv(tmp_path / "share.csv", index=False)
         read_scene_table((tmp_path / "share.csv").read_bytes())
         tables.append(pd.read_csv(tmp_path / "share.csv", dtype=str, keep_default_na=False))
-    changes, _ = changed_numbers(*tables, set())
-    back, _ = changed_numbers(*tables[::-1], set())
+    changes, _ = changed_numbers(*tables, set(), set())
+    back, _ = changed_numbers(*tables[::-1], set(), set())
     tables[1].loc[tables[1].note.str.startswith(NOT_JUDGED), ["value", "note"]] = "1e9", ""
-    control, _ = changed_numbers(*tables, set())
+    control, _ = changed_numbers(*tables, set(), set())
 
     assert {change.verdict for change in (*changes, *back)} == {"other"}
     assert {change.after for change in changes} == {NOT_JUDGED}

@@ -11,10 +11,11 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
+from adapters.friction import REFUSAL
 from adapters.run import Run
 from reports.compare.comparison import compare
 from reports.page.charts import ChartLine, Drawing, figure_of
-from reports.page.findings import early_ends, not_counted, unranked_sentence
+from reports.page.findings import early_ends, not_counted, refusals, unranked_sentence
 from reports.page.first_screen import failed
 from reports.page.own_solvers import with_lines
 from reports.page.page_tables import conformance_matrix
@@ -77,13 +78,30 @@ def test_the_first_failure_of_an_engine_is_named():
 
 
 def test_a_file_is_not_asked_where_the_exercise_does_not_ask():
-    """Its number is of the scenes that it plays; the others are counted, with why."""
+    """Its number is of the scenes that it plays; the others are counted."""
     off = pd.DataFrame({"a.js:own": {"head_on": 0.25, "oblique": 1.75, "wall": np.nan}})
 
-    assert unranked_sentence("a.js:own", off, 1.0, {"wall": "the exercise has no walls"}) == (
+    assert unranked_sentence("a.js:own", off, 1.0, 1) == (
         "a.js is within 1 radius of the exact answer in 1 of 2 scenes, off by 1.8 radii in oblique,"
-        " not asked in 1 scene (the exercise has no walls). It is not ranked among the engines."
+        " not asked in 1 scene. It is not ranked among the engines."
     )
+
+
+def test_a_reason_to_refuse_is_said_once_with_its_cells():
+    """Whoever gave it; a scene with friction that an engine does not model has its own place."""
+    walls, other = "the exercise has no walls", "the file has e = 0.9, the scene needs 0.5"
+    friction = f"it {REFUSAL}, the scene has 0.2"
+    refused = [("a.js", walls), ("b.js", walls), ("a.js", walls), ("a.js", other)]
+    scene = scenario("head_on_equal_e05")
+    runs = [
+        Run(file, "own", scene.name, 0.1 / k, "unsupported", why)
+        for k, (file, why) in enumerate([*refused, ("a.js", friction)], 1)
+    ]
+
+    assert refusals([compare(scene, runs)]) == [
+        f"a.js and b.js refused 3 cells: {walls}.",
+        f"a.js refused 1 cell: {other}.",
+    ]
 
 
 def test_the_end_of_the_exact_answer_to_a_scene_of_ones_own_is_said():

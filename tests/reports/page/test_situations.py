@@ -777,9 +777,11 @@ def test_a_scene_that_a_file_refuses_is_not_counted_as_not_played(comparisons: l
         ]
 
     asked = overview.summary([refusals("unsupported")[0], comparisons[1]], [name], set())
+    refused = overview.summary(refusals("unsupported"), [name], set())
     crashed = overview.summary(refusals("crashed"), [name], set())
 
     assert asked[name][-1].text == "0 of 1"
+    assert refused[name][-1].text == "not asked"
     assert crashed[name][-1].text == "2 of 2"
     assert not overview.refused_by_file("pymunk:matched", {"pymunk:matched": ("refused", "")})
     assert name not in set(scores(refusals("unsupported")).name)

@@ -65,6 +65,23 @@ def test_sentences_are_numbered_where_there_are_some():
     ]
 
 
+@pytest.mark.slow  # a file, checked and asked to play
+def test_a_run_says_once_why_a_file_does_not_play(tmp_path: Path):
+    """The scene has another restitution than the file: one line with the reason and how many cells,
+    and no count of nothing."""
+    path = FAULTY.write(tmp_path)
+    words = ["head_on_equal_e05", "--engine", path.name, "--timings", "0", "--out", "out"]
+    done = crosscheck("run", *words, cwd=tmp_path)
+    reason = "the file has e = 0.9, the scene needs 0.5"
+
+    assert done.returncode == 1
+    assert f"{path.name} refused 4 cells: {reason}." in " ".join(done.stdout.split())
+    assert (done.stdout + done.stderr).count(reason) == 1
+    assert "0 of 0" not in done.stdout
+    assert "dt 0.01667 s: unsupported" not in done.stderr
+    assert reason in (tmp_path / "out" / "report.html").read_text()
+
+
 @pytest.mark.long
 def test_a_run_says_what_check_says(tmp_path: Path):
     """The second command of the README, of a faulty file: played at every step, with the same cause
