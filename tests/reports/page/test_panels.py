@@ -363,7 +363,8 @@ TOPS = """() => [...document.querySelectorAll('#panels .panel')]
 
 @pytest.mark.slow
 def test_panels_fit_a_narrow_page_and_paper(browser: Browser, path: Path):
-    """Two beside each other at 400 px; on paper five, drawn although they were never in view."""
+    """Two beside each other at 400 px; on paper five, drawn although they were never in view, and
+    on one sheet with their heading."""
     page, heard = opened(browser, path.as_uri(), viewport={"width": 400, "height": 800})
     for name in (ASTEROIDS, ORBIT, HEAD_ON):
         chosen(page, name)
@@ -373,8 +374,13 @@ def test_panels_fit_a_narrow_page_and_paper(browser: Browser, path: Path):
     page.set_viewport_size({"width": 703, "height": 1032})
     printed = page.evaluate(TOPS)
     drawn = page.locator("#panels .panel:visible .track").count()
+    breaks, height = page.locator("#panels").evaluate(
+        "(all) => [getComputedStyle(all).breakInside, all.getBoundingClientRect().height]"
+    )
     page.context.close()
 
+    assert breaks == "avoid"
+    assert height < 1032
     assert narrow[0] == narrow[1] < narrow[2]
     assert (len(printed), len(set(printed)), drawn) == (5, 1, 2 * len(PLAYED))
     assert heard == []
