@@ -268,7 +268,7 @@ def changed_numbers(
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
     says which value is better, unless they differ in rounding. A deviation between two engines, a
-    number that only one run judges, or one of an edited scene is "other".
+    number that only one run judges, or one of an edited scene is then "other".
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile
@@ -279,10 +279,10 @@ def changed_numbers(
         must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in engines_of(row))
         if must:
             verdict = "worse"
-        elif row["scenario"] in edited:
-            verdict = "other"
         elif is_rounding(engines_of(row), was, now):
             verdict = ROUNDING
+        elif row["scenario"] in edited:
+            verdict = "other"
         else:
             verdict = verdict_of(row["metric"], row["versus"], was, now)
         what = (
