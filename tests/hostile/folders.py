@@ -87,7 +87,7 @@ NO_PLACE = tuple(
         (*OUT[command], path),
         SCENE,
         prepare=prepare,
-        says=path.strip("./")[:20] or "where you are",
+        says=path.strip("./")[:20] or "is the current folder",
     )
     for number, (what, (path, prepare)) in enumerate(PATHS.items())
     for command in [
@@ -243,7 +243,7 @@ OURS = (
         "a run into where the current folder is",
         (*RUN, "--out", "../here"),
         SCENE,
-        says="where you are",
+        says="is the current folder",
     ),
 )
 
