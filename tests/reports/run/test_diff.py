@@ -1,7 +1,6 @@
 """`crosscheck diff`: what got worse between two runs is found, what did not is not; scripts can
 tell by the exit."""
 
-import json
 import random
 import shutil
 from collections.abc import Callable
@@ -19,11 +18,12 @@ from reports.page.report import make_report
 from reports.run import suite
 from reports.run.cells import digest
 from reports.run.diff import Timing, difference, timing
-from reports.run.journal import JOURNAL, Journal, lines_of
+from reports.run.journal import Journal
 from reports.run.suite import carry_out
 from reports.run.tables import seal_of
 from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
+from tests.reports.run.journals import contents, put
 
 PLAN = RunPlan(
     ["slow_collision", "near_miss"],
@@ -59,10 +59,10 @@ def after(before: Path, tmp_path: Path) -> Path:
 
 def edit(folder: Path, change: Callable[[dict], None]) -> None:
     """Change every line of a journal."""
-    lines = list(lines_of(folder))
+    lines = contents(folder)
     for line in lines:
         change(line)
-    (folder / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in lines))
+    put(folder, lines)
 
 
 def put_table(table: pd.DataFrame, folder: Path) -> None:
@@ -94,7 +94,7 @@ def test_the_numbers_do_not_depend_on_workers_or_order(
     monkeypatch.setattr(suite, "tasks_of", shuffled)
     again = run(tmp_path / "again", workers=1)
     cells = [
-        [line["cell"] for line in lines_of(folder) if "cell" in line] for folder in (before, again)
+        [line["cell"] for line in contents(folder) if "cell" in line] for folder in (before, again)
     ]
 
     assert cells[0] != cells[1]
@@ -174,9 +174,8 @@ def test_where_versions_differ_the_metric_says_what_is_worse(
 def test_a_cell_that_fails_now_or_is_gone_is_worse(before: Path, after: Path):
     """One crashed, one missing: two changes, exit 1; the other way round they are better or
     nothing."""
-    cells = [line for line in lines_of(after) if "cell" in line]
-    kept = [line for line in lines_of(after) if line.get("cell") != cells[0]["cell"]]
-    (after / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in kept))
+    cells = [line for line in contents(after) if "cell" in line]
+    put(after, [line for line in contents(after) if line.get("cell") != cells[0]["cell"]])
     edit(
         after,
         lambda line: (
