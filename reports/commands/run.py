@@ -134,7 +134,7 @@ def plan_of(folder: Path, part: Path) -> RunPlan:
     `part`: the path of `folder` during the run. Exits 2 if a scene file or a solver's file is at
     fault.
     """
-    header = {"folder": os.getcwd()} | Archive.read(folder).header
+    header = Archive.read(folder).header
     files = {
         scene: file_of(scene, folder, header)
         for scene in header["scenes"]

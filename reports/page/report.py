@@ -112,7 +112,7 @@ def made_report(
         about=header | {"seconds": archive.seconds, "unfinished": unfinished(archive)},
         clock=RunTimes(tables.timed, noise_floor(archive), header["timings"]),
         lessons=lessons,
-        said={name: with_lines(one["says"], one.get("shown", [])) for name, one in checks.items()},
+        said={name: with_lines(one["says"], one["shown"]) for name, one in checks.items()},
         on_paper=on_paper,
     )
     says = {name: one["says"] for name, one in checks.items()}

@@ -1,7 +1,7 @@
 """The files of a run, read back; everything is made from the journal and the trajectories.
 
 journal.jsonl   a header, a line for each cell when it ends, a footer; a resumed run adds another
-                header and footer; run_lines.py defines the lines
+                header and footer; `LINES` has what a line holds
 trajectories/   an .npz for each cell, with the fields of `Trajectory` as keys; of a failed cell up
                 to its last good state. The line of the cell has the file's digest: a file that
                 does not match it is not used
@@ -22,15 +22,36 @@ from typing import Any
 
 from adapters.run import Run
 from reports.run.cells import digest
-from reports.run.journal import JOURNAL
-from reports.run.journal_lines import checked_lines, no_use
-from reports.run.run_lines import KINDS
+from reports.run.journal import JOURNAL, lines_of, unusable
 from reports.run.trajectories import load_trajectory
 from scenarios.model import Trajectory
 from scenarios.regular import all_of
 
-# subject of a line -> its number, and the line
-Numbered = dict[Hashable, tuple[int, dict[str, Any]]]
+LINES = {
+    # the request, and the versions that played it
+    "header": (
+        *("command", "seed", "started", "versions", "machine"),
+        *("scenes", "engines", "dts", "full", "timings", "folder", "names", "tasks"),
+    ),
+    # how a cell ended, as `keep_cell` of results.py writes it
+    "cell": (
+        *("scene_hash", "scene", "seed", "substeps", "scenario", "engine", "profile", "dt_s"),
+        *("status", "reason", "step", "until_s", "seconds", "timeout_s", "outside", "file"),
+        *("settings", "versions"),
+    ),
+    # the findings of the probes of an engine; a known answer, with the number computed here; the
+    # verdict of `crosscheck check` on a solver's file
+    "conformance": ("of", "key"),
+    "known_answer": ("of", "key", "column", "dt_s", "published_J2", "made_by", "source", "ours_J2"),
+    "checked": ("of", "key", "passed", "says", "shown"),
+    # the cost of a cell in the first `timed_s` of its scenario, s per simulated second, a number
+    # for each round; and the part spent in Python on wrapping disks at the edges
+    "timing": ("copy", "timed_s", "cost", "wrapping"),
+    # an overhead of an engine, as `stepping.overheads` times it, s, a number for each round
+    "overhead": ("of", "scenario", "cost"),
+    "footer": ("tasks", "played", "seconds"),
+}
+"""The kinds of lines of a run's journal -> what they hold."""
 
 
 @dataclass(frozen=True)
@@ -67,41 +88,39 @@ class Archive:
         """Read the journal of a folder, once; raises `ValueError`, naming the line, if it cannot be
         used."""
         header: dict[str, Any] = {}
-        last: dict[str, Numbered] = {
-            kind: {} for kind in ("cell", "conformance", "known_answer", "checked")
+        cells: dict[Hashable, tuple[int, dict[str, Any]]] = {}
+        about: dict[str, dict[str, dict[str, Any]]] = {
+            kind: {} for kind in ("conformance", "known_answer", "checked")
         }
         timings: dict[str, dict[int, dict[str, Any]]] = {}
         overheads: dict[tuple[str, str, str], list[float]] = {}
         seconds, complete = 0.0, False
-        for number, kind, line in checked_lines(folder, KINDS):
+        for number, kind, line in lines_of(folder, LINES):
             complete = kind == "footer"
             if complete:
                 seconds += line["footer"]["seconds"]
             elif kind == "header":
                 header = line["header"]
+            elif kind == "cell":
+                cells[what_of(line)] = number, line
             elif kind == "timing":
                 timings.setdefault(line["timing"], {})[line["copy"]] = line
             elif kind == "overhead":
                 overheads[line["overhead"], line["of"], line["scenario"]] = line["cost"]
             else:
-                last[kind][what_of(line) if kind == "cell" else line["of"]] = number, line
+                about[kind][line["of"]] = line
         if not header:
             raise ValueError(f"{folder / JOURNAL}: has no header, so nothing was played")
-        for number, record in last["cell"].values():
-            if fault := foreign_cell(record, header):
-                raise ValueError(no_use(folder, number, fault, KINDS.missed))
-        records, conformance, known, checked = (
-            [line for _, line in last[kind].values()] for kind in last
-        )
-        records = [as_found(folder, record) for record in records]
-        by_engine = {line["of"]: line for line in conformance}
+        for number, record in cells.values():
+            if not is_of_run(record, header):
+                raise unusable(folder, number, "is of another run")
         return Archive(
             folder,
             header,
-            records,
-            by_engine,
-            known,
-            {line["of"]: line for line in checked},
+            [as_found(folder, record) for _, record in cells.values()],
+            about["conformance"],
+            list(about["known_answer"].values()),
+            about["checked"],
             timings,
             overheads,
             seconds if complete else float("nan"),
@@ -114,17 +133,12 @@ def what_of(record: dict[str, Any]) -> tuple[Any, ...]:
     return tuple(record[name] for name in ("scene", "seed", "engine", "profile", "substeps"))
 
 
-def foreign_cell(record: dict[str, Any], header: dict[str, Any]) -> str:
-    """Why the line of a cell does not belong to its run; "" if it does."""
-    name = f"{record['engine']}:{record['profile']}"
-    if record["scene"] not in header["scenes"]:
-        return f"scene = {record['scene']!r}: must be one of the scenes of the header"
-    if name not in header["engines"]:
-        return f"engine = {name!r}: must be one of the engines of the header"
+def is_of_run(record: dict[str, Any], header: dict[str, Any]) -> bool:
+    """Whether the line of a cell belongs to the run: somebody may have joined two journals."""
     return (
-        ""
-        if record["seed"] == header["seed"]
-        else f"seed = {record['seed']}: must be that of the header"
+        record["scene"] in header["scenes"]
+        and f"{record['engine']}:{record['profile']}" in header["engines"]
+        and record["seed"] == header["seed"]
     )
 
 

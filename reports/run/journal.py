@@ -1,5 +1,9 @@
-"""The journal of a run: a line of JSON for each task that ends. One process at a time writes it;
-any process may read it."""
+"""The journal of a command: a line of JSON for each task that ends. One process at a time writes
+it; any process may read it.
+
+The first key of a line is its kind. The last, `sum`, is a digest of the text before it, so that a
+line that was torn or edited is noticed.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,14 @@ import contextlib
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adapters.system import BINARY, lock
+from reports.run.cells import digest
 from scenarios.regular import opened
 
 JOURNAL = "journal.jsonl"
@@ -68,7 +73,7 @@ class Journal:
     def append(self, line: dict[str, Any]) -> None:
         """Append a line and flush it. If that fails, raises `OSError` and leaves no part of the
         line."""
-        text = (json.dumps(plain(line), allow_nan=False) + "\n").encode()
+        text = written(line)
         before = os.fstat(self.file).st_size
         try:
             while text:
@@ -79,21 +84,75 @@ class Journal:
             raise
 
 
-def lines_of(folder: Path, missed: str = "delete that line") -> Iterator[Any]:
-    """The lines of a folder's journal without an incomplete last line.
+def written(line: Mapping[str, Any]) -> bytes:
+    """A line as it stands in a journal, with its `sum`."""
+    text = json.dumps(plain(line), allow_nan=False).removesuffix("}").encode()
+    return text + end_of(text)
+
+
+def end_of(text: bytes) -> bytes:
+    """The end of the line that begins with this text."""
+    return f', "sum": "{digest(text)}"}}\n'.encode()
+
+
+END = len(end_of(b""))
+
+
+def lines_of(
+    folder: Path, kinds: Mapping[str, Collection[str]]
+) -> Iterator[tuple[int, str, dict[str, Any]]]:
+    """Number, kind and content of each line of a folder's journal, the header first. An incomplete
+    last line is left out.
+
+    kinds: kind -> the names that such a line has, itself or in its first value.
 
     Raises:
-        ValueError: another line is not JSON; names it, and adds `missed`, which says what to do.
+        ValueError: a line is not what was written, or another version has written it; says which
+            line, and what to do.
     """
     with opened(folder / JOURNAL) as journal:
         for number, line in enumerate(journal, start=1):
-            try:
-                yield json.loads(line.decode())  # because null bytes would be read as UTF-32
-            except (ValueError, RecursionError) as error:  # raised by deeply nested brackets
-                if line.endswith(b"\n"):
-                    raise ValueError(
-                        f"{folder / JOURNAL}: line {number}: is not JSON: {error}; {missed}"
-                    ) from error
+            if not line.endswith(b"\n"):
+                return
+            text = line[:-END]
+            if line != text + end_of(text):
+                without_sum = number == 1 and parsed(line).keys() == {"header"}
+                raise (of_another_version if without_sum else unusable)(folder, number)
+            content = parsed(text + b"}")
+            kind, value = next(iter(content.items()), ("", None))
+            if number == 1 and kind != "header":
+                raise unusable(folder, number)
+            names = {*content, *(value if isinstance(value, dict) else ())}
+            if kind not in kinds or not names.issuperset(kinds[kind]):
+                raise of_another_version(folder, number)
+            yield number, kind, content
+
+
+def parsed(line: bytes) -> dict[str, Any]:
+    """The table in a line of JSON; an empty one if there is none."""
+    try:
+        content = json.loads(line)
+    except (ValueError, RecursionError):  # the last is raised by deeply nested brackets
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def of_another_version(folder: Path, number: int) -> ValueError:
+    """That another version has written a line."""
+    return ValueError(
+        f"{folder / JOURNAL}: line {number}: was written by another version of crosscheck; run it"
+        " again"
+    )
+
+
+def unusable(folder: Path, number: int, why: str = "is not what was written") -> ValueError:
+    """That a line cannot be used, why, and what to do."""
+    remedy = (
+        "delete that line, and --resume plays again what it was of"
+        if number > 1
+        else "without it the plan is not known: run it again"
+    )
+    return ValueError(f"{folder / JOURNAL}: line {number}: {why}; {remedy}")
 
 
 def plain(value: Any) -> Any:
@@ -108,12 +167,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value
-
-
-def numbers(value: Any) -> Any:
-    """The inverse of `plain`: "nan", "inf" and "-inf" become numbers again, at any depth."""
-    if isinstance(value, dict):
-        return {key: numbers(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [numbers(item) for item in value]
-    return float(value) if value in ("nan", "inf", "-inf") else value

@@ -9,7 +9,6 @@ from typing import Any
 
 from reports.run.archive import stored_scene
 from reports.run.cells import scene_hash
-from reports.run.journal import JOURNAL
 from reports.terminal.exits import Unusable
 from scenarios.catalogue import SCENARIOS
 from scenarios.catalogue import scenario as from_catalogue
@@ -26,8 +25,8 @@ def open_scene(scene: str, seed: int) -> Scenario:
 
 
 def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
-    """The scenario of a cell, given its line in the run of `folder`; raises `Unusable` if the line
-    does not fit the scene."""
+    """The scenario of a cell, given its line in the run of `folder`; raises `Unusable` if it has
+    changed since."""
     scene = (
         record["scene"]
         if record["scene"] in SCENARIOS
@@ -39,30 +38,16 @@ def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
             f"{scenario.name} has changed since it was played; crosscheck run --resume"
             " plays it again"
         )
-    must_fit(folder, scenario, record)
     return scenario
 
 
-def must_fit(folder: Path, scenario: Scenario, record: dict[str, Any]) -> None:
-    """Raise `Unusable` if the line of a cell does not fit the scenario."""
-    for name, value in {"scenario": scenario.name, "dt_s": scenario.dt(record["substeps"])}.items():
-        if record[name] != value:
-            raise Unusable(
-                f"{folder / JOURNAL}: the line of the cell {record['cell']}: {name} ="
-                f" {record[name]!r}: must be {value!r}, that of {record['scene']} with"
-                f" {record['substeps']} substeps; delete that line"
-            )
-
-
 def scenario_of(folder: Path, records: Records) -> Scenario:
-    """The scenario of a scene's cells, with the step sizes played; raises `Unusable` if the line of
-    a cell does not fit the present scene."""
+    """The scenario of a scene's cells, with the step sizes played; raises `Unusable` if it has
+    changed since."""
     [scenario] = [
         played_scenario(folder, record)
         for record in {one["scene_hash"]: one for one in records}.values()
     ]
-    for record in records:
-        must_fit(folder, scenario, record)
     return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
 
 

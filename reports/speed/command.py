@@ -20,7 +20,6 @@ from reports.run.folders import discard, given_back, open_part, place_of, replac
 from reports.run.journal import Journal
 from reports.run.machine import about
 from reports.run.made import FolderKind, digest_of, writing
-from reports.run.scenes import open_scene
 from reports.speed import figures
 from reports.speed.effort import FULL, QUICK
 from reports.speed.explained import sentence
@@ -107,12 +106,8 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume
         "effort": asdict(plan.effort),
         "whole": plan.whole,
     }
-    scenarios = {scene: open_scene(scene, seed) for scene, seed in plan.seeded_scenes}
     return Kept(
-        journal,
-        asked | {key: header[key] for key in ("seed", "versions", "machine")},
-        resume,
-        scenarios,
+        journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume
     )
 
 

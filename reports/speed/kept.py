@@ -5,14 +5,20 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from typing import Any
 
 from reports.run.folders import may_go_on
-from reports.run.journal import Journal, plain
-from reports.run.journal_lines import checked_lines, no_use
-from reports.speed.lines import KINDS, misfit, numbered
-from scenarios.model import Scenario
+from reports.run.journal import Journal, lines_of, plain
+
+LINES = {"header": (), "task": ("result",)}
+"""The kinds of lines of the journal -> what they hold: the measurement that was asked for; a task,
+and what it gave: rows as `ladder.errors_of`, `budget.budget_of`, `measure.sample_row`,
+`cheapest.closed_form` and `measure.size_rows` return them."""
+TEXT = {
+    *("scenario", "engine", "profile", "kind", "change", "status", "reason"),
+    *("contribution", "note", "truth", "stopped"),
+}
+"""The columns of results that hold text, which may be "nan"."""
 
 
 class Kept:
@@ -23,44 +29,24 @@ class Kept:
     that are not finite.
     """
 
-    def __init__(
-        self,
-        journal: Journal,
-        header: dict[str, Any],
-        resume: bool,
-        scenarios: Mapping[str, Scenario],
-    ) -> None:
-        """Go on, if `resume` and the journal is of a measurement with the very same `header`, of
-        these `scenarios`.
+    def __init__(self, journal: Journal, header: dict[str, Any], resume: bool) -> None:
+        """Go on, if `resume` and the journal is of a measurement with the very same `header`.
 
         Raises:
             FolderTaken: as `may_go_on`.
-            ValueError: naming a line of the journal that does not fit.
+            ValueError: as `lines_of`.
         """
         self.journal, folder = journal, journal.path.parent
-        lines = []
-        for number, kind, line in checked_lines(folder, KINDS):
-            if kind != "header" and number == 1:
-                raise ValueError(
-                    no_use(folder, number, "the first line must be the header", KINDS.asked)
-                )
-            if kind == "header" and number > 1:
-                raise ValueError(
-                    no_use(folder, number, "only the first line may be the header", KINDS.missed)
-                )
-            lines.append(line)
-        header_before, tasks = (lines[0]["header"], lines[1:]) if lines else (None, [])
-        same = header_before == json.loads(json.dumps(plain(header)))
+        lines = [line for _, _, line in lines_of(folder, LINES)]
+        headers = [line["header"] for line in lines if "header" in line]
+        tasks = [line for line in lines if "task" in line]
+        # two, if somebody has joined two journals
+        same = headers == [json.loads(json.dumps(plain(header)))]
         may_go_on(folder, len(tasks), same, resume)
-        self.results: dict[str, Any] = {}
+        self.results = {json.dumps(line["task"]): line["result"] for line in tasks if same}
         if not same:
             os.truncate(journal.path, 0)
             journal.append({"header": header})
-            return
-        for number, line in enumerate(tasks, start=2):
-            if fault := misfit(line, scenarios):
-                raise ValueError(no_use(folder, number, fault, KINDS.missed))
-            self.results[json.dumps(line["task"])] = line["result"]
 
     def __len__(self) -> int:
         """The number of tasks that the interrupted measurement finished."""
@@ -77,3 +63,13 @@ class Kept:
     def add(self, task: tuple[Any, ...], result: Any) -> None:
         """Store the result of a task."""
         self.journal.append({"task": task, "result": result})
+
+
+def numbered(value: Any) -> Any:
+    """The inverse of `plain`: "nan", "inf" and "-inf" become numbers again, except in columns of
+    text."""
+    if isinstance(value, dict):
+        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [numbered(item) for item in value]
+    return float(value) if value in ("nan", "inf", "-inf") else value

@@ -19,8 +19,7 @@ import pandas as pd
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, OWN
 from adapters.npm_packages import version_of
-from reports.run.journal import JOURNAL, Journal, plain
-from reports.run.journal_lines import checked_lines, no_use
+from reports.run.journal import Journal, lines_of, of_another_version, plain, unusable
 from reports.run.machine import about
 from reports.run.made import digest_of, writing
 from reports.run.runner import run_all
@@ -29,7 +28,6 @@ from reports.stability.cases import CASES
 from reports.stability.explain import explained, with_replays
 from reports.stability.failures import keep_failure
 from reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
-from reports.stability.lines import KINDS, impossible, unknown_engine
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import LimitSearch
 from reports.stability.touching import TOUCHING, LawOf, law_of
@@ -59,6 +57,14 @@ COLUMNS = (
     "event",
     "form",
 )
+LINES = {
+    "header": ("seed", "started", "versions", "machine", "form", "files"),
+    "task": (),
+    "footer": ("tasks", "seconds"),
+}
+"""The kinds of lines of the journal -> what they hold: what was asked for, and the versions that
+played it; a `Task`, with a `Limit`, a `MapOf` or a `LawOf` under the name of its kind; how much was
+done."""
 TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one engine
 SLOWEST_FIRST = (
     "long_gas",
@@ -214,9 +220,7 @@ def read(folder: Path) -> StabilityResults:
     cannot be used."""
     headers, results = journalled(folder)
     order = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
-    engines = list(
-        dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case, ENGINES))
-    )
+    engines = engines_now()
 
     def place(task: Task) -> tuple[int, str, int]:
         return order.get(task.name, len(order)), task.name, engines.index(task.engine)
@@ -233,7 +237,7 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
     the later one counts.
 
     Raises:
-        ValueError: with the line that does not fit.
+        ValueError: as `lines_of`, or a line is of an engine that is not asked for.
     """
     made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
         "limit": limit_from,
@@ -242,30 +246,26 @@ def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | M
     }
     headers: list[dict[str, Any]] = []
     results: dict[Task, Limit | MapOf | LawOf] = {}
-    for number, kind, line in checked_lines(folder, KINDS):
+    engines = engines_now()
+    for number, kind, line in lines_of(folder, LINES):
         if kind == "header":
             headers.append(line["header"])
         elif kind == "task":
-            task = Task(**line["task"])
-            result = made[task.kind](line[task.kind])
-            files = headers[-1]["files"] if headers else {}
-            if fault := unknown_engine(result, files) or wrong(result, files):
-                raise ValueError(no_use(folder, number, fault, KINDS.missed))
-            results[task] = result
-    if results and not headers:
-        raise ValueError(f"{folder / JOURNAL}: has no header; {KINDS.asked}")
+            try:
+                task = Task(**line["task"])
+                results[task] = made[task.kind](line[task.kind])
+            except (KeyError, TypeError, ValueError):
+                raise of_another_version(folder, number) from None
+            if task.engine not in engines:  # an engine's own file
+                raise unusable(folder, number, f"is of {task.engine}, which is not asked for")
     return headers, results
 
 
-def wrong(result: Limit | MapOf | LawOf, files: Mapping[str, str]) -> str:
-    """As `impossible`, for a limit whose case is known; a scene file that has changed since is
-    not checked."""
-    if not isinstance(result, Limit):
-        return ""
-    path = "" if result.case in CASES else result.case.rpartition(":")[0]
-    if path and digest_of(path) != files[path]:
-        return ""
-    return impossible(result, case_named(result.case))
+def engines_now() -> list[str]:
+    """The engines of all cases in reading order, with those of the plan."""
+    return list(
+        dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case, ENGINES))
+    )
 
 
 def limit_from(record: dict[str, Any]) -> Limit:

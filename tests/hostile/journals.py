@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from tests.hostile.played import Input
-from tests.hostile.small_run import CELL, copied, edited, lines_of, torn, write
+from tests.hostile.small_run import CELL, copied, edited, torn
+from tests.reports.run.journals import contents, put
 
 REPORT, DIFF, REPLAY = (
     ("report", "out"),
@@ -89,9 +90,6 @@ OTHERS: dict[str, tuple[str, tuple[Any, ...], Any]] = {
     "a footer that is text": ("footer", ("footer",), "the end"),
     "seconds before the beginning": ("footer", ("footer", "seconds"), -1.0),
 }
-# A sum that is another is no fault of the journal: the cell is as good as not played, which one
-# says, or mends.
-HEALED = {"a file with another sum": {REPORT: (0, 1), DIFF: (1,), REPLAY: (0, 1, 2), RESUME: (0,)}}
 WRITES = ("out", "out.part")
 
 
@@ -101,11 +99,7 @@ def refused() -> list[Input]:
         (f"header: {what}", "header", ("header", *at), value)
         for what, (at, value) in HEADER.items()
     ]
-    edits += [
-        (f"cell: {what}", "cell", at, value)
-        for what, (at, value) in CELLS.items()
-        if what not in HEALED
-    ]
+    edits += [(f"cell: {what}", "cell", at, value) for what, (at, value) in CELLS.items()]
     edits += [(what, *edit) for what, edit in OTHERS.items()]
     return [
         Input(
@@ -231,26 +225,36 @@ def gone(name: str, here: Path) -> None:
 
 def twice(here: Path) -> None:
     """Every line is there two times."""
-    lines = lines_of(here / "out" / JOURNAL)
-    write(here / "out", [line for line in lines for _ in (1, 2)])
+    put(here / "out", [line for line in contents(here / "out") for _ in (1, 2)])
 
 
 def backwards(here: Path) -> None:
     """The last line is the first."""
-    write(here / "out", lines_of(here / "out" / JOURNAL)[::-1])
+    put(here / "out", contents(here / "out")[::-1])
 
 
 def older(here: Path) -> None:
     """Another version has written it."""
-    lines = lines_of(here / "out" / JOURNAL)
+    lines = contents(here / "out")
     lines[0]["header"]["versions"]["crosscheck2d"] = "0.0.1"
-    write(here / "out", lines)
+    put(here / "out", lines)
 
 
 def indented(here: Path) -> None:
     """Somebody's editor has made it beautiful."""
-    lines = lines_of(here / "out" / JOURNAL)
+    lines = contents(here / "out")
     (here / "out" / JOURNAL).write_text("\n".join(json.dumps(line, indent=2) for line in lines))
+
+
+def without_sums(here: Path) -> None:
+    """A version before there were sums has written it."""
+    lines = contents(here / "out")
+    (here / "out" / JOURNAL).write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+
+
+def of_a_kind_to_come(here: Path) -> None:
+    """A version after this one has written it."""
+    put(here / "out", [*contents(here / "out"), {"friction": 1}])
 
 
 WHOLE: dict[str, tuple[Callable[[Path], None], tuple[str, ...], tuple[int, ...]]] = {
@@ -263,10 +267,14 @@ WHOLE: dict[str, tuple[Callable[[Path], None], tuple[str, ...], tuple[int, ...]]
     "the copies of scenes are gone, report": (partial(gone, "scenes/*"), REPORT, (0, 2)),
     "every line twice, report": (twice, REPORT, (0,)),
     "every line twice, resume": (twice, RESUME, (0,)),
-    "the last line first, report": (backwards, REPORT, (0, 2)),
+    "the last line first, report": (backwards, REPORT, (2,)),
     "lines that an editor has broken, diff": (indented, DIFF, (2,)),
     "another version, resume": (older, RESUME, (0, 1, 2)),
     "another version, diff": (older, DIFF, (0,)),
+    "an earlier version, report": (without_sums, REPORT, (2,)),
+    "an earlier version, resume": (without_sums, RESUME, (2,)),
+    "a later version, diff": (of_a_kind_to_come, DIFF, (2,)),
+    "a later version, replay": (of_a_kind_to_come, REPLAY, (2,)),
 }
 TABLES = [
     Input(
@@ -296,17 +304,6 @@ JOURNALS = (
     *(
         Input(what, words, prepare=copied("before", "out", then=do), codes=codes, writes=WRITES)
         for what, (do, words, codes) in WHOLE.items()
-    ),
-    *(
-        Input(
-            f"cell: {what}, {words[0]}",
-            words,
-            prepare=edited("cell", *CELLS[what]),
-            codes=codes,
-            writes=WRITES,
-        )
-        for what, by_command in HEALED.items()
-        for words, codes in by_command.items()
     ),
     Input(
         "replay: a cell that is not there",

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.hostile.played import CROSSCHECK
+from tests.reports.run.journals import contents, put
 
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
 MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is
@@ -41,27 +42,16 @@ def finished_run() -> Path:
     return Path(os.environ[MADE])
 
 
-def lines_of(journal: Path) -> list[dict[str, Any]]:
-    """The lines of a journal."""
-    return [json.loads(line) for line in journal.read_text().splitlines()]
-
-
 def copy(here: Path, *names: str) -> dict[str, str]:
     """Set copies of the run into a folder, as if it had been made there, with its scene file."""
     made = finished_run()
-    lines = lines_of(made / "journal.jsonl")
+    lines = contents(made)
+    lines[0]["header"]["folder"] = str(here)
     for name in names:
         shutil.copytree(made, here / name)
-        if "folder" in lines[0]["header"]:
-            lines[0]["header"]["folder"] = str(here)
-        write(here / name, lines)
+        put(here / name, lines)
     (here / "two.toml").write_text(TWO)
     return {CELL: next(line["cell"] for line in lines if "cell" in line)}
-
-
-def write(out: Path, lines: list[Any]) -> None:
-    """Write a journal."""
-    (out / "journal.jsonl").write_text("".join(f"{json.dumps(line)}\n" for line in lines))
 
 
 def copied(*names: str, then: Callable[[Path], object] | None = None) -> Prepare:
@@ -79,19 +69,20 @@ def _copied(
 
 
 def edited(kind: str, at: tuple[Any, ...], value: Any) -> Prepare:
-    """A copy `out` of the run in which one thing in the first line of a kind is another, and a
-    whole one, `before`."""
+    """A copy `out` of the run in which one thing in the first line of a kind is another, while its
+    sum stays; and a whole one, `before`."""
     return partial(_edited, kind, at, value)
 
 
 def _edited(kind: str, at: tuple[Any, ...], value: Any, here: Path) -> dict[str, str]:
     words = copy(here, "before", "out")
-    lines = lines_of(here / "out" / "journal.jsonl")
+    journal = here / "out" / "journal.jsonl"
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
     inner: Any = next(line for line in lines if kind in line)
     for key in at[:-1]:
         inner = inner[key]
     inner[at[-1]] = value
-    write(here / "out", lines)
+    journal.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
     return words
 
 

@@ -1,7 +1,6 @@
 """`crosscheck diff`: what got worse between two runs is found, what did not is not; scripts can
 tell by the exit."""
 
-import json
 import math
 import random
 import shutil
@@ -20,11 +19,12 @@ from reports.page.report import make_report
 from reports.run import suite
 from reports.run.cells import digest
 from reports.run.diff import ROUNDING, Timing, difference, is_rounding, timing
-from reports.run.journal import JOURNAL, Journal, lines_of
+from reports.run.journal import Journal
 from reports.run.suite import carry_out
 from reports.run.tables import seal_of
 from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
+from tests.reports.run.journals import contents, put
 
 PLAN = RunPlan(
     ["slow_collision", "near_miss"],
@@ -60,10 +60,10 @@ def after(before: Path, tmp_path: Path) -> Path:
 
 def edit(folder: Path, change: Callable[[dict], None]) -> None:
     """Change every line of a journal."""
-    lines = list(lines_of(folder))
+    lines = contents(folder)
     for line in lines:
         change(line)
-    (folder / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in lines))
+    put(folder, lines)
 
 
 def elsewhere(line: dict) -> None:
@@ -101,7 +101,7 @@ def test_the_numbers_do_not_depend_on_workers_or_order(
     monkeypatch.setattr(suite, "tasks_of", shuffled)
     again = run(tmp_path / "again", workers=1)
     cells = [
-        [line["cell"] for line in lines_of(folder) if "cell" in line] for folder in (before, again)
+        [line["cell"] for line in contents(folder) if "cell" in line] for folder in (before, again)
     ]
 
     assert cells[0] != cells[1]
@@ -234,7 +234,7 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
 
     theirs = {
         line["cell"]
-        for line in lines_of(after)
+        for line in contents(after)
         if "cell" in line and line["scenario"] == "near_miss"
     }
 
@@ -264,9 +264,8 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
 def test_a_cell_that_fails_now_or_is_gone_is_worse(before: Path, after: Path):
     """One crashed, one missing: two changes, exit 1; the other way round they are better or
     nothing."""
-    cells = [line for line in lines_of(after) if "cell" in line]
-    kept = [line for line in lines_of(after) if line.get("cell") != cells[0]["cell"]]
-    (after / JOURNAL).write_text("".join(json.dumps(line) + "\n" for line in kept))
+    cells = [line for line in contents(after) if "cell" in line]
+    put(after, [line for line in contents(after) if line.get("cell") != cells[0]["cell"]])
     edit(
         after,
         lambda line: (

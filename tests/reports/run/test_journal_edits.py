@@ -1,266 +1,304 @@
-"""A journal that somebody edited is refused by line or used, by every command that reads one: never
-a traceback."""
+"""A journal that somebody edited, that was torn or that another version has written is refused by
+line, by every command that reads one: never a traceback."""
 
-import copy
 import json
-import random
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable
+from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from reports.run.archive import Archive
-from reports.run.journal import JOURNAL
-from reports.run.journal_lines import kind_of
-from reports.run.run_lines import KINDS
+from adapters.engines import row_of
+from reports.run.archive import LINES, Archive
+from reports.run.journal import JOURNAL, Journal, end_of, written
+from reports.run.machine import about
+from reports.run.made import digest_of, read_made
+from reports.speed import budget, cheapest
+from reports.speed.kept import TEXT, Kept
+from reports.speed.measure import in_turns, scene_rows
+from reports.speed.plan import PLAIN, SCENE, Measurement
+from reports.stability.limits import Limit
+from reports.stability.maps import MAPS, MapOf
+from reports.stability.results import Task, found_limit, journalled
+from reports.stability.touching import law_of
+from reports.terminal.exits import FolderTaken
+from tests.reports.run.journals import contents, put
 from tests.reports.run.small_runs import make
-from tests.reports.terminal.command_line import Done, crosscheck
+from tests.reports.terminal.command_line import crosscheck
 
-GONE = object()
-DEEP = json.loads("[" * 60 + "]" * 60)
-WRONG: dict[str, Any] = {
-    "null": None,
-    "true": True,
-    "negative": -1,
-    "zero": 0,
-    "half": 0.5,
-    "huge": 1e308,
-    "400 digits": 10**400,
-    "not a number": float("nan"),
-    "infinite": float("inf"),
-    "nan as text": "nan",
-    "empty": "",
-    "path": "../../../x",
-    "another name": "other",
-    "long": "x" * 5000,
-    "escape codes": "a\x1b[31mb\r",
-    "surrogate": "\udcff",
-    "null byte": "a\0b",
-    "markup": "[/nope]",
-    "colon": "a:b",
-    "list": ["x"],
-    "empty list": [],
-    "deep": DEEP,
-    "empty table": {},
-    "table": {"a": {"b": [1]}},
-    "missing": GONE,
-}
-SAMPLE = 30  # edits that are taken, and are put to all commands in the long test
+NAME = "reference:exercise"
+HEADER = {
+    "scenes": ["slow_collision"],
+    "files": {},
+    "engines": [NAME],
+    "effort": {"rounds": 1},
+    "whole": False,
+} | {key: value for key, value in about("", 0).items() if key in ("seed", "versions", "machine")}
+DAMAGED, OTHER = "is not what was written", "was written by another version of crosscheck"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run in which nothing is wrong."""
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run in which nothing is wrong, with a line of every kind."""
     place = tmp_path_factory.mktemp("edits")
-    scene = Path(
-        shutil.copy(
-            Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml", place / "two.toml"
+    scene = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
+    made = make(place / "made", Path(shutil.copy(scene, place / "two.toml")))
+    check = {"passed": False, "says": ["No."], "shown": [[]]}
+    *lines, footer = contents(made)
+    return put(made, [*lines, {"checked": check, "of": "mine.js:own", "key": ""}, footer])
+
+
+@pytest.fixture(scope="module")
+def speed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The journal of a measurement: a ladder, what its error is made of, times and a closed
+    form."""
+    place = tmp_path_factory.mktemp("speed")
+    engine = Measurement(SCENE, "slow_collision", 0, NAME, PLAIN, row_of(NAME).make, (1, 2, 4))
+    with Journal(place) as journal:
+        kept = Kept(journal, HEADER, False)
+        kept.add(engine.task, engine.errors())
+        kept.add(("budget", "slow_collision", NAME), budget.budget_of("slow_collision", 0, NAME, 2))
+        often = {"rounds": 1, "budget": 0.0}
+        kept.add(
+            ("time", SCENE, "slow_collision"),
+            scene_rows(SCENE, "slow_collision", 0, in_turns([engine]), often),
         )
-    )
-    return with_check(make(place / "made", scene))
+        kept.add(("time", "truth", "slow_collision"), cheapest.closed_form("slow_collision", 0))
+    return place
 
 
-def with_check(folder: Path) -> Path:
-    """A run in whose journal the check of a solver's file stands, too, which none of these takes
-    part in."""
-    lines = (folder / JOURNAL).read_text().splitlines()
-    check = {"checked": {"passed": False, "says": ["No."]}, "of": "mine.js:own", "key": "0" * 16}
-    (folder / JOURNAL).write_text("\n".join([*lines[:-1], json.dumps(check), lines[-1], ""]))
-    return folder
+@pytest.fixture(scope="module")
+def stability(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The journal of a search: a limit, a law, and a map whose readings are all alike."""
+    place = tmp_path_factory.mktemp("stability")
+    (place / "trajectories").mkdir()
+    one = MAPS["dt_and_speed"]
+    tasks = [
+        Task(kind, name, "pymunk:matched", "quick")
+        for kind, name in (("limit", "spin"), ("law", "touching_break"), ("map", one.name))
+    ]
+    cells = tuple((x, y, 0.1, False, "") for x, y in product(one.x, one.y))
+    found = [
+        found_limit(tasks[0], place),
+        law_of(tasks[1].name, tasks[1].engine),
+        MapOf(one.name, tasks[2].engine, cells),
+    ]
+    with Journal(place) as journal:
+        journal.append({"header": about("", 0) | {"form": "quick", "files": {}}})
+        for task, result in zip(tasks, found):
+            journal.append({"task": asdict(task), task.kind: asdict(result)})
+        journal.append({"footer": {"tasks": 3, "seconds": 1.0}})
+    return place
 
 
-def places(value: Any, at: tuple = ()) -> Iterator[tuple]:
-    """Where a line may be edited: every key of every table in it, and the first two items of every
-    list."""
-    if at:
-        yield at
-    items = (
-        value.items()
-        if isinstance(value, dict)
-        else enumerate(value[:2])
-        if isinstance(value, list)
-        else ()
-    )
-    for key, item in items:
-        yield from places(item, (*at, key))
+def resumed(folder: Path) -> Kept:
+    """What `speed --resume` makes of a journal before it measures."""
+    with Journal(folder) as journal:
+        return Kept(journal, HEADER, True)
 
 
-def edited(line: dict[str, Any], at: tuple, value: Any) -> dict[str, Any]:
-    """A copy of the line with another value there, or none."""
-    new = copy.deepcopy(line)
-    inner = new
-    for key in at[:-1]:
-        inner = inner[key]
-    if value is GONE:
-        del inner[at[-1]]
-    else:
-        inner[at[-1]] = value
-    return new
+READ: dict[str, Callable[[Path], Any]] = {
+    "run": Archive.read,
+    "speed": resumed,
+    "stability": journalled,
+}
 
 
-def edits(folder: Path) -> Iterator[tuple[int, dict[str, Any], str]]:
-    """(Number of a line, the line edited, what was done), for every field of every kind of line, to
-    all of `WRONG`."""
-    lines = [json.loads(line) for line in (folder / JOURNAL).read_text().splitlines()]
-    first = {kind_of(line, KINDS.models): number for number, line in reversed([*enumerate(lines)])}
-    assert set(first) == set(KINDS.models)
-    for kind, number in first.items():
-        for at in places(lines[number]):
-            for what, value in WRONG.items():
-                yield number, edited(lines[number], at, value), f"{kind} {at} {what}"
+@pytest.fixture(scope="module", params=list(READ))
+def journal(request: pytest.FixtureRequest) -> tuple[Path, Callable[[Path], Any]]:
+    """The folder of a journal, and what reads it."""
+    return request.getfixturevalue(request.param), READ[request.param]
 
 
-def put(folder: Path, number: int, line: dict[str, Any]) -> None:
-    """Set a line of a journal in the place of another."""
-    lines = (folder / JOURNAL).read_text().splitlines()
-    lines[number] = json.dumps(line)
-    (folder / JOURNAL).write_text("\n".join(lines) + "\n")
-
-
-def put_to_all(
-    made: Path, number: int, line: dict[str, Any], place: Path, resumes: bool
-) -> list[Done]:
-    """What all commands that read a journal make of a copy of a run with such a line."""
-    key = next(record["cell"] for record in Archive.read(made).records)
-    commands = [["report", "out"], ["diff", made, "out"], ["replay", key, "--out", "out"]]
-    done = []
-    for command in (
-        [*commands, ["run", "--resume", "out", "--workers", "1"]] if resumes else commands
-    ):
-        for folder in ("out", "out.part"):
-            shutil.rmtree(place / folder, ignore_errors=True)
-        shutil.copytree(made, place / "out")
-        put(place / "out", number, line)
-        done.append(crosscheck(*command, cwd=place))
-    return done
-
-
-def fault_of(folder: Path) -> str:
-    """Why the run there cannot be used; "" if it can."""
+def fault_of(read: Callable[[Path], Any], folder: Path) -> str:
+    """Why the journal there cannot be used; "" if it can."""
     try:
-        Archive.read(folder)
-    except ValueError as fault:
+        read(folder)
+    except (ValueError, FolderTaken) as fault:
         return str(fault)
     return ""
 
 
-def assert_quiet(done: Done, what: str) -> None:
-    """Nothing that acts on a terminal was printed."""
-    assert not set("\x1b\r\0\x07") & set(done.stdout + done.stderr), what
+def test_a_journal_as_it_was_written_is_taken(journal: tuple, tmp_path: Path):
+    """The control: nothing is refused that a command writes, though it ends within a line."""
+    folder, read = journal
+    shutil.copy(folder / JOURNAL, tmp_path)
+    assert fault_of(read, tmp_path) == ""
+    with (tmp_path / JOURNAL).open("a") as file:
+        file.write('{"task": ["err')
+    assert fault_of(read, tmp_path) == ""
 
 
-def test_every_edit_of_every_field_is_taken_or_refused(made: Path):
-    """2600 edits, most of which no journal may hold: nothing but `ValueError` says so."""
-    refused = taken = 0
-    for _, line, _ in edits(made):
-        try:
-            kind_of(line, KINDS.models)
-            taken += 1
-        except ValueError:
-            refused += 1
+def test_a_journal_is_json_lines_whose_last_key_is_the_sum(journal: tuple):
+    """For pandas and jq."""
+    table = pd.read_json(journal[0] / JOURNAL, lines=True)
+    lines = [json.loads(line) for line in (journal[0] / JOURNAL).read_text().splitlines()]
 
-    assert refused > 2 * taken > 0
+    assert table["sum"].notna().all()
+    assert all([*line][-1] == "sum" for line in lines)
 
 
-def test_what_is_refused_names_its_line(made: Path, tmp_path: Path):
-    """Journal, number, and what to do, of a sample of the edits."""
-    copied = Path(shutil.copytree(made, tmp_path / "copied"))
-    for number, line, what in random.Random(15).sample([*edits(made)], 100):
-        shutil.copy(made / JOURNAL, copied / JOURNAL)
-        put(copied, number, line)
-        named = f"{JOURNAL}: line {number + 1}: ", "of the header; delete", "has no header"
-        said = fault_of(copied)
-        assert not said or any(words in said for words in named), what
+@given(st.data())
+def test_any_byte_that_is_another_is_noticed(
+    journal: tuple, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+):
+    """Replaced, left out or put in; but the end of the last line, which then counts as torn."""
+    folder, read = journal
+    whole = (folder / JOURNAL).read_bytes()
+    at = data.draw(st.integers(0, len(whole) - 2))
+    new = data.draw(st.binary(max_size=1))
+    edited = whole[:at] + new + whole[at + data.draw(st.integers(0, 1)) :]
+    place = tmp_path_factory.mktemp("edited")
+    (place / JOURNAL).write_bytes(edited)
+
+    assert (DAMAGED in fault_of(read, place)) == (edited != whole)
+
+
+@pytest.mark.parametrize("number", [1, 4])
+def test_what_was_edited_is_refused_by_every_command(run: Path, tmp_path: Path, number: int):
+    """One sentence with the line's number and what to do; exit 2; the run is left as it is."""
+    lines = (run / JOURNAL).read_text().splitlines(keepends=True)
+    lines[number - 1] = lines[number - 1].replace('"pymunk', '"box2d', 1)
+    key = Archive.read(run).records[0]["cell"]
+    shutil.copytree(run, tmp_path / "out")
+    (tmp_path / "out" / JOURNAL).write_text("".join(lines))
+    for command in (
+        ("report", "out"),
+        ("diff", run, "out"),
+        ("replay", key, "--out", "out"),
+        ("run", "--resume", "out"),
+    ):
+        done = crosscheck(*command, cwd=tmp_path)
+
+        assert done.returncode == 2
+        assert f"{JOURNAL}: line {number}: {DAMAGED}; " in done.stderr
+        assert ("run it again" if number == 1 else "delete that line, and --resume") in done.stderr
+        assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_journal_without_sums_is_of_another_version(journal: tuple, tmp_path: Path):
+    """As earlier versions wrote it."""
+    folder, read = journal
+    text = "".join(json.dumps(line) + "\n" for line in contents(folder))
+    (tmp_path / JOURNAL).write_text(text)
+
+    assert f"line 1: {OTHER}; run it again" in fault_of(read, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("kind", "at", "value", "said"),
+    "line",
+    [b'{"what": 1', b'{"cell": "0"', b'{"task": {"kind": "limit"}', b"{", b"[" * 100_000, b"\xff"],
+)
+def test_a_line_with_its_sum_that_cannot_be_read_is_of_another_version(
+    journal: tuple, tmp_path: Path, line: bytes
+):
+    """Of a kind that is not known, or without what it should have."""
+    folder, read = journal
+    whole = (folder / JOURNAL).read_bytes()
+    (tmp_path / JOURNAL).write_bytes(whole + line + end_of(line))
+
+    number = len(contents(folder)) + 1
+    assert f"line {number}: {OTHER}; run it again" in fault_of(read, tmp_path)
+
+
+def test_the_header_comes_first(journal: tuple, tmp_path: Path):
+    """Without it the plan is not known."""
+    folder, read = journal
+    (tmp_path / JOURNAL).write_bytes(b"".join(map(written, contents(folder)[1:])))
+
+    assert f"line 1: {DAMAGED}; without it the plan is not known" in fault_of(read, tmp_path)
+
+
+def test_a_line_that_is_there_twice_counts_once(journal: tuple, tmp_path: Path):
+    """The later holds."""
+    folder, read = journal
+    lines = contents(folder)
+    put(tmp_path, [*lines, lines[1]])
+    assert fault_of(read, tmp_path) == ""
+
+
+def test_the_lines_of_a_run_have_what_is_said_of_them(run: Path):
+    """Neither more nor less, of every kind."""
+    kinds = {next(iter(line)): line for line in contents(run)}
+
+    assert {*kinds} == {*LINES}
+    for kind, line in kinds.items():
+        inside = line[kind] if isinstance(line[kind], dict) else {}
+        assert {*line, *inside} - {kind} == {*LINES[kind]}
+
+
+def test_journals_that_were_joined_are_noticed(run: Path, speed: Path, tmp_path: Path):
+    """Every line has its sum, but it is not of this run."""
+    lines = contents(run)
+    foreign = next(line for line in lines if "cell" in line) | {"seed": 7}
+    assert f"line {len(lines) + 1}: is of another run; delete" in fault_of(
+        Archive.read, put(tmp_path, [*lines, foreign])
+    )
+    other = {"header": HEADER | {"seed": 1}}
+    assert "of something else" in fault_of(resumed, put(tmp_path, [*contents(speed), other]))
+
+
+def test_a_limit_of_an_engines_file_that_is_not_asked_for_is_named(stability: Path, tmp_path: Path):
+    """It could not be shown among the others."""
+    lines = contents(stability)
+    for whose in (lines[1]["task"], lines[1]["limit"]):
+        whose["engine"] = "mine.py:own"
+
+    assert "line 2: is of mine.py:own, which is not asked for; delete" in fault_of(
+        journalled, put(tmp_path, lines)
+    )
+
+
+def test_a_text_that_reads_nan_stays_a_text(speed: Path, stability: Path, tmp_path: Path):
+    """It became a number when it was read back, and a traceback where it was taken for text."""
+    lines = contents(speed)
+    lines[1]["result"][0]["reason"] = "nan"
+    again = resumed(put(tmp_path, lines))
+    assert again[tuple(lines[1]["task"])][0]["reason"] == "nan"
+    lines = contents(stability)
+    lines[1]["limit"]["source"] = "nan"
+    _, results = journalled(put(tmp_path, lines))
+    assert [one.source for one in results.values() if isinstance(one, Limit)] == ["nan"]
+
+
+def test_every_column_of_text_is_known_and_no_other(speed: Path):
+    """Of the rows of a measurement, in which numbers that are not finite are text, too."""
+    found = set()
+    for line in contents(speed)[1:]:
+        result = line["result"]
+        for row in result if isinstance(result, list) else [result]:
+            found |= {name for name, value in row.items() if isinstance(value, str)}
+            assert all(isinstance(row[name], str) for name in TEXT & row.keys())
+
+    # of the sizes; and numbers
+    assert TEXT - found == {"stopped"}
+    assert {*found} - TEXT <= {"change_radii", "error_radii", "dt_s", "share"}
+
+
+@pytest.mark.parametrize(
+    "text",
     [
-        ("cell", ("scenario",), "../../../x", "scenario = '../../../x': must match pattern"),
-        ("cell", ("status",), "fine", "status = 'fine': must be 'ok', 'unsupported'"),
-        ("cell", ("dt_s",), -1.0, "dt_s = -1.0: must be greater than 0"),
-        ("cell", ("settings", "friction"), [1], "settings.friction = [1]: "),
-        ("cell", ("cell",), "../x", "cell = '../x': must match pattern"),
-        ("cell", ("scene",), "near_miss", "must be one of the scenes of the header"),
-        ("cell", ("seed",), 10**400, "must be that of the header"),
-        ("header", ("header", "machine"), DEEP, "header.machine = [["),
-        (
-            "header",
-            ("header", "timings"),
-            10**12,
-            "header.timings = 1000000000000: must be less than",
-        ),
-        ("header", ("header", "seed"), GONE, "header.seed: missing"),
-        ("conformance", ("of",), "pymunk:other", "must be of one engine"),
-        ("timing", ("cost", 0), float("nan"), "cost[0] = nan: must be a finite number"),
+        "[" * 10**6,
+        "{}",
+        "[]",
+        "1",
+        '{"command": 1, "finished": true, "files": {}}',
+        "\0",
+        '{"command": "x", "finished": "y", "files": {}}',
     ],
 )
-def test_what_does_not_fit_is_named(
-    made: Path, tmp_path: Path, kind: str, at: tuple, value: Any, said: str
-):
-    """By line, key, value and what is allowed; exit 2 of all four commands, of which none writes
-    outside of the run."""
-    lines = [json.loads(line) for line in (made / JOURNAL).read_text().splitlines()]
-    number = next(k for k, line in enumerate(lines) if kind in line)
-    before = sorted(path.name for path in tmp_path.parent.iterdir())
-    for done in put_to_all(made, number, edited(lines[number], at, value), tmp_path, resumes=True):
-        assert done.returncode == 2
-        assert said in done.stderr
-        assert_quiet(done, said)
-    assert sorted(path.name for path in tmp_path.parent.iterdir()) == before
+def test_a_record_of_what_was_made_that_is_none_is_as_good_as_none(tmp_path: Path, text: str):
+    """made.json: what is in the folder then is nobody's."""
+    (tmp_path / "made.json").write_text(text)
+    assert read_made(tmp_path) is None
 
 
-@pytest.mark.parametrize(
-    "line", ["[" * 100_000, "{" * 100_000, "NaN", '"\\ud800"', "1e999", "\x00", "\udcff"]
-)
-def test_a_line_that_is_no_table_is_named(made: Path, tmp_path: Path, line: str):
-    """Brackets in brackets without end, a number, a text, bytes that are none."""
-    copied = Path(shutil.copytree(made, tmp_path / "copied"))
-    text = (made / JOURNAL).read_bytes()
-    (copied / JOURNAL).write_bytes(text + line.encode(errors="surrogateescape") + b"\n")
-    number = text.count(b"\n") + 1
-
-    with pytest.raises(ValueError, match=f"line {number}"):
-        Archive.read(copied)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "at", "value"), [("cell", ("dt_s",), 0.5), ("cell", ("scenario",), "other")]
-)
-def test_a_line_that_does_not_fit_its_scene_is_named(
-    made: Path, tmp_path: Path, kind: str, at: tuple, value: Any
-):
-    """It is as its schema has it, but a scene has its own name and its own steps: exit 2 of what
-    reads the scene."""
-    lines = [json.loads(line) for line in (made / JOURNAL).read_text().splitlines()]
-    number = next(k for k, line in enumerate(lines) if kind in line)
-    report, _, replay, resumed = put_to_all(
-        made, number, edited(lines[number], at, value), tmp_path, resumes=True
-    )
-    cell = lines[number]["cell"]
-
-    for done in (report, resumed) if replay.returncode == 0 else (report, replay, resumed):
-        assert done.returncode == 2
-        assert f"the line of the cell {cell}: {at[0]} = {value!r}" in done.stderr
-
-
-@pytest.mark.long
-def test_what_is_taken_ends_no_command_with_a_traceback(made: Path, tmp_path: Path):
-    """Of the edits that the schema lets pass, a sample goes to every command; an exception would
-    fail this test."""
-    # so that the copies need not compare again
-    assert crosscheck("report", made, cwd=tmp_path).returncode == 0
-    taken = []
-    copied = Path(shutil.copytree(made, tmp_path / "copied"))
-    for number, line, what in edits(made):
-        shutil.copy(made / JOURNAL, copied / JOURNAL)
-        put(copied, number, line)
-        if not fault_of(copied):
-            taken.append((number, line, what))
-    for number, line, what in random.Random(15).sample(taken, SAMPLE):
-        for done in put_to_all(made, number, line, tmp_path, resumes=True):
-            assert done.returncode in (0, 1, 2), what
-            assert_quiet(done, what)
+def test_a_file_that_never_ends_has_no_digest(tmp_path: Path):
+    """A journal may name any path."""
+    assert digest_of("/dev/zero") == digest_of(tmp_path) == digest_of("a\0b") == ""

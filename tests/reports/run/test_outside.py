@@ -34,6 +34,7 @@ from reports.run.playing import play_here
 from reports.run.runner import LEAST_MEMORY, affordable, run_all
 from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
+from tests.reports.run.journals import contents, put
 from tests.reports.run.sweeps import SMALL, lines, undisturbed
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
@@ -147,14 +148,14 @@ def test_resume_plays_again_what_failed_outside_the_engine_and_nothing_else(tmp_
     engines."""
     whole = undisturbed(SMALL, tmp_path)
     changed, cells, probes = [], 0, 0
-    for line in lines(whole):
+    for line in contents(whole):
         if "cell" in line and cells < 4:
             line |= {"status": "crashed", "reason": "planted", "outside": cells % 2 == 0}
             cells += 1
         if "conformance" in line and probes < 1:
             line["key"], probes = "", probes + 1  # as `keep_probes` writes it
-        changed.append(json.dumps(line) + "\n")
-    (whole / "journal.jsonl").write_text("".join(changed))
+        changed.append(line)
+    put(whole, changed)
     crosscheck("run", "--resume", "whole", cwd=tmp_path)
     records = Archive.read(whole).records
 

@@ -3,7 +3,6 @@ takes its place."""
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 from reports.commands.run import what_is_kept
 from reports.run.folders import RUN, begun, part_of
 from reports.run.journal import JOURNAL
+from tests.reports.run.journals import contents, put
 from tests.reports.terminal.command_line import crosscheck
 
 SCENE = (Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml").read_text()
@@ -137,15 +137,14 @@ def test_what_was_torn_beside_the_journal_does_not_keep_the_stability_run_from_i
 
 def test_a_header_without_what_it_should_have_is_reported(parts: dict[str, Path], tmp_path: Path):
     """By the commands that read a run's folder."""
-    journal = journal_of(parts["run"], tmp_path)
-    first, *others = journal.read_text().splitlines()
-    header = json.loads(first)
+    part = journal_of(parts["run"], tmp_path).parent
+    header, *others = contents(part)
     del header["header"]["versions"]
-    journal.write_text("\n".join([json.dumps(header), *others]) + "\n")
+    put(part, [header, *others])
     done = crosscheck("report", "out.part", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert "line 1: header.versions: missing" in done.stderr
+    assert "line 1: was written by another version of crosscheck; run it again" in done.stderr
 
 
 def test_a_run_that_ends_before_its_header_is_written_has_played_nothing(tmp_path: Path):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.reports.run.journals import contents, put
 from tests.reports.terminal.command_line import crosscheck
 from tests.reports.terminal.test_strangers import all_of
 
@@ -46,10 +47,9 @@ def begun_at(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def home(begun_at: Path, tmp_path: Path) -> Path:
     """A copy, of which the journal says that it was begun there."""
     shutil.copytree(begun_at, tmp_path / "home")
-    journal = tmp_path / "home" / "out" / "journal.jsonl"
-    journal.write_text(
-        journal.read_text().replace(json.dumps(str(begun_at)), json.dumps(str(tmp_path / "home")))
-    )
+    lines = contents(tmp_path / "home" / "out")
+    lines[0]["header"]["folder"] = str(tmp_path / "home")
+    put(tmp_path / "home" / "out", lines)
     return tmp_path / "home"
 
 
@@ -99,12 +99,9 @@ def a_file_as_part(home: Path) -> None:
 
 def an_engine_nobody_knows(home: Path) -> None:
     """The journal is of another version."""
-    journal = home / "out" / "journal.jsonl"
-    journal.write_text(
-        journal.read_text().replace(
-            '"reference:exercise", "mine', '"reference:exercise", "bullet:shipped", "mine'
-        )
-    )
+    lines = contents(home / "out")
+    lines[0]["header"]["engines"].insert(1, "bullet:shipped")
+    put(home / "out", lines)
 
 
 REFUSED = {

@@ -11,7 +11,6 @@ import pytest
 from adapters.engines import ENGINES
 from reports.run import timing_pass
 from reports.run.archive import Archive
-from reports.run.journal import lines_of
 from reports.run.stepping import Spent, binding_of
 from reports.run.timing import WARM_UP, Timed, interleaved, noise_of
 from reports.run.timing_pass import (
@@ -27,6 +26,7 @@ from reports.run.timing_pass import (
     timed_scenes,
 )
 from scenarios.catalogue import SCENARIOS, scenario
+from tests.reports.run.journals import contents
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # each times a run
@@ -44,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def timing_lines(folder: Path) -> list[dict]:
     """Those of the journal."""
-    return [line for line in lines_of(folder / "out") if "timing" in line or "overhead" in line]
+    return [line for line in contents(folder / "out") if "timing" in line or "overhead" in line]
 
 
 def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: Path):

@@ -15,7 +15,6 @@ from reports.speed import ladder, measure
 from reports.speed.command import kept_of
 from reports.speed.effort import QUICK
 from reports.speed.kept import Kept
-from reports.speed.lines import TEXT, numbered
 from reports.speed.measure import done
 from reports.speed.plan import SpeedPlan
 from reports.terminal import progress as terminal
@@ -39,7 +38,6 @@ FAILED = {
     "error_radii": np.inf,
     "change_radii": np.nan,
 }
-SCENES = {"slow_collision": scenario("slow_collision")}
 HEADER: dict[str, Any] = {
     "scenes": ["slow_collision"],
     "files": {},
@@ -57,9 +55,9 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
     not lost to it."""
     rows = [FAILED]
     with Journal(tmp_path) as journal:
-        Kept(journal, HEADER, resume=False, scenarios=SCENES).add(TASK, rows)
+        Kept(journal, HEADER, resume=False).add(TASK, rows)
     with Journal(tmp_path) as journal:
-        again = Kept(journal, HEADER, resume=True, scenarios=SCENES)
+        again = Kept(journal, HEADER, resume=True)
         with Progress() as progress:
             found = dict(done({TASK: fails}, 1, progress, "error", kept=again))
 
@@ -70,11 +68,11 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
         with pytest.raises(
             FolderTaken, match="holds 1 results of an interrupted run of something else"
         ):
-            Kept(journal, HEADER | {"seed": 1}, resume=True, scenarios=SCENES)
+            Kept(journal, HEADER | {"seed": 1}, resume=True)
         with pytest.raises(FolderTaken, match="ask again with --resume"):
-            Kept(journal, HEADER, resume=False, scenarios=SCENES)
+            Kept(journal, HEADER, resume=False)
     with Journal(tmp_path) as journal:  # nothing was lost by asking
-        assert len(Kept(journal, HEADER, resume=True, scenarios=SCENES)) == 1
+        assert len(Kept(journal, HEADER, resume=True)) == 1
 
 
 def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else(tmp_path: Path):
@@ -144,12 +142,3 @@ def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
 def interrupted(*_: object) -> None:
     """As Ctrl-C does."""
     raise KeyboardInterrupt
-
-
-def test_every_column_of_text_is_known_and_no_other():
-    """A text such as "nan" is no number when the journal is read again."""
-    whose = {"scenario", "engine", "profile", "kind", "change"}
-    said = {"status", "reason", "contribution", "note", "truth", "stopped"}
-
-    assert whose | said | {"task"} == TEXT
-    assert numbered({"contribution": "nan"}) == {"contribution": "nan"}

@@ -4,7 +4,6 @@ keeps."""
 from __future__ import annotations
 
 import inspect
-import json
 import re
 import shutil
 from pathlib import Path
@@ -28,6 +27,7 @@ from reports.stability.search import LimitSearch
 from reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.page.figures import check_figures
+from tests.reports.run.journals import contents, put
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
@@ -112,13 +112,11 @@ def test_what_has_ended_is_not_played_again(results: Path, monkeypatch: pytest.M
     assert all(task.name != "grazing" for task in done)
     assert set(done) < set(tasks_of(plan))
     assert Task("limit", "slow_collision", "box2d:shipped", "full") not in done
-    journal = (results / "journal.jsonl").read_text().splitlines()
-    header = json.loads(journal[0])
+    header, *others = contents(results)
     header["header"]["versions"]["pymunk"] = "6"
     other = results.parent / "other"
     other.mkdir()
-    (other / "journal.jsonl").write_text("\n".join([json.dumps(header), *journal[1:]]) + "\n")
-    assert done_before(other, plan) == (had, set())
+    assert done_before(put(other, [header, *others]), plan) == (had, set())
 
 
 def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(
