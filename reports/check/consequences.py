@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from reports.check.detection import NOT_OF_THE_CENTRES
 from reports.check.functions import keeps_state
 from reports.check.impacts import ABSOLUTE_NORMAL
 from reports.check.impulse import ONLY, UNALIKE
@@ -86,7 +87,7 @@ def followed(row: CheckRow, first: dict[str, str], spoilt: dict[str, str]) -> Ch
         why = "it follows from the fault in the velocity of one sphere"
         return replace(row, verdict="follows", cause=why)
     unexplained = row.cause.startswith(NOT_EXPLAINED)
-    if row.task in spoilt and (unexplained or (row.cause, spoilt[row.task]) in FROM_KEPT):
+    if row.task in spoilt and (unexplained or (row.cause, spoilt[row.task]) in EXPLAINED_TOO):
         return replace(row, verdict="follows", cause=spoilt[row.task])
     from_impulse = (row.name, row.cause) == ("separating", UNKNOWN) or (
         row.name == "restitution" and row.cause.startswith("the file has e = ")
@@ -97,8 +98,14 @@ def followed(row: CheckRow, first: dict[str, str], spoilt: dict[str, str]) -> Ch
 
 
 KEPT = "it may follow from the value that is kept from one call to the next"
-# in a fresh world the mean of J and the J before it, which is 0, and the sum of the two
-FROM_KEPT = {(cause, KEPT) for cause in ("the impulse is halved", "the impulse is counted twice")}
+NORMAL = "it may follow from the fault in 2a: the normal is along another line than the centres"
+# Causes that have a name, though they follow, too: in a fresh world the mean of J and the J before
+# it, which is 0, and the sum of the two; a normal that is not reversed when A and B are exchanged.
+EXPLAINED_TOO = {
+    ("the impulse is halved", KEPT),
+    ("the impulse is counted twice", KEPT),
+    (UNALIKE, NORMAL),
+}
 # keys of `first` that are no causes
 IMPULSE = "the impulse is wrong"
 ONE_VELOCITY = "the velocity of one sphere is wrong"
@@ -113,6 +120,8 @@ def spoilers(rows: Iterable[CheckRow]) -> dict[str, str]:
             ("2c", "2d"), "it may follow from the fault in 2b, which changes the velocities, too"
         )
     for row in rows:
+        if row.verdict == "fault" and row.cause.startswith(NOT_OF_THE_CENTRES):
+            spoilt |= dict.fromkeys(("2b", "2c", "2d"), NORMAL)
         if keeps_state([row]):
             parts = ("1",) if row.task == "1" else ("2a", "2b", "2c", "2d")
             spoilt |= dict.fromkeys(parts, KEPT)

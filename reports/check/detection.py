@@ -16,6 +16,7 @@ from scenarios.model import Array
 Rule = Callable[[float, float, float, float], bool | None]
 
 WRONG_WAY = "the comparison is the wrong way round"
+NOT_OF_THE_CENTRES = "the distance is not that of the centres"
 # (dx, dy, size of A, size of B) in m -> whether they collide by the rule, None if either
 RULES: dict[str, Rule] = {
     "": lambda x, y, a, b: np.hypot(x, y) < a + b,
@@ -190,7 +191,7 @@ def mixed_up(answers: dict[str, SolverAnswer]) -> str | None:
             (np.hypot(*vector(np.array(a.x), np.array(b.x))) < a.r + b.r) == was
             for (a, b), was in seen
         ):
-            return f"the distance is not that of the centres: {name}"
+            return f"{NOT_OF_THE_CENTRES}: {name}"
     return None
 
 

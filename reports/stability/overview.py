@@ -70,14 +70,17 @@ def cell_of(case: Case, limit: Limit | None) -> LimitCell:
 
 def held(case: Case) -> dict[str, str]:
     """Symbol -> value with unit of what the numbers of a case depend on and it does not vary: the
-    step size dt and the radii R of the disks that move. A symbol is left out if it varies."""
+    step size dt and the radii R of the disks that move. A symbol is left out if it varies, and R if
+    no disk moves."""
     ends = [case.scene(value, 0) for value in (case.values[0], case.values[-1])]
     steps = [scenario.dt(scenario.substeps[0]) for scenario in ends]
     radii = [scenario.scene.radius[~scenario.scene.static] for scenario in ends]
     found = {}
     if steps[0] == steps[1]:
         found["dt"] = f"{number(1e3 * steps[0])} ms"
-    least, most = (sorted({float(pick(each)) for each in radii}) for pick in (np.min, np.max))
+    least, most = (
+        sorted({float(pick(each)) for each in radii if len(each)}) for pick in (np.min, np.max)
+    )
     if len(least) == len(most) == 1:
         span = (
             number(least[0]) if least == most else f"{number(least[0], 2)} to {number(most[0], 2)}"

@@ -205,7 +205,8 @@ CHECKED = tuple(
     for what, (name, text, says) in CALLED.items()
 )
 
-# The same as an engine: a run goes on, and says what was not played.
+# The same as an engine: a run goes on, and says what was not played. A file without a function that
+# is known is refused, so what happens on loading happens in a file that has them.
 IN_A_RUN = (
     "a syntax error",
     "an endless loop",
@@ -213,23 +214,30 @@ IN_A_RUN = (
     "os._exit with success",
     "killing its group",
     "an exception with escape codes",
-    "no function at all",
     "an endless loop in a call",
     "nan",
     "abort in a call",
     "megabytes that are printed",
     "answers that are forged",
 )
-ENGINES = tuple(
+ENGINES = (
+    *(
+        Input(
+            f"run: {what}",
+            (*PLAYED, name),
+            {"two.toml": TWO, name: f"{text}\n{PY}" if what in LOADING else text},
+            writes=WRITES,
+            codes=(0, 1) if what.endswith("printed") else (1,),
+        )
+        for what in IN_A_RUN
+        for name, text, _ in [(LOADING | CALLED)[what]]
+    ),
     Input(
-        f"run: {what}",
-        (*PLAYED, name),
-        {"two.toml": TWO, name: text},
-        writes=WRITES,
-        codes=(0, 1) if what.endswith("printed") else (1,),
-    )
-    for what in IN_A_RUN
-    for name, text, _ in [(LOADING | CALLED)[what]]
+        "run: no function at all",
+        (*PLAYED, "mine.py"),
+        {"two.toml": TWO, "mine.py": LOADING["no function at all"][1]},
+        says="has neither the functions of the exercise",
+    ),
 )
 
 # It does something to where it is: that stays the user's own doing, and what the program does is
@@ -347,7 +355,7 @@ BESIDE = (
     Input(
         "check: a folder of such modules",
         ("check", "."),
-        {"a/random.py": TRAP, "a/mine.py": PY},
+        {"random.py": TRAP, "mine.py": PY},
         codes=(1,),
         writes=(*WRITES, "trapped.txt"),
         says="trapped",

@@ -240,7 +240,10 @@ def test_the_committed_table_is_what_comes_out(tmp_path: Path):
     rows = {row["solver"]: row for row in csv.DictReader(TABLE.read_text().splitlines())}
 
     assert sum(right.values()) >= 0.95 * len(right)
-    assert spread([checks[tmp_path / mutant.name] for mutant in MUTANTS if not mutant.second]) == {}
+    # both parts are missing: one return leaves them out
+    assert spread([checks[tmp_path / mutant.name] for mutant in MUTANTS if not mutant.second]) == {
+        "no_impulse.js": ["2c", "2d"]
+    }
     assert {name: rows[name]["first cause is right"] for name in right} == {
         name: "yes" if is_right else "no" for name, is_right in right.items()
     }
