@@ -48,7 +48,6 @@ MARKS = {
     " advise ": pytest.mark.long,
     " stability my_scene.toml ": pytest.mark.long,
     " run my_scene.toml ": pytest.mark.long,  # the gate plays a file through one engine
-    " --engine ball.js ": pytest.mark.long,  # the gate plays this file without the command
     " speed free_fall slow_collision ": pytest.mark.long,
     " stability ": pytest.mark.slow,
     " speed ": pytest.mark.slow,

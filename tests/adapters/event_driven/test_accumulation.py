@@ -310,7 +310,7 @@ def test_accumulation_in_plain_python_is_the_same(monkeypatch):
         # What rattles is not noticed, and a wall's end lifts a disk to its face: both rattle on for
         # seconds.
         pytest.param("if run.collisions < COLLISIONS:", "if True:", marks=pytest.mark.long),
-        pytest.param("if abs(gap) < ROUNDING", "if gap < ROUNDING", marks=pytest.mark.long),
+        pytest.param("if abs(gap) < rounding:", "if gap < rounding:", marks=pytest.mark.long),
         # it is left to the first of its two walls
         pytest.param("acceleration_into(walls, a, w, k) > 0.0", "False", marks=pytest.mark.slow),
     ],
