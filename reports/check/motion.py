@@ -223,14 +223,8 @@ def law_row(
         return not_asked(name, "1", f"the {words['velocity']} is not a number")
     if found != "" and laws is MOVED_BY_MASS and moved_rightly(given, answers):
         found = ""
-    if found is None and name in ("velocity", "spin"):
-        found = damped(given, answers)
-    if found is None:
-        found = fixed_step(laws[""], given, answers)
-    if found is None and np.ndim(answers[0]):
-        found = one_axis(laws, given, answers) or limited(laws[""], given, answers)
-    if found is None:
-        found = multiplied(laws[""], given, answers)
+    if found is None and all(np.isfinite(np.asarray(answer, float)).all() for answer in answers):
+        found = beyond_formulas(name, laws, given, answers)
     if found == OWN_MOI:
         got, expected = f"{shown(answers[0])} {unit}", f"{shown(right)} {unit}"
         return CheckRow(name, "1", asked, got, expected, "free choice", OWN_MOI)
@@ -248,6 +242,18 @@ def law_row(
         found == "",
         cause,
     )
+
+
+def beyond_formulas(
+    name: str, laws: dict[str, Law], given: list[tuple[Any, ...]], answers: list[Any]
+) -> str | None:
+    """The cause of finite answers that no formula of the table gives, in words; None if none is
+    known."""
+    found = damped(given, answers) if name in ("velocity", "spin") else None
+    found = found or fixed_step(laws[""], given, answers)
+    if found is None and np.ndim(answers[0]):
+        found = one_axis(laws, given, answers) or limited(laws[""], given, answers)
+    return found or multiplied(laws[""], given, answers)
 
 
 def moved_rightly(given: list[tuple[Any, ...]], answers: list[Any]) -> bool:

@@ -96,11 +96,11 @@ LOADING = {
     ),
     "page.js": (
         "document.title = 'mine';\n" + JS,
-        "document is not defined: a solver is run without page",
+        "document is not defined: a solver runs without page",
     ),
     "timer.js": (
         JS + "setTimeout(initScene, 1);",
-        "setTimeout is not defined: a solver is run without page, network",
+        "setTimeout is not defined: a solver runs without page, network",
     ),
     "unclosed.js": (JS[:-3], "SyntaxError"),
     "throws.js": (
@@ -230,7 +230,7 @@ CALLS = {
     ),
     "clock.js": (
         within(JS, "integrate", "var t = Date.now();"),
-        "run without page, network and clock",
+        "without page, network and clock",
     ),
     "endless_integrate.py": (
         within(PY, "integrate", "    while True: pass"),
