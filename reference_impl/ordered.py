@@ -8,13 +8,12 @@ s = 0 is the end, s = -dt the start.
 
 Every search asks the pairs of a neighbour list. Where collisions accumulate (a ball that bounces
 ever lower, a stack) the work is bounded: a bounce that would last less than a `REST` of a step is
-the last one, and after `MOST` collisions a disk the rest of a step goes unresolved, which shows as
-overlap. One disk at rest can use up the collisions of all: the force that holds it leaves a
-rounding of its speed, and it meets its wall again at the same instant. Another disk at rest then
-falls and slides freely for that step. Alone on its wall none does.
+the last one, and what touches then stays together to the end of the step (`settle`); so does what
+is near after `MOST` collisions a disk. With e = 1 the rest of such a step goes unresolved, which
+shows as overlap.
 
-It knows friction. What holds a disk at rest does so to the end of the step, also if a collision
-lifts the disk off before. Compiled by numba, as `exercise` is.
+It knows friction. A contact that lasts is held to the end of the step, or until a collision opens
+it; its friction, once it has acted, to the end. Compiled by numba, as `exercise` is.
 """
 
 from math import inf, sqrt
@@ -43,6 +42,14 @@ from reference_impl.state import Disks, World
 
 REST = 1 / 16  # of a step
 MOST = 8  # collisions a disk and step, on average
+EXACT, COARSE = 2.0**-40, 2.0**-20  # of radii, speeds and accelerations
+# A disk in a step is held by: nothing; alone; or so many solutions of `settle`. Then, in radii, it
+# may overlap by its leeway, and touches what is in reach.
+ALONE, LAST = 1, 5
+LEEWAY = 0.0, EXACT, EXACT, COARSE, COARSE, inf
+REACH = 0.0, 0.0, 2.0**-30, 2.0**-16, 2.0**-2, inf
+TURNS = 6  # of `press` a contact, at most
+TOGETHER = -1.0  # in place of an impulse: perhaps others touch these two
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
 
 
@@ -52,6 +59,7 @@ class Accelerations(NamedTuple):
     steady: np.ndarray  # (n, 2) m/s2, by force and gravity
     now: np.ndarray  # (n, 2) m/s2, and by what holds those at rest until the end of a step
     turning: np.ndarray  # (n,) rad/s2
+    held: np.ndarray  # (n,) what holds the disk in this step, as an index of `LEEWAY`
     moving: np.ndarray  # (m, 2) who moves, as `moving` has it
     strongest: float  # m/s2, of the steady ones
 
@@ -61,6 +69,7 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     """Advance `count` steps of `dt` s; return the collisions as (step, i, j, impulse in N s), wall
     w as j = -1 - w."""
     collisions = [(0, 0, 0, 0.0) for _ in range(0)]  # empty, but numba must know what it will hold
+    pressed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
     acceleration, k = accelerations_of(disks, world), 0
     near = empty_list(disks.radius, len(world.walls))
     while True:
@@ -69,9 +78,9 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
             break
         if used_up(near):
             find_near(disks, world, acceleration.now, near, dt, count - k)
-            first = first_meeting(disks, world, acceleration.now, near, -dt)
+            first = first_meeting(disks, world, acceleration, near, -dt)
         if first[1] != NOBODY:
-            resolve(disks, world, acceleration, near, dt, k, first, count, collisions)
+            resolve(disks, world, acceleration, near, dt, k, first, count, collisions, pressed)
         k += 1
     if world.friction == 0.0:
         turn(disks, acceleration, dt, count)
@@ -91,20 +100,13 @@ def accelerations_of(disks: Disks, world: World) -> Accelerations:
         steady[i, 0], steady[i, 1] = ax, ay
         strongest2 = max(strongest2, ax * ax + ay * ay)
         turning[i] = disks.torque[i] / disks.inertia[i]
-    return Accelerations(
-        steady, np.zeros_like(steady), turning, moving(disks.mass), sqrt(strongest2)
-    )
+    now, held = np.zeros_like(steady), np.zeros(len(disks.mass), np.int64)
+    return Accelerations(steady, now, turning, held, moving(disks.mass), sqrt(strongest2))
 
 
 @kernel
 def fly_until_meeting(  # type: ignore[no-untyped-def]
-    disks: Disks,
-    world: World,
-    acceleration: Accelerations,
-    near: NeighbourList,
-    dt: float,
-    k: int,
-    count: int,
+    disks: Disks, world: World, acceleration, near: NeighbourList, dt: float, k: int, count: int
 ):
     """Take steps from step k on until one in which two meet or the list is used up: in that one all
     have flown, and nothing else was done. Returns it and its `first_meeting`, as far as the list
@@ -117,7 +119,7 @@ def fly_until_meeting(  # type: ignore[no-untyped-def]
         take_step(near, acceleration.strongest * dt * dt)
         if used_up(near):
             break
-        first = first_meeting(disks, world, acceleration.now, near, -dt)
+        first = first_meeting(disks, world, acceleration, near, -dt)
         if first[1] != NOBODY:
             break
         k += 1
@@ -131,11 +133,8 @@ def fly(disks: Disks, acceleration: Accelerations, dt: float) -> None:
     What rounding cuts off is kept for the next time (Kahan, Comm. ACM 8, 40, 1965): hundreds of
     small steps would else round ten times as much as the few flights event by event that they are.
     """
-    x, v, cut = (
-        disks.position.reshape(-1),
-        disks.velocity.reshape(-1),
-        disks.remainder.reshape(-1),
-    )
+    x, v = disks.position.reshape(-1), disks.velocity.reshape(-1)
+    cut = disks.remainder.reshape(-1)
     a, steady = acceleration.now.reshape(-1), acceleration.steady.reshape(-1)
     for run in range(len(acceleration.moving)):
         begin, end = np.int64(acceleration.moving[run, 0]), np.int64(acceleration.moving[run, 1])
@@ -162,34 +161,45 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
 
 @inlined
 def resolve(  # type: ignore[no-untyped-def]
-    disks: Disks,
-    world: World,
-    acceleration: Accelerations,
-    near: NeighbourList,
-    dt: float,
-    k: int,
-    first,
-    count: int,
-    collisions: list,
+    disks, world, acceleration, near, dt: float, k: int, first, count: int, collisions, pressed
 ) -> None:
     """Meeting after meeting, from the first on, of a step in which all have flown to its end."""
-    for _ in range(MOST * len(disks.radius)):
+    most, held, any_held = MOST * len(disks.radius), acceleration.held, False
+    for c in range(most + 1):
         now, i, j = first
-        if i == NOBODY:
+        alone = near.found[PAIRS] + near.found[WALLS] == 1
+        if i == NOBODY or (c == most and (alone or world.restitution == 1.0)):
             break
         if j == EDGE:
             carry_over(disks.position, world, i)
             near.length[SLACK] = -inf
         else:
-            impulse = collide(disks, world, acceleration.now, i, j, now, dt)
+            impulse, hold, low = TOGETHER, 0.0, acceleration.strongest * dt * REST
+            if c < most:
+                impulse, hold = collide(disks, world, acceleration.now, i, j, now, dt, low, alone)
+            if impulse == TOGETHER:
+                # after so many collisions, what is near stays together
+                level = min(1 + max(held[i], held[max(i, j)], ALONE), LAST) if c < most else LAST
+                any_held = True
+                impulse, hold = settle(
+                    disks, world, acceleration, near, first, level, dt, k, collisions, pressed
+                )
             if impulse > 0.0:
+                if len(pressed) > 0:
+                    release(disks, world, acceleration, near, i, j, now, dt, collisions, pressed)
                 collisions.append((k, i, j, impulse))
+                if hold > 0.0 and not alone:
+                    pressed.append((i, j, len(collisions) - 1, hold))
+                    held[i], held[max(i, j)] = max(held[i], ALONE), max(held[max(i, j)], ALONE)
             account_for(near, disks.position, i, way_of(disks, acceleration.now, i, dt))
             if j >= 0:
                 account_for(near, disks.position, j, way_of(disks, acceleration.now, j, dt))
         if not holds(near):
             find_near(disks, world, acceleration.now, near, dt, count - k)
-        first = first_meeting(disks, world, acceleration.now, near, now)
+        first = first_meeting(disks, world, acceleration, near, now)
+    if any_held:
+        held[:] = 0
+        pressed.clear()
 
 
 @compiled
@@ -225,7 +235,7 @@ def first_meeting(  # type: ignore[no-untyped-def]
     if holds(near):
         for p in range(near.found[PAIRS]):
             i, j = int(near.first[p]), int(near.second[p])
-            first = sooner(first, of_disks(disks, acceleration, near, i, j, now), i, j)
+            first = sooner(first, of_disks(disks, world, acceleration, near, i, j, now), i, j)
         for b in range(near.found[WALLS]):
             i, w = int(near.disk[b]), int(near.wall[b])
             first = sooner(first, of_wall(disks, world, acceleration, near, i, w, now), i, -1 - w)
@@ -235,7 +245,7 @@ def first_meeting(  # type: ignore[no-untyped-def]
     else:
         for i in range(len(disks.radius)):
             for j in range(i + 1, len(disks.radius)):
-                first = sooner(first, of_disks(disks, acceleration, near, i, j, now), i, j)
+                first = sooner(first, of_disks(disks, world, acceleration, near, i, j, now), i, j)
             for w in range(len(world.walls)):
                 s = of_wall(disks, world, acceleration, near, i, w, now)
                 first = sooner(first, s, i, -1 - w)
@@ -254,15 +264,18 @@ def sooner(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_disks(disks: Disks, acceleration, near: NeighbourList, i: int, j: int, now: float) -> float:  # type: ignore[no-untyped-def]
+def of_disks(  # type: ignore[no-untyped-def]
+    disks: Disks, world: World, acceleration, near: NeighbourList, i: int, j: int, now: float
+) -> float:
     """When two disks meet from `now` on, or inf."""
-    x, radius, mass = disks.position, disks.radius, disks.mass
+    x, radius, mass, held = disks.position, disks.radius, disks.mass, acceleration.held
     # Who met within the step cannot be farther apart at its end than both ways: passing through is
     # seen, too.
     dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
     reach = radius[i] + radius[j] + 2.0 * near.length[STRIDE]
     if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
-        return meeting(path_to_disk(x, disks.velocity, acceleration, radius, i, j), now)
+        level = min(held[i if mass[i] != inf else j], held[j if mass[j] != inf else i])
+        return meeting(path_of(disks, world, acceleration.now, i, j), now, LEEWAY[level])
     return inf
 
 
@@ -276,9 +289,8 @@ def of_wall(  # type: ignore[no-untyped-def]
     low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
     beside = left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach
     if beside and disks.mass[i] != inf:
-        return meeting(
-            path_to_wall(x, disks.velocity, acceleration, disks.radius, i, walls, w), now
-        )
+        path = path_of(disks, world, acceleration.now, i, -1 - w)
+        return meeting(path, now, LEEWAY[acceleration.held[i]])
     return inf
 
 
@@ -304,36 +316,23 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
 
 
 @kernel
-def path_to_disk(x, v, acceleration, radius, i: int, j: int):  # type: ignore[no-untyped-def]
-    """How disk i moves as seen from disk j, which is a wall without length."""
-    return (
-        x[i, 0] - x[j, 0],
-        x[i, 1] - x[j, 1],
-        v[i, 0] - v[j, 0],
-        v[i, 1] - v[j, 1],
-        acceleration[i, 0] - acceleration[j, 0],
-        acceleration[i, 1] - acceleration[j, 1],
-        0.0,
-        0.0,
-        radius[i] + radius[j],
-    )
+def path_of(disks: Disks, world: World, acceleration, i: int, j: int):  # type: ignore[no-untyped-def]
+    """How disk i moves as seen from disk j, or from the start of wall w = -1 - j: place, velocity,
+    acceleration; the wall, which a disk has without length; and the reach."""
+    x, v, a, walls, w = disks.position, disks.velocity, acceleration, world.walls, -1 - j
+    if j >= 0:
+        px, py, pu, pv = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], v[i, 0] - v[j, 0], v[i, 1] - v[j, 1]
+        pa, pb = a[i, 0] - a[j, 0], a[i, 1] - a[j, 1]
+        return px, py, pu, pv, pa, pb, 0.0, 0.0, disks.radius[i] + disks.radius[j]
+    px, py = x[i, 0] - walls[w, 0, 0], x[i, 1] - walls[w, 0, 1]
+    along, up = walls[w, 1, 0] - walls[w, 0, 0], walls[w, 1, 1] - walls[w, 0, 1]
+    return px, py, v[i, 0], v[i, 1], a[i, 0], a[i, 1], along, up, disks.radius[i]
 
 
 @kernel
-def path_to_wall(x, v, acceleration, radius, i: int, walls, w: int):  # type: ignore[no-untyped-def]
-    """How disk i moves as seen from the start of wall w: place, velocity, acceleration; the wall,
-    and the reach."""
-    return (
-        x[i, 0] - walls[w, 0, 0],
-        x[i, 1] - walls[w, 0, 1],
-        v[i, 0],
-        v[i, 1],
-        acceleration[i, 0],
-        acceleration[i, 1],
-        walls[w, 1, 0] - walls[w, 0, 0],
-        walls[w, 1, 1] - walls[w, 0, 1],
-        radius[i],
-    )
+def weights(mass, i: int, j: int) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+    """1/kg of the two; a wall's is 0."""
+    return 1.0 / mass[i], 1.0 / mass[j] if j >= 0 else 0.0
 
 
 @kernel
@@ -367,13 +366,15 @@ def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-unty
             return 0.0
         part = min(max(part, 0.0), 1.0)
     slide = (v + b * s) * nx - (u + a * s) * ny
-    distance = sqrt((px - part * along) ** 2 + (py - part * up) ** 2)
+    px, py = px - part * along, py - part * up
+    distance = sqrt(px * px + py * py)
     return slide * slide / distance if distance > 0.0 else 0.0
 
 
 @compiled
-def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
-    """The first s from `since` to 0 at which the gap is closed and closes on, or inf."""
+def meeting(path, since: float, leeway: float) -> float:  # type: ignore[no-untyped-def]
+    """The first s from `since` to 0 at which the gap is closed and closes on, or inf, also where it
+    ends within the leeway."""
     low, high = since, 0.0
     closing, opening = contact(path, low)[1] < 0.0, contact(path, high)[1] >= 0.0
     if opening and not closing:
@@ -382,7 +383,7 @@ def meeting(path, since: float) -> float:  # type: ignore[no-untyped-def]
     if opening == closing:
         turn = halved(path, low, high, closing)
         low, high = (low, turn) if closing else (turn, high)
-    if contact(path, high)[0] >= 0.0:
+    if contact(path, high)[0] >= -leeway * path[8]:
         return inf
     return low if contact(path, low)[0] <= 0.0 else root(path, low, high)
 
@@ -421,58 +422,222 @@ def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def
 
 
 @compiled
-def collide(disks: Disks, world: World, acceleration, i: int, j: int, s: float, dt: float) -> float:  # type: ignore[no-untyped-def]
+def collide(  # type: ignore[no-untyped-def]
+    disks: Disks, world: World, acceleration, i: int, j: int, s: float, dt, low: float, alone: bool
+) -> tuple[float, float]:
     """The impulse J = -(1 + e) (vi - vj).n / (1/mi + 1/mj) at s, and both on their new ways to the
-    end; returns J."""
-    x, v, e = disks.position, disks.velocity, world.restitution
-    if j >= 0:
-        path = path_to_disk(x, v, acceleration, disks.radius, i, j)
-        wi, wj = 1.0 / disks.mass[i], 1.0 / disks.mass[j]
-    else:
-        path = path_to_wall(x, v, acceleration, disks.radius, i, world.walls, -1 - j)
-        wi, wj = 1.0 / disks.mass[i], 0.0
+    end; returns J, and the force that holds them from then on. Unless they are alone, where they
+    would rest or part by less than `low` / 2 m/s: `TOGETHER`, and nothing is done."""
+    e, hold, path = world.restitution, 0.0, path_of(disks, world, acceleration, i, j)
+    wi, wj = weights(disks.mass, i, j)
     _, rate, nx, ny = contact(path, s)
-    speed, inward, hold = (
-        max(-rate, 0.0),
-        -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny),
-        0.0,
-    )
+    speed, inward = max(-rate, 0.0), -(path[4] * nx + path[5] * ny) - lift(path, s, nx, ny)
     # it would be back at once, and ever sooner: it rests, and is held
-    if 2.0 * e * speed < inward * dt * REST:
+    rests = 2.0 * e * speed < inward * dt * REST
+    if not alone and (rests or 2.0 * e * speed < low):
+        return TOGETHER, 0.0
+    if rests:
         e, hold = 0.0, inward / (wi + wj)
     J = (1.0 + e) * speed / (wi + wj)
-    fly_anew(disks, acceleration, i, wi * nx, wi * ny, J, hold, s)
-    if j >= 0:
-        fly_anew(disks, acceleration, j, -wj * nx, -wj * ny, J, hold, s)
+    push_apart(disks, acceleration, i, j, nx, ny, J, hold, s)
     if world.friction > 0.0:
         rub(disks, acceleration, i, j, path, nx, ny, world.friction * J, world.friction * hold, s)
-    return J - hold * s
+    return J - hold * s, hold
 
 
 @compiled
-def fly_anew(  # type: ignore[no-untyped-def]
-    disks: Disks, acceleration, i: int, wx: float, wy: float, J: float, hold: float, s: float
+def release(disks, world, acceleration, near, i, j, s: float, dt, collisions, pressed) -> None:  # type: ignore[no-untyped-def]
+    """From s on, no force holds a contact of disk i or j that a collision has opened."""
+    for p in range(len(pressed)):
+        a, b, row, hold = pressed[p]
+        if hold > 0.0 and (a in (i, j) or b in (i, j)):
+            _, rate, nx, ny = contact(path_of(disks, world, acceleration.now, a, b), s)
+            if rate > COARSE * acceleration.strongest * dt:
+                push_apart(disks, acceleration.now, a, b, nx, ny, 0.0, -hold, s)
+                k, _, _, impulse = collisions[row]
+                collisions[row] = (k, a, b, impulse + hold * s)
+                pressed[p] = (a, b, row, 0.0)
+                for d in (a, max(a, b)):
+                    account_for(near, disks.position, d, way_of(disks, acceleration.now, d, dt))
+
+
+@compiled
+def settle(  # type: ignore[no-untyped-def]
+    disks, world, acceleration, near, first, level: int, dt: float, k, collisions, pressed
+) -> tuple[float, float]:
+    """All that touch the two that meet first, and each other, at once: the impulses without bounce
+    and then the forces, all >= 0, with which no gap of theirs closes before the end of the step.
+    Returns `TOGETHER`, or what `collide` returns of the two alone if no other contact touches.
+
+    A gap is convex along a straight way, so one that is open at the end by its normal now stays
+    open. With friction, its impulses and forces follow from those, and then they once more.
+    """
+    s, e, strongest = first[0], world.restitution, acceleration.strongest
+    slow = strongest * dt * REST / (2.0 * e) if e > 0.0 and level < LAST else inf
+    who = touching(disks, world, acceleration.now, near, first, REACH[level], slow)
+    m = len(who)
+    if m < 2:
+        return collide(disks, world, acceleration.now, first[1], first[2], s, dt, 0.0, True)
+    place, push = np.full(m, -1), np.zeros((2, m))  # impulses in N s, forces in N
+    for c in range(m):
+        for p in range(len(pressed)):
+            if pressed[p][0] == who[c][0] and pressed[p][1] == who[c][1]:
+                place[c], push[1, c] = p, pressed[p][3]
+    start, left = push[1].copy(), min(LEEWAY[level], COARSE)
+    push_together(disks, world, acceleration, who, push, left, s, dt)
+    if world.friction > 0.0:
+        for c in range(m):
+            i, j = who[c]
+            path = path_of(disks, world, acceleration.now, i, j)
+            _, _, nx, ny = contact(path, s)
+            most, rise = world.friction * push[0, c], max(push[1, c] - start[c], 0.0)
+            rub(disks, acceleration.now, i, j, path, nx, ny, most, world.friction * rise, s)
+        push_together(disks, world, acceleration, who, push, left, s, dt)
+    for c in range(m):
+        i, j = who[c]
+        p, hold, impulse = int(place[c]), push[1, c], push[0, c] - (push[1, c] - start[c]) * s
+        if p >= 0:
+            row = pressed[p][2]
+            collisions[row] = (k, i, j, collisions[row][3] + impulse)
+            pressed[p] = (i, j, row, hold)
+        elif impulse > 0.0:
+            pressed.append((i, j, len(collisions), hold))
+            collisions.append((k, i, j, impulse))
+        for d in (i, max(i, j)):
+            if disks.mass[d] != inf:
+                acceleration.held[d] = level
+                account_for(near, disks.position, d, way_of(disks, acceleration.now, d, dt))
+    return TOGETHER, 0.0
+
+
+@compiled
+def touching(disks, world, acceleration, near, first, reach: float, slow: float) -> list:  # type: ignore[no-untyped-def]
+    """The contacts (i, j) that join the two that meet first and all that touch them in turn: closer
+    than `reach` radii, and closing by less than `slow` m/s."""
+    mass, pairs, s, who = disks.mass, near.found[PAIRS], first[0], [(0, 0) for _ in range(0)]
+    joined, taken = np.zeros(len(mass), np.bool_), np.zeros(pairs + near.found[WALLS], np.bool_)
+    count = -1
+    for d in (first[1], max(first[1], first[2])):
+        joined[d] = mass[d] != inf
+    while count != len(who) and holds(near):
+        count = len(who)
+        for p in range(len(taken)):
+            i = np.int64(near.first[p] if p < pairs else near.disk[p - pairs])
+            j = np.int64(near.second[p]) if p < pairs else -1 - np.int64(near.wall[p - pairs])
+            if taken[p] or not (joined[i] or joined[max(i, j)]):
+                continue
+            path = path_of(disks, world, acceleration, i, j)
+            gap, rate, _, _ = contact(path, s)
+            if gap < reach * path[8] and -rate < slow:
+                taken[p] = True
+                who.append((int(i), int(j)))
+                for d in (i, max(i, j)):
+                    joined[d] = mass[d] != inf
+    return who
+
+
+@compiled
+def push_together(disks, world, acceleration, who, push, left: float, s: float, dt: float) -> None:  # type: ignore[no-untyped-def]
+    """Change the impulses push[0] and then the forces push[1] (m,) of these contacts, from s on."""
+    m, h = len(who), max(-s, EXACT * dt)
+    normal, weight, open = np.empty((m, 2)), np.empty((m, 2)), np.empty(m)
+    for held in range(2):  # by an impulse, by a force
+        for c in range(m):
+            i, j = who[c]
+            path = path_of(disks, world, acceleration.now, i, j)
+            gap, rate, nx, ny = contact(path, s)
+            open[c] = rate + max(gap, 0.0) / h
+            if held:
+                straight = path[4] * nx + path[5] * ny
+                open[c] = 2.0 * open[c] / h + straight + lift(path, s, nx, ny)
+            normal[c, 0], normal[c, 1] = nx, ny
+            weight[c, 0], weight[c, 1] = weights(disks.mass, i, j)
+        before, scale = push[held].copy(), acceleration.strongest * (1.0 if held else h)
+        bodies = len(disks.mass) + len(world.walls)
+        press(who, weight, normal, open, push[held], bodies, left, scale)
+        for c in range(m):
+            i, j = who[c]
+            change, nx, ny = push[held, c] - before[c], normal[c, 0], normal[c, 1]
+            J, hold = (0.0, change) if held else (change, 0.0)
+            push_apart(disks, acceleration.now, i, j, nx, ny, J, hold, s)
+
+
+@compiled
+def press(who, weight, normal, open, push, bodies: int, left: float, scale: float) -> None:  # type: ignore[no-untyped-def]
+    """Change the pushes (m,) >= 0 of the contacts along their normals until `open` (m,), how fast
+    each opens, is 0 where a contact pushes and >= 0 elsewhere: but for what is `left` of the scale.
+
+    It is the minimum of a quadratic function over push >= 0 (the dual of Gauss's least constraint),
+    found by conjugate gradients over those that push (Polyak, USSR Comput. Math. 9, 94, 1969): in a
+    row or a column none stops to push, and it is exact whatever the masses.
+    """
+    m, pushes, last = len(push), push > 0.0, 0.0
+    along, effect, way = np.zeros(m), np.zeros(m), np.zeros((bodies, 2))
+    for c in range(m):
+        scale = max(scale, -open[c])
+    for _ in range(TURNS * (m + TURNS)):
+        square, closing = 0.0, 0.0
+        for c in range(m):
+            square += open[c] * open[c] if pushes[c] else 0.0
+            closing += open[c] * open[c] if open[c] < 0.0 and not pushes[c] else 0.0
+        if max(square, closing) <= left * left * scale * scale:
+            break
+        join = closing > square
+        if join:
+            square, last = square + closing, 0.0
+        share, curvature = square / last if last > 0.0 else 0.0, 0.0
+        for c in range(m):
+            pushes[c] = pushes[c] or (join and open[c] < 0.0)
+            along[c] = share * along[c] - open[c] if pushes[c] else 0.0
+        respond(who, weight, normal, along, way, effect)
+        for c in range(m):
+            curvature += along[c] * effect[c]
+        length, last, stops = square / curvature, square, -1
+        for c in range(m):
+            if push[c] + length * along[c] < 0.0:
+                length, stops = -push[c] / along[c], c
+        for c in range(m):
+            push[c] += length * along[c]
+            open[c] += length * effect[c]
+        if stops >= 0:
+            push[stops], pushes[stops], last = 0.0, False, 0.0
+
+
+@compiled
+def respond(who, weight, normal, push, way, effect) -> None:  # type: ignore[no-untyped-def]
+    """What pushes (m,) change in how fast each contact opens: effect (m,). Wall w, which never
+    moves, is row -1 - w of `way`, so counts from its end."""
+    way[:] = 0.0
+    for c in range(len(push)):
+        i, j = who[c]
+        for axis in range(2):
+            way[i, axis] += weight[c, 0] * push[c] * normal[c, axis]
+            way[j, axis] -= weight[c, 1] * push[c] * normal[c, axis]
+    for c in range(len(push)):
+        i, j = who[c]
+        x, y = way[i, 0] - way[j, 0], way[i, 1] - way[j, 1]
+        effect[c] = normal[c, 0] * x + normal[c, 1] * y
+
+
+@compiled
+def push_apart(  # type: ignore[no-untyped-def]
+    disks, acceleration, i: int, j: int, nx: float, ny: float, J: float, hold: float, s: float
 ) -> None:
-    """From s on, as if disk i had left with the impulse J and the force `hold` along n; (wx, wy) is
-    n / mass."""
-    for axis, w in enumerate((wx, wy)):
-        move(disks.position, disks.remainder, i, axis, (hold * (s * s / 2) - J * s) * w)
-        disks.velocity[i, axis] += (J - hold * s) * w
-        acceleration[i, axis] += hold * w
+    """From s on, as if the two had left with the impulse J and the force `hold` along n."""
+    wi, wj = weights(disks.mass, i, j)
+    for d, weight in ((i, wi), (j, -wj)):
+        if d < 0:
+            continue
+        for axis, n in enumerate((nx, ny)):
+            w = weight * n
+            move(disks.position, disks.remainder, d, axis, (hold * (s * s / 2) - J * s) * w)
+            disks.velocity[d, axis] += (J - hold * s) * w
+            acceleration[d, axis] += hold * w
 
 
 @compiled
 def rub(  # type: ignore[no-untyped-def]
-    disks: Disks,
-    acceleration,
-    i: int,
-    j: int,
-    path,
-    nx: float,
-    ny: float,
-    most: float,
-    most_held: float,
-    s: float,
+    disks, acceleration, i: int, j: int, path, nx, ny, most: float, most_held: float, s: float
 ) -> None:
     """Coulomb's friction from s on: at most the impulse `most` at once, then at most the force
     `most_held`, which brakes until the surfaces do not slide and from then on keeps them so.
@@ -480,21 +645,15 @@ def rub(  # type: ignore[no-untyped-def]
     The slip is that of i against j where they touch, along t = (-ny, nx). It is exact for one
     contact that lasts; of two of the same disk the second does not know that the first turns it.
     """
-    spin, torque, inertia, radius = (
-        disks.angular_velocity,
-        disks.torque,
-        disks.inertia,
-        disks.radius,
-    )
     slip = (path[3] + path[5] * s) * nx - (path[2] + path[4] * s) * ny
     growth = path[5] * nx - path[4] * ny  # of the slip in m/s2, as long as nothing brakes
     weight = 0.0
     for k in (i, j):
         if k >= 0:
-            turning = torque[k] / inertia[k]
-            slip -= radius[k] * (spin[k] + turning * s)
-            growth -= radius[k] * turning
-            weight += 1.0 / disks.mass[k] + radius[k] * radius[k] / inertia[k]
+            radius, turning = disks.radius[k], disks.torque[k] / disks.inertia[k]
+            slip -= radius * (disks.angular_velocity[k] + turning * s)
+            growth -= radius * turning
+            weight += 1.0 / disks.mass[k] + radius * radius / disks.inertia[k]
     J = min(max(-slip / weight, -most), most)
 
     # the force brakes until `stopped`, and holds from then on
@@ -505,30 +664,16 @@ def rub(  # type: ignore[no-untyped-def]
     hold = min(max(-growth / weight, -most_held), most_held) if stopped < 0.0 else brake
     impulse = J + brake * (stopped - s) - hold * stopped
     way = -J * s + (brake * (s * s - stopped * stopped) + hold * stopped * stopped) / 2
-    drag(disks, acceleration, i, -ny, nx, impulse, way, hold)
-    if j >= 0:
-        drag(disks, acceleration, j, ny, -nx, impulse, way, hold)
-
-
-@compiled
-def drag(  # type: ignore[no-untyped-def]
-    disks: Disks,
-    acceleration,
-    i: int,
-    tx: float,
-    ty: float,
-    impulse: float,
-    way: float,
-    hold: float,
-) -> None:
-    """By the end of the step disk i has got `impulse` N s along t where it is touched, moved by
-    `way` kg m over its mass, and is under the force `hold`."""
-    for axis, t in enumerate((tx, ty)):
-        move(disks.position, disks.remainder, i, axis, way * t / disks.mass[i])
-        disks.velocity[i, axis] += impulse * t / disks.mass[i]
-        acceleration[i, axis] += hold * t / disks.mass[i]
-    disks.angular_velocity[i] -= impulse * disks.radius[i] / disks.inertia[i]
-    disks.angle[i] -= way * disks.radius[i] / disks.inertia[i]
+    # the end of the step as it is with the impulse, moved by `way` kg m over the mass
+    for d, side in ((i, 1.0), (j, -1.0)):
+        if d < 0:
+            continue
+        for axis, t in enumerate((-ny * side, nx * side)):
+            move(disks.position, disks.remainder, d, axis, way * t / disks.mass[d])
+            disks.velocity[d, axis] += impulse * t / disks.mass[d]
+            acceleration[d, axis] += hold * t / disks.mass[d]
+        disks.angular_velocity[d] -= impulse * disks.radius[d] / disks.inertia[d]
+        disks.angle[d] -= way * disks.radius[d] / disks.inertia[d]
 
 
 @compiled

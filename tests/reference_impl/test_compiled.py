@@ -32,6 +32,18 @@ for solver, side, steps in SOLVERS:
     assert solver is not neighbours or len(n) > FEW
     played = b"".join(array.tobytes() for array in disks)
     sys.stdout.buffer.write(played + np.array(collisions).tobytes())
+# what lasts: a stack with friction, and a heap
+n = np.arange(9)
+stack = np.stack([np.zeros(4), 0.6 + 1.1 * np.arange(4)], -1)
+heap = np.stack([0.6 + 1.05 * (n % 3) + 0.02 * np.sin(n), 0.6 + 1.05 * (n // 3)], -1)
+box = np.array([[[-5, 0], [5, 0]], [[0, 0], [0, 9]], [[3.3, 0], [3.3, 9]]], float)
+LASTING = ((stack, box[:1], 0.3, 0.3), (heap, box, 0.5, 0.0), (heap, box, 0.0, 0.3))
+for x, walls, e, friction in LASTING:
+    world = World(gravity=np.array([0, -10.0]), walls=walls, restitution=e, friction=friction)
+    disks = make_disks(x, np.zeros_like(x), np.full(len(x), 0.5), 1.0 + np.arange(len(x)) % 3)
+    collisions = ordered.advance(disks, world, 1 / 60, 60)
+    played = b"".join(array.tobytes() for array in disks)
+    sys.stdout.buffer.write(played + np.array(collisions).tobytes())
 """
 
 

@@ -253,13 +253,11 @@ def sunk_by(scene, disks, steps=90, dt=1 / 120):
     return deepest
 
 
-def test_disks_at_rest_take_the_collisions_of_a_step_from_each_other():
-    """The cause of the slip at rest of `reference:ordered` in `roll_or_slide`: with others beside
-    it a disk falls freely for a step, g cos(angle) dt2 / 2 deep or more; alone it stays."""
+def test_disks_at_rest_take_no_collisions_of_a_step_from_each_other():
+    """Each meets its incline again and again at the same instant, by the rounding of the force that
+    holds it: after `MOST` times that is no collision. Else one would fall freely for a step, by g
+    cos(angle) dt2 / 2 or more."""
     scene = scenario("roll_or_slide").scene
     together = sunk_by(scene, np.arange(scene.n))
-    alone = np.concatenate([sunk_by(scene, np.array([k])) for k in range(scene.n)])
-    cosines = np.array([12 / 13, 15 / 17, 4 / 5, 21 / 29, 7 / 25])
-    assert (together > 0.99 * 9.81 * cosines / 120**2 / 2).any()
-    # some hundred steps round a height of up to 4 m
-    assert (alone < 1e3 * ROUNDING * 4).all()
+    # some hundred steps round a height of up to 4 m, and `EXACT` of a radius may be left
+    assert (together < 1e3 * ROUNDING * 4 + ordered.EXACT * scene.radius).all()

@@ -11,6 +11,7 @@ import pytest
 from adapters.event_driven.events import EventEngine
 from adapters.reference import Reference
 from reference_impl import neighbours, ordered
+from scenarios.catalogue import scenario
 from scenarios.families.placing import box
 from scenarios.model import Scenario, Scene
 from scenarios.truth.exact import computed
@@ -192,11 +193,14 @@ def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
 )
-def test_a_heap_takes_a_bounded_number_of_collisions_a_step_and_shows_what_it_leaves_as_overlap(
+def test_a_heap_takes_few_collisions_a_step_and_neither_overlaps_nor_gains_energy(
     seed,
 ):
-    """Thirty disks that fall onto each other: no order of collisions has an end; nothing blows up,
-    and nothing is hidden."""
+    """Thirty disks that fall onto each other. Beside the collisions, each contact that lasts has an
+    entry a step: fewer than three pairs a disk touch in a plane, and a disk touches one wall or so.
+
+    Each step leaves 2^-20 of g dt2 / 2 and of the radii at most (`COARSE`), 300 steps 300 times it.
+    """
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(5)), -1).reshape(-1, 2)
     scene = Scene(
@@ -208,14 +212,116 @@ def test_a_heap_takes_a_bounded_number_of_collisions_a_step_and_shows_what_it_le
         gravity=[0.0, -10.0],
         walls=box([0.0, 0.0], [6.6, 20.0]),
     )
-    engine = played(scene, 1 / 60, 300)
+    engine, deepest, gain = steps_of(scene, 1 / 60, 300)
     a_step = np.bincount([collision.step for collision in engine.collisions()])
-    state = engine.read()
-    assert a_step.max() <= ordered.MOST * 30
-    assert np.isfinite(state.position).all()
-    energy = (state.velocity**2).sum() / 2 + 10 * state.position[:, 1].sum()
-    start = (scene.velocity**2).sum() / 2 + 10 * scene.position[:, 1].sum()
-    assert energy < start
+    assert a_step.max() <= (ordered.MOST + 4) * 30
+    assert deepest < 300 * 2 * ordered.COARSE
+    assert gain < 300 * ordered.COARSE
+
+
+def steps_of(scene, dt, steps, variant=ordered):
+    """The engine; the deepest overlap of two disks, or a disk and a level or upright wall, in
+    radii; and the largest gain of energy in a step as a share of that at the start."""
+    engine, (i, j), deepest, gain = Reference(variant), np.triu_indices(scene.n, 1), 0.0, 0.0
+    engine.load(scene, dt)
+
+    def energy(state):
+        turning = scene.inertia @ state.angular_velocity**2 / 2
+        falling = scene.mass @ (
+            (state.velocity**2).sum(axis=1) / 2 - state.position @ scene.gravity
+        )
+        return turning + falling
+
+    before = start = energy(scene.state)
+    for _ in range(steps):
+        engine.step()
+        state = engine.read()
+        x, r = state.position, scene.radius
+        gaps = (np.hypot(*(x[i] - x[j]).T) - r[i] - r[j]) / np.minimum(r[i], r[j])
+        nearest = np.clip(x[:, None], scene.walls.min(axis=1), scene.walls.max(axis=1))
+        walls = np.hypot(*np.moveaxis(x[:, None] - nearest, -1, 0)) / r[:, None] - 1
+        deepest = max(deepest, -gaps.min(initial=0.0), -walls.min())
+        gain, before = max(gain, (energy(state) - before) / abs(start)), energy(state)
+    return engine, deepest, gain
+
+
+def column(masses, e=0.0, gap=0.0, friction=0.0):
+    """Disks of 0.5 m above each other on a floor, and as far apart as the gap."""
+    n = len(masses)
+    return Scene(
+        position=np.stack([np.zeros(n), 0.5 + gap + np.arange(n) * (1 + gap)], axis=-1),
+        velocity=np.zeros((n, 2)),
+        radius=[0.5] * n,
+        mass=masses,
+        restitution=e,
+        friction=friction,
+        gravity=[0.0, -10.0],
+        walls=[[[-5.0, 0.0], [5.0, 0.0]]],
+    )
+
+
+STACKS = {
+    "column_of_ten": scenario("column_of_ten").scene,
+    "heavy on light": column([1.0, 100.0], gap=0.4),
+    "light on heavy": column([100.0, 1.0], gap=0.4),
+    "friction": column([1.0] * 4, e=0.3, gap=0.3, friction=0.5),
+    "nine under 1e4 kg": column([1.0] * 9 + [1e4]),
+    "thirty": column([1.0] * 30),
+    "ten fall": column([1.0] * 10, e=0.5, gap=0.1),
+}
+
+
+@pytest.mark.parametrize("name", STACKS)
+def test_a_stack_stands_neither_overlaps_nor_gains_energy(name):
+    """Each step may leave `EXACT` of a radius, and 2^-40 of g dt2 / 2 on top of it, 300 times; with
+    1e4 kg on 1 kg the rounding of the heavy one's push is 1e4 times as large."""
+    engine, deepest, gain = steps_of(STACKS[name], 1 / 60, 300)
+    assert deepest < 10 * ordered.EXACT
+    assert gain < 10 * ordered.EXACT
+    assert np.abs(engine.read().velocity).max() < 1e-9
+    floor = [hit.impulse for hit in engine.collisions() if hit.step >= 240 and hit.j == -1]
+    weight = STACKS[name].mass.sum() * -STACKS[name].gravity[1]
+    assert sum(floor) == pytest.approx(weight * 60 / 60, rel=1e-9)
+
+
+def test_projection_pair_by_pair_overlaps_in_a_stack():
+    """The control of what a stack is measured by."""
+    assert steps_of(STACKS["column_of_ten"], 1 / 60, 60, neighbours)[1] > 1e-2
+
+
+def test_a_disk_at_rest_beside_a_stack_stays_as_alone():
+    """To a few roundings a step: it is in no solution of the stack. Not to the bit: alone it has 8
+    collisions a step, beside the stack it shares 40; and there it may overlap by `EXACT`, so that a
+    rounding does not use up those of all.
+    """
+    stack, alone = column([1.0] * 4, e=0.5, gap=0.1), column([1.0], e=0.5, gap=0.3)
+    both = {
+        name: np.concatenate([getattr(stack, name), getattr(alone, name)])
+        for name in ("velocity", "radius", "mass", "inertia", "angle", "angular_velocity")
+    }
+    beside = replace(stack, position=np.vstack([stack.position, [[3.0, 0.8]]]), **both)
+    alone = replace(alone, position=[[3.0, 0.8]])
+    ends = [played(scene, 1 / 64, 200).read() for scene in (beside, alone)]
+    assert np.abs(ends[0].position[4:] - ends[1].position).max() < 200 * 4 * ROUNDING
+    assert np.abs(ends[0].velocity[4:] - ends[1].velocity).max() < 200 * 4 * ROUNDING
+
+
+@pytest.mark.parametrize("e", [0.5, 1.0])
+def test_a_contact_that_a_collision_opens_pushes_no_more(e):
+    """A disk that is struck after it was held flies off without the force: with it, this scene
+    gained up to 2e-3 of its energy in a step."""
+    stack = column([1.0] * 5, e=e)
+    scene = replace(
+        stack,
+        position=np.vstack([stack.position, [[-3.0, 2.5]]]),
+        velocity=np.vstack([stack.velocity, [[5.0, 0.0]]]),
+        **{name: np.append(getattr(stack, name), 0.0) for name in ("angle", "angular_velocity")},
+        **{
+            name: np.append(getattr(stack, name), getattr(stack, name)[0])
+            for name in ("radius", "mass", "inertia")
+        },
+    )
+    assert steps_of(scene, 1 / 60, 90)[2] < 10 * ROUNDING
 
 
 def sliding_past(speed):
