@@ -1,6 +1,6 @@
 """The yardstick: which numbers does a change of the code change?
 
-    uv run python .ci/yardstick.py all              the base and this checkout, then compare
+    uv run --extra js python .ci/yardstick.py all   the base and this checkout, then compare
     ... measure OUT [--root CHECKOUT] [--groups suite,truths]
     ... compare BASE NEW                            exit 1: something that changed.toml lacks
     ... keep BASE COMMIT                            a new base: its hashes go to base.toml
@@ -21,13 +21,12 @@ import json
 import math
 import os
 import random
-import re
 import shutil
 import subprocess
 import sys
 import time
 import tomllib
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -138,7 +137,7 @@ def random_scene(number: int) -> str:
         "loose": [[complex(x + rng.random(), rng.uniform(0, 4)) for x in (1, 4)] for _ in "ab"],
         "floor": [[-50 + 0j, 50 + 0j]],
     }.get(place, [])
-    lines += [f"[[wall]]\nstart = {pair(start)}\nend = {pair(end)}" for start, end in walls]
+    lines += [f"[[wall]]\nstart = {x_and_y(start)}\nend = {x_and_y(end)}" for start, end in walls]
     lines += [] if walls else [f"[{place}]\nlow = [0.0, 0.0]\nhigh = [6.0, 4.0]"]
     disks: list[tuple[complex, float]] = []
     while len(disks) < 2 + number % 7:
@@ -152,7 +151,7 @@ def random_scene(number: int) -> str:
             continue
         moves = not disks or place == "wrap" or rng.random() < 0.85
         disks.append((at, r))
-        lines.append(f"[[disk]]\nposition = {pair(at)}\nradius = {r}")
+        lines.append(f"[[disk]]\nposition = {x_and_y(at)}\nradius = {r}")
         lines.append(
             f"velocity = [{rng.gauss(0, 2)}, {rng.gauss(0, 2)}]\nmass = {rng.uniform(0.5, 4)}\n"
             f"angular_velocity = {rng.choice((0.0, rng.gauss(0, 5)))}"
@@ -165,8 +164,8 @@ def random_scene(number: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def pair(place: complex) -> list[float]:
-    """x and y."""
+def x_and_y(place: complex) -> list[float]:
+    """m."""
     return [place.real, place.imag]
 
 
@@ -302,7 +301,7 @@ GROUPS: dict[str, Callable[[Path], Numbers]] = {
 }
 
 
-def write_group(name: str, out: Path) -> None:
+def write_group(name: str, out: Path) -> int:
     """In the checkout: the numbers of a group, sorted by id."""
     lines: dict[str, str] = {}
     with TemporaryDirectory() as folder:
@@ -312,10 +311,11 @@ def write_group(name: str, out: Path) -> None:
             lines[key] = value if isinstance(value, str) else float(value).hex()
     text = "".join(f"{key}\t{lines[key]}\n" for key in sorted(lines))
     (out / f"{name}.tsv").write_text(text, "utf-8")
+    return 0
 
 
-def measure(out: Path, root: Path, groups: list[str]) -> bool:
-    """Measure groups of a checkout, two at a time; whether all could be measured."""
+def measure(out: Path, root: Path, groups: list[str]) -> int:
+    """Measure groups of a checkout, two at a time; 1 if one could not be measured."""
     out.mkdir(parents=True, exist_ok=True)
     out, root = out.resolve(), root.resolve()
     # of this checkout the environment that runs, which need not be .venv
@@ -345,7 +345,7 @@ def measure(out: Path, root: Path, groups: list[str]) -> bool:
     fetched = run("fetch", python.parent / "crosscheck", *line)
     with ThreadPoolExecutor(2) as pool:
         chosen = [name for name in GROUPS if name in groups]
-        return all([fetched, *pool.map(run_group, chosen)])
+        return int(not all([fetched, *pool.map(run_group, chosen)]))
 
 
 def read(folder: Path, groups: list[str]) -> dict[str, str]:
@@ -357,13 +357,11 @@ def read(folder: Path, groups: list[str]) -> dict[str, str]:
 
 def hashes(numbers: dict[str, str]) -> dict[str, str]:
     """Kind of id -> how many, and a hash of all."""
-    kinds = defaultdict(list)
+    kinds: dict[str, list[str]] = {}
     for key in sorted(numbers):
-        kinds[key.partition("/")[0]].append(f"{key}\t{numbers[key]}\n")
-    return {
-        kind: f"{len(lines)} {hashlib.sha256(''.join(lines).encode()).hexdigest()[:32]}"
-        for kind, lines in sorted(kinds.items())
-    }
+        kinds.setdefault(key.partition("/")[0], []).append(f"{key}\t{numbers[key]}\n")
+    sums = {kind: hashlib.sha256("".join(lines).encode()) for kind, lines in kinds.items()}
+    return {kind: f"{len(kinds[kind])} {sums[kind].hexdigest()[:32]}" for kind in kinds}
 
 
 PRINTED = 40  # faults
@@ -433,15 +431,9 @@ def decimal(value: str) -> str:
 
 def show(base: Path, new: Path, groups: list[str]) -> int:
     """Print what is wrong, all of it to NEW/faults.tsv; the exit status."""
-    lacking = [
-        path
-        for folder in (base, new)
-        for name in groups
-        if not (path := folder / f"{name}.tsv").exists()
-    ]
-    whole = [
-        name for name in groups if not {base / f"{name}.tsv", new / f"{name}.tsv"} & {*lacking}
-    ]
+    places = {name: (base / f"{name}.tsv", new / f"{name}.tsv") for name in groups}
+    lacking = [path for pair in places.values() for path in pair if not path.exists()]
+    whole = [name for name in groups if not {*places[name]} & {*lacking}]
     before, after = read(base, whole), read(new, whole)
     kept = tomllib.loads((KEPT / "base.toml").read_text())["numbers"]
     for kind, now in hashes(before).items():
@@ -452,7 +444,7 @@ def show(base: Path, new: Path, groups: list[str]) -> int:
     faults += compare(before, after, changes, len(whole) == len(GROUPS))
     (new / "faults.tsv").write_text("".join(f"{fault}\n" for fault in faults), "utf-8")
     print("".join(f"{fault}\n" for fault in faults[:PRINTED]), end="")
-    for what, count in Counter(" ".join(re.split("[\t/]", one)[:2]) for one in faults).items():
+    for what, count in Counter(fault.partition("/")[0] for fault in faults).items():
         print(f"{count} {what}")
     fresh = len(after.keys() - before.keys())
     print(f"{len(before)} ids, {fresh} new: {len(faults)} faults, in {new / 'faults.tsv'}")
@@ -477,12 +469,15 @@ def make_base(groups: list[str]) -> Path:
     return numbers
 
 
-def keep(base: Path, commit: str) -> None:
-    """Write base.toml."""
+def keep(base: Path, commit: str) -> int:
+    """Write base.toml; raises `ValueError` where a group is missing."""
+    if lacking := [name for name in GROUPS if not (base / f"{name}.tsv").exists()]:
+        raise ValueError(f"{base}: lacks {', '.join(lacking)}; measure these first")
     lines = [f'{kind} = "{text}"\n' for kind, text in hashes(read(base, [*GROUPS])).items()]
     head = "# The base: its commit, and of each kind of number how many there are and their hash.\n"
     text = f'{head}commit = "{commit}"\n\n[numbers]\n{"".join(lines)}'
     (KEPT / "base.toml").write_text(text)
+    return 0
 
 
 def main() -> int:
@@ -500,24 +495,23 @@ def main() -> int:
         parser.error(f"{given.command}: takes {needed} arguments")
     places = [Path(place) for place in given.places]
     try:
-        if given.command == "group":
-            write_group(given.places[0], places[1])
-        elif given.command == "measure":
-            return int(not measure(places[0], given.root, groups))
-        elif given.command == "keep":
-            keep(places[0], given.places[1])
-        elif given.command == "compare":
-            return show(*places, groups)
-        else:
-            base, new = make_base(groups), CACHE / "new"
-            measure(new, given.root, groups)
-            return show(base, new, groups)
+        match given.command:
+            case "group":
+                return write_group(given.places[0], places[1])
+            case "measure":
+                return measure(places[0], given.root, groups)
+            case "keep":
+                return keep(places[0], given.places[1])
+            case "compare":
+                return show(places[0], places[1], groups)
+        base, new = make_base(groups), CACHE / "new"
+        measure(new, given.root, groups)
+        return show(base, new, groups)
     except (ValueError, OSError, subprocess.CalledProcessError) as fault:
         if given.command == "group":
             raise
         print(fault, file=sys.stderr)
         return 2
-    return 0
 
 
 if __name__ == "__main__":
