@@ -125,7 +125,7 @@ def effective_restitution(
     late = (closing > slowest) & ~fast
     unclear = crowded + int(np.isnan(closing).sum())
     # what closes more slowly is the weight of a disk that lies
-    slow = int(((closing > slowest / 10) & ~fast & ~late).sum())
+    slow = int(((closing > slowest / 5) & ~fast & ~late).sum())
     closing, separating, gained, lost = (
         column[fast] for column in (closing, separating, gained, lost)
     )
