@@ -5,7 +5,7 @@ from __future__ import annotations
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED
 from adapters.npm_packages import missing
-from reports.compare.metrics import METRICS, Metric
+from reports.compare.metrics import METRICS, SCALES, Metric
 from reports.run.arguments import unknown
 from reports.terminal.console import Console
 from reports.terminal.exits import refuse
@@ -28,6 +28,8 @@ def explain(what: str) -> None:
         if what in ("", kind):
             print_texts(console, lines, f"{len(lines)} {kind}")
             console.print()
+    if what in ("", "metrics"):
+        print_texts(console, SCALES, "Scales, by which errors are divided")
 
 
 def _engine(row: EngineRow) -> str:

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenarios.model import Array, Scene, Trajectory
+from scenarios.model import Array, Scene, Thrust, Trajectory
 
 Law = TypeVar("Law", bound=Callable[..., Any])
 
@@ -136,7 +136,8 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
 
 def tunnelled(trajectory: Trajectory, scene: Scene) -> np.ndarray:
     """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line.
-    If a sample lies on the wall itself, the side of the sample before it counts."""
+    If a sample lies on the wall itself, the side of the sample before it counts. A disk that wraps
+    moves out of one edge and in at the other, and not across the box."""
     through = np.zeros(scene.n, dtype=bool)
     x, number = trajectory.position, np.arange(len(trajectory))[:, None]
     for a, b in scene.walls:
@@ -144,10 +145,35 @@ def tunnelled(trajectory: Trajectory, scene: Scene) -> np.ndarray:
         tells = np.abs(side) > ON_THE_WALL * scene.radius * lengths(b - a)
         last = np.maximum.accumulate(np.where(tells, number, 0), axis=0)[:-1]
         start, end = np.take_along_axis(x, last[..., None], axis=0), x[1:]
-        sides = np.take_along_axis(side, last, axis=0) * side[1:]
-        ends = cross(a - start, end - start) * cross(b - start, end - start)
-        through |= ((sides < 0) & tells[1:] & (ends <= 0)).any(axis=0)
+        way = nearer_way(end - start, scene)
+        # a wrap cuts the way in two: one part leaves the start, the other arrives at the end
+        parts = (
+            [(start, start + way), (end - way, end)] if scene.wrap is not None else [(start, end)]
+        )
+        for first, second in parts:
+            sides = cross(first - a, b - a) * cross(second - a, b - a)
+            ends = cross(a - first, way) * cross(b - first, way)
+            through |= ((sides < 0) & tells[1:] & (ends <= 0)).any(axis=0)
     return through
+
+
+def apexes(height: Array) -> tuple[np.ndarray, Array]:
+    """(m,) the highest sample of each flight, and (m,) m, the vertex of the parabola through it and
+    the two beside it; of the first flight, which may begin with a drop, through its first three.
+
+    `height`: (k,) m of a disk. A flight with fewer samples is left out.
+    """
+    y = height
+    top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
+    top = np.concatenate([[1], top[top > 1]]) if len(y) > 2 else top
+    before, at, after = y[top - 1], y[top], y[top + 1]
+    bend = before - 2 * at + after
+    return top, at - (after - before) ** 2 / (8 * np.where(bend == 0.0, np.nan, bend))
+
+
+def time_on(thrust: Thrust, t: Array | float) -> Array:
+    """(k,) s for which the thrust has been on by `t`."""
+    return np.clip(t - thrust.start, 0.0, thrust.stop - thrust.start)
 
 
 def cross(u: Array, v: Array) -> Array:
