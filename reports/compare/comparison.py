@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
 from reports.compare.table import TableRow, deviation_row, status_row, table_of, verdict_row
-from reports.compare.verdicts import verdicts
+from reports.compare.verdicts import fails, in_words, verdicts
 from reports.compare.view import View, beside, not_judged, rounding_of
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -27,6 +28,18 @@ class Comparison:
     truth: Trajectory | None  # the exact answer up to its horizon
     runs: Sequence[Run]  # also failed and refused ones, in the order of `ENGINES`, coarse dt first
     table: pd.DataFrame  # one number a row
+
+    @cached_property
+    def failed(self) -> Mapping[tuple[str, float], str]:
+        """(`engine:profile`, dt in s) -> the first verdict that the run fails, in words."""
+        rows = fails(self.table)[::-1]  # of several the first stays
+        names = zip(rows.engine + ":" + rows.profile, rows.dt_s.astype(float))
+        return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
+
+    @cached_property
+    def failed_at_middle_dt(self) -> Mapping[str, str]:
+        """`engine:profile` -> the first verdict that it fails at the middle step size."""
+        return {name: words for (name, dt), words in self.failed.items() if dt == self.middle_dt}
 
     @property
     def middle_dt(self) -> float:
