@@ -16,7 +16,7 @@ k samples, n disks; R is the radius of the smaller disk of a pair.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -95,6 +95,11 @@ class Verdict:
     def unit(self) -> str:
         """The unit of the value."""
         return VERDICTS[self.id].unit
+
+    @property
+    def text(self) -> str:
+        """What is said of a run that fails it."""
+        return in_words(self.id, self.value)
 
 
 def verdicts(
@@ -508,8 +513,3 @@ def worst_of(
 def detour(start: Array, end: Array, around: Array) -> float:
     """m, the way from start to end by a third point."""
     return float(laws.lengths(around - start) + laws.lengths(end - around))
-
-
-def failed_ids(found: Sequence[Verdict]) -> list[str]:
-    """The ids of those that fail."""
-    return [verdict.id for verdict in found if verdict.failed]

@@ -6,7 +6,7 @@ import numpy as np
 
 from reports.compare import laws
 from reports.compare.collisions import match, pair_keys, who
-from reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, in_words, verdicts
+from reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
 from reports.compare.view import cut
 from reports.stability.predicates import Predicate, Reading, largest
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
@@ -32,8 +32,7 @@ def _reading(verdict: Verdict) -> Reading:
     """A verdict in units of its bound."""
     value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
     disk = verdict.disks[0] if verdict.disks else -1
-    text = in_words(verdict.id, verdict.value)
-    return Reading(value, verdict.at, text, verdict.id, disk=disk)
+    return Reading(value, verdict.at, verdict.text, verdict.id, disk=disk)
 
 
 def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
