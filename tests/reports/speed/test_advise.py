@@ -101,9 +101,7 @@ def test_an_option_is_more_accurate_only_if_it_is_at_the_neighbouring_step_sizes
 def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
     """In a column the collisions accumulate: `event_driven` refuses to go on."""
     dt = open_scene("column_of_ten", 0).dt(1)
-    found = [
-        Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "box2d:matched")
-    ]
+    found = [Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "box2d:matched")]
     with Progress() as progress:
         able, partly = Inquiry("column_of_ten", 0, "trajectory", 1, progress).to_the_end(found)
 
