@@ -577,7 +577,7 @@ def list_(
         typer.Argument(metavar="engines|scenarios|metrics", help="Default: all three."),
     ] = "",
 ) -> None:
-    """List engines, scenarios and metrics, and say what each is."""
+    """List engines, scenarios, metrics and verdicts, and say what each is."""
     from reports.commands.listing import explain
 
     explain(what)

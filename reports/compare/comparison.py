@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,9 @@ from adapters.run import Run
 from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
-from reports.compare.table import TableRow, deviation_row, status_row, table_of
-from reports.compare.view import View, beside, not_judged
+from reports.compare.table import TableRow, deviation_row, status_row, table_of, verdict_row
+from reports.compare.verdicts import fails, in_words, verdicts
+from reports.compare.view import View, beside, not_judged, rounding_of
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
 
@@ -27,6 +29,18 @@ class Comparison:
     runs: Sequence[Run]  # also failed and refused ones, in the order of `ENGINES`, coarse dt first
     table: pd.DataFrame  # one number a row
 
+    @cached_property
+    def failed(self) -> Mapping[tuple[str, float], str]:
+        """(`engine:profile`, dt in s) -> the first verdict that the run fails, in words."""
+        rows = fails(self.table)[::-1]  # of several the first stays
+        names = zip(rows.engine + ":" + rows.profile, rows.dt_s.astype(float))
+        return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
+
+    @cached_property
+    def failed_at_middle_dt(self) -> Mapping[str, str]:
+        """`engine:profile` -> the first verdict that it fails at the middle step size."""
+        return {name: words for (name, dt), words in self.failed.items() if dt == self.middle_dt}
+
     @property
     def middle_dt(self) -> float:
         """s, the middle step size, whose errors are the scores of the report."""
@@ -39,7 +53,8 @@ class Comparison:
 
 
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
-    """Every metric of every run against the laws, the truth and every other engine at the same dt.
+    """Every metric of every run against the laws, the truth and every other engine at the same dt;
+    and its verdicts.
 
     A run that failed has one row with its status, and no score.
     """
@@ -53,6 +68,9 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
         for versus, other, silent in _opponents(run, runs, truth):
             view = beside(scenario, run, other, jumps if versus == TRUTH else None, silent)
             rows += _measure(run, view, versus)
+        assert run.trajectory is not None
+        judged = verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
+        rows += [verdict_row(run, verdict) for verdict in judged]
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
 
 

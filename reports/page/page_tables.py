@@ -11,11 +11,12 @@ import pandas as pd
 from adapters.matched import searched
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS, Metric
+from reports.compare.verdicts import VERDICTS, Kind
 from reports.page import overview, situations, style
 from reports.page.trust import how_far_to_trust
 from reports.run.known_answers import MEANING
 
-VERDICTS = ("keeps", "not asked", "departs", "breaks")
+OUTCOMES = ("keeps", "not asked", "departs", "breaks")
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class PageTables:
         settings: engine -> its (setting, asked, used) that are the same in every scenario.
         searched: engine -> the settings that were searched for its matched profile.
         metrics: name -> metric.
+        verdicts: id -> what a verdict is about.
     """
 
     columns: Mapping[str, overview.SummaryColumn]
@@ -52,6 +54,7 @@ class PageTables:
     settings: Mapping[str, Sequence[tuple[str, str, str]]]
     searched: Mapping[str, Sequence[Mapping[str, str]]]
     metrics: Mapping[str, Metric]
+    verdicts: Mapping[str, Kind]
 
 
 def page_tables(
@@ -79,6 +82,7 @@ def page_tables(
         settings=by_name(overview.common_settings(comparisons)),
         searched=by_engine(searched()),
         metrics=METRICS,
+        verdicts=VERDICTS,
     )
 
 
@@ -135,7 +139,7 @@ def records(table: pd.DataFrame | None) -> list[dict[str, Any]]:
 
 def conformance_matrix(table: pd.DataFrame) -> dict[str, dict[str, tuple[str, int]]]:
     """probe -> `engine:profile` -> (the worst verdict, how many of its questions got it)."""
-    order = VERDICTS
+    order = OUTCOMES
     matrix: dict[str, dict[str, tuple[str, int]]] = {}
     for row in records(table):
         name = f"{row['engine']}:{row['profile']}"

@@ -20,7 +20,8 @@ from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
-from reports.compare.view import beside
+from reports.compare.verdicts import verdicts
+from reports.compare.view import beside, rounding_of
 from reports.page.style import number
 from reports.run.machine import busy_cores
 from reports.run.scenes import open_scene
@@ -69,6 +70,7 @@ class Attempt:
         error: of the purpose; inf where the run failed, nan where it cannot be judged.
         reason: why it failed, else "".
         cost: s per simulated second, nan where not timed.
+        broken: whether it failed by a verdict.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Attempt:
     error: float
     reason: str = ""
     cost: float = nan
+    broken: bool = False
 
     @property
     def make(self) -> Callable[[], Engine]:
@@ -138,11 +141,12 @@ class Advice:
         until, duration: s, up to where errors are judged, and how long the scene is.
         collisions: how many of the exact answer are judged.
         step_sizes: s, those that were tried, coarse to fine.
-        keeping: for every engine that keeps the error, and plays the whole scene, the coarsest step
-            size at which it keeps it, as at every finer one; cheapest first.
+        keeping: for every engine that keeps the error, and plays the whole scene without failing a
+            verdict, the coarsest step size at which it does, and keeps the error at every finer
+            one; cheapest first.
         short: the engines that do not keep it.
-        partial: those that keep it where it is judged, but do not play the whole scene; the reason
-            of each says how far it gets.
+        partial: those that keep it where it is judged, but do not play the whole scene, or fail a
+            verdict in it at every step size that keeps it; with the reason.
         changes: options of the engines that keep it, changed one at a time.
         noise: the upper quartile of |log(cost / cost of its own copy)| over the engines.
         busy: cores that others kept busy when the timing began; nan where unknown.
@@ -226,7 +230,7 @@ class Inquiry:
         tried = self.attempts([(name, PLAIN, k) for name in names for k in ladder])
         by_engine = {name: [one for one in tried if one.name == name] for name in names}
         kept = {name: those_that_keep(each, bound) for name, each in by_engine.items()}
-        keeping, partly = self.to_the_end([each[0] for each in kept.values() if each])
+        keeping, partly = self.first_to_the_end([each for each in kept.values() if each])
         at = {one.name: one.substeps for one in keeping}
         optional = self.attempts(
             [
@@ -274,17 +278,40 @@ class Inquiry:
             for one in wanted
         ]
 
+    def first_to_the_end(
+        self, ladders: Sequence[Sequence[Attempt]]
+    ) -> tuple[list[Attempt], list[Attempt]]:
+        """Of each engine the coarsest of its attempts that is able, as in `to_the_end`: where one
+        fails a verdict the next finer one is tried. Of those that never are the finest tried."""
+        able: list[Attempt] = []
+        unable: list[Attempt] = []
+        first: dict[str, str] = {}
+        while ladders:
+            passed, failed = self.to_the_end([each[0] for each in ladders])
+            finer = {each[0].name: each[1:] for each in ladders if len(each) > 1}
+            able += passed
+            for one in failed:
+                at_dt = f"{one.reason} (dt {number(one.dt * 1e3)} ms)" if one.broken else one.reason
+                coarse = first.setdefault(one.name, at_dt)
+                if not (one.broken and one.name in finer):
+                    both = dict.fromkeys((coarse, at_dt))
+                    unable.append(replace(one, reason="; ".join(both)))
+            ladders = [finer[one.name] for one in failed if one.broken and one.name in finer]
+        return able, unable
+
     def to_the_end(self, wanted: Sequence[Attempt]) -> tuple[list[Attempt], list[Attempt]]:
-        """The attempts that play the whole scene, beyond the horizon of its exact answer, too; and
-        those that do not, each with the reason."""
+        """The attempts that play the whole scene, beyond the horizon of its exact answer, too, and
+        fail no verdict in it; and those that do not, each with the reason."""
         tasks = {one.task: partial(end_of, self.scene, self.seed, one) for one in wanted}
         outcomes = self.done(tasks, "playing to the end")
         able: list[Attempt] = []
         partly: list[Attempt] = []
         for one in wanted:
             outcome = outcomes[one.task]
-            why = f"{outcome.status}: {outcome.reason}" if isinstance(outcome, Failure) else outcome
-            (partly if why else able).append(replace(one, reason=why))
+            if isinstance(outcome, Failure):
+                outcome = f"{outcome.status}: {outcome.reason}", False
+            why, broken = outcome
+            (partly if why else able).append(replace(one, reason=why, broken=broken))
         return able, partly
 
     def timed(
@@ -380,14 +407,18 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
     return error, "" if not isnan(error) else "too little of it can be judged"
 
 
-def end_of(scene: str, seed: int, one: Attempt) -> str:
-    """Why the attempt does not play the whole scene, and how far it gets; "" if it does."""
+def end_of(scene: str, seed: int, one: Attempt) -> tuple[str, bool]:
+    """Why the attempt does not play the whole scene, and how far it gets, or the verdict that it
+    fails in it; "" if neither; and whether it is a verdict."""
     scenario = open_scene(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
-    if run.status == "ok":
-        return ""
+    if run.status == "ok" and run.trajectory is not None:
+        truth = scored(scene, seed).truth
+        judged = verdicts(scenario, run.trajectory, one.dt, rounding_of(one.name), truth)
+        failed = next((verdict for verdict in judged if verdict.failed), None)
+        return (f"{failed.text} at {failed.at:.3g} s", True) if failed else ("", False)
     until = f", up to {run.trajectory.t[-1]:.3g} s" if run.trajectory is not None else ""
-    return f"{run.status}{until}: {run.reason}"
+    return f"{run.status}{until}: {run.reason}", False
 
 
 def times_of_whole(

@@ -10,6 +10,7 @@ import numpy as np
 
 from adapters.run import Run
 from reports.compare import laws
+from reports.compare.verdicts import MOST_BOUNCE
 from scenarios.model import Array, Scenario, Trajectory
 
 
@@ -260,7 +261,7 @@ ANGLE_OFF = Predicate(
 BOUNCES_OFF = Predicate(
     "bounce off",
     "of the height",
-    0.01,
+    MOST_BOUNCE,
     "a bounce changes the height that the ball reaches",
     _bounces_off,
 )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.compare import laws
+from reports.compare.verdicts import MOST_MOMENTUM
 from reports.stability.hard_disks import Gas, gas_in_box
 from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
 from scenarios.model import Array, Scenario, Trajectory
@@ -146,7 +147,7 @@ ENERGY_DRIFTS = Predicate(
 MOMENTUM_DRIFTS = Predicate(
     "momentum drifts",
     "of all momenta",
-    1e-5,
+    MOST_MOMENTUM,
     "the momentum changes by more than a hundred roundings of float32",
     _momentum_drifts,
 )

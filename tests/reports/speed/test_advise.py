@@ -101,13 +101,11 @@ def test_an_option_is_more_accurate_only_if_it_is_at_the_neighbouring_step_sizes
 def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
     """In a column the collisions accumulate: `event_driven` refuses to go on."""
     dt = open_scene("column_of_ten", 0).dt(1)
-    found = [
-        Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "pymunk:matched")
-    ]
+    found = [Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "box2d:matched")]
     with Progress() as progress:
         able, partly = Inquiry("column_of_ten", 0, "trajectory", 1, progress).to_the_end(found)
 
-    assert [one.name for one in able] == ["pymunk:matched"]
+    assert [one.name for one in able] == ["box2d:matched"]
     assert [one.name for one in partly] == ["event_driven:float64"]
     assert "accumulate" in partly[0].reason
 
@@ -239,3 +237,19 @@ def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Pa
     assert done.returncode == 1
     assert "No engine keeps this error" in done.stdout
     assert "mostly" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["heavy_on_light", "swapped"])
+def test_an_engine_whose_disk_is_through_the_floor_is_not_advised(name: str):
+    """The exact answer ends at 0.319 of 3 s, and up to there all keep the error."""
+    scene = str(Path(__file__).parents[3] / "tests" / "data" / "scenes" / f"{name}.toml")
+    names = ("reference:exercise", "reference:coulomb", "box2d_v3:matched")
+    dt = open_scene(scene, 0).dt
+    with Progress() as progress:
+        asked = Inquiry(scene, 0, "trajectory", 2, progress)
+        ladders = [[Attempt(who, PLAIN, k, dt(k), 0.01) for k in (1, 2)] for who in names]
+        able, unable = asked.first_to_the_end(ladders)
+
+    assert [(one.name, one.substeps) for one in able] == [("box2d_v3:matched", 2)]
+    assert {one.name for one in unable} == {"reference:exercise", "reference:coulomb"}
+    assert all(one.reason.startswith("tunnels at 0.467 s (dt 16.7 ms); tunnels") for one in unable)
