@@ -166,7 +166,10 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
 
 
 def summary(
-    comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
+    comparisons: Sequence[Comparison],
+    names: Sequence[str],
+    untrusted: Set[str],
+    lawless: Set[str] = frozenset(),
 ) -> dict[str, list[OverviewCell]]:
     """`engine:profile` -> a cell for each of `SUMMARY`: the median over the scenarios and the worst
     of them; the last cell counts the scenarios not played.
@@ -174,7 +177,8 @@ def summary(
     A scene that a solver's own file refuses, because the file is written for another restitution,
     does not count; a file that refuses all of them was not asked. The best is the lowest of its
     group (`situations.grouped`), and all that show the same number. Engines in `untrusted` broke
-    the protocol of the harness and are not scored.
+    the protocol of the harness and are not scored; none in
+    `lawless` is the best.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
@@ -208,7 +212,8 @@ def summary(
             cells = [OverviewCell("–", REFUSAL) for _ in cells[:-1]] + [OverviewCell(NO_FRICTION)]
         rows[name] = cells
     groups = situations.grouped(names)
-    marked = [mark_best({name: rows[name] for name in each}, untrusted) for each in groups.values()]
+    unranked = untrusted | lawless
+    marked = [mark_best({name: rows[name] for name in each}, unranked) for each in groups.values()]
     return {name: each[name] for name in names for each in marked if name in each}
 
 

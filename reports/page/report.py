@@ -12,6 +12,7 @@ import pandas as pd
 from reports.compare.comparison import Comparison
 from reports.page.cost_points import RunTimes
 from reports.page.findings import findings, not_counted
+from reports.page.own_engines import is_lawless, own_engine_sentences
 from reports.page.own_solvers import with_lines
 from reports.page.page import write_page
 from reports.run.archive import Archive
@@ -96,7 +97,9 @@ def made_report(
         if row["verdict"] == "breaks"
     }
     untrusted = set(broken)
-    sentences = [*findings(comparisons, untrusted), *not_counted(broken)]
+    lawless = {name for name, rows in zip(engines, asked) if is_lawless(rows)}
+    own = [sentence for rows in asked for sentence in own_engine_sentences(rows)]
+    sentences = [*own, *findings(comparisons, untrusted | lawless), *not_counted(broken)]
     checks = {
         name: archive.checked[name]["checked"]
         for name in header["engines"]
@@ -107,6 +110,7 @@ def made_report(
         comparisons,
         findings=sentences,
         untrusted=untrusted,
+        lawless=lawless,
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds, "unfinished": unfinished(archive)},

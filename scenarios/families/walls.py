@@ -15,6 +15,7 @@ from scenarios.truth.closed_forms import (
     stacked,
     to_and_fro,
 )
+from scenarios.truth.exact import with_oracle
 
 G = 9.81
 FLOOR = [[[-10, 0], [10, 0]]]
@@ -265,6 +266,50 @@ def column_of_ten() -> Scenario:
     )
 
 
+def heavy_on_light() -> Scenario:
+    """A disk of 100 kg falls onto one of 1 kg, which falls onto a floor first."""
+    question = Scenario(
+        name="heavy_on_light",
+        asks="Does a disk of 100 kg stay on a disk of 1 kg, or sink into it?",
+        source="after HighMassRatio1 to 3 of Box2D (samples/sample_robustness.cpp)",
+        scene=lay_out(
+            position=[[0.0, 0.6], [0.0, 2.0]],
+            velocity=[[0.0, 0.0], [0.0, 0.0]],
+            radius=[0.5, 0.5],
+            mass=[1.0, 100.0],
+            walls=FLOOR,
+            gravity=[0.0, -G],
+            restitution=0.0,
+        ),
+        duration=3.0,
+        sample_interval=1 / 60,
+    )
+    return with_oracle(question)
+
+
+def ball_on_supported_ball() -> Scenario:
+    """A ball falls onto an equal one that lies on a floor: the impulse goes through to the floor
+    and back."""
+    question = Scenario(
+        name="ball_on_supported_ball",
+        asks="How high does a ball bounce at e = 0.9 from a ball that lies on a floor?",
+        source="after the supported column of Box2D's test/test_restitution.c; the limit of small"
+        " gaps, one collision after the other",
+        scene=lay_out(
+            position=[[0.0, 0.25], [0.0, 1.75]],
+            velocity=[[0.0, 0.0], [0.0, 0.0]],
+            radius=[0.25, 0.25],
+            mass=[1.0, 1.0],
+            walls=FLOOR,
+            gravity=[0.0, -G],
+            restitution=0.9,
+        ),
+        duration=1.5,
+        sample_interval=1 / 60,
+    )
+    return with_oracle(question)
+
+
 WALLS = (
     bouncing_ball_e1,
     bouncing_ball_e09,
@@ -274,4 +319,6 @@ WALLS = (
     rest_on_floor,
     slide_on_incline,
     column_of_ten,
+    heavy_on_light,
+    ball_on_supported_ball,
 )
