@@ -177,8 +177,8 @@ def summary(
     A scene that a solver's own file refuses, because the file is written for another restitution,
     does not count; a file that refuses all of them was not asked. The best is the lowest of its
     group (`situations.grouped`), and all that show the same number. Engines in `untrusted` broke
-    the protocol of the harness and are not scored; none in
-    `lawless` is the best.
+    the protocol of the harness and are not scored;
+    none in `lawless` is the best.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]

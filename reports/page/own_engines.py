@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from adapters.conformance.laws import ALLOWED
 from adapters.conformance.physics import SPEEDS
 from adapters.conformance.probe import Departure
 from adapters.engines import OWN
@@ -16,18 +17,18 @@ Finding = Mapping[str, Any]  # a row of the probes
 
 # In the order in which they are named; {got} and {expected} are of the finding.
 WORDS = {
-    Departure.MEMORY: "an earlier scene changes the next one",
+    Departure.MEMORY: "state of the scene before is kept",
     Departure.DT_IGNORED: "dt is ignored",
     Departure.PATH: "a disk of {expected} m/s moves by {got} m in a second",
     Departure.SPEED: "a free disk of {expected} m/s does not keep its speed and ends at {got} m/s",
     Departure.GRAVITY_UNSTATED: "gravity acts where none is stated",
     Departure.GRAVITY_ABSENT: "gravity does not act",
     Departure.GRAVITY_UPWARD: "gravity acts upward",
-    Departure.GRAVITY_DIRECTION: "gravity acts along {got} where {expected} is stated",
+    Departure.GRAVITY_DIRECTION: "gravity acts along {got} m/s2 where {expected} is stated",
     Departure.GRAVITY_SIZE: "gravity is {got} m/s2 where {expected} is stated",
-    Departure.STATIC: "a static disk moves",
     Departure.MASSES: "momentum is not kept where masses differ",
     Departure.MOMENTUM: "momentum is not kept",
+    Departure.STATIC: "a static disk moves",
     Departure.PASSES: "disks pass through each other",
     Departure.STICKS: "disks stick where e = {expected} is stated",
     Departure.RESTITUTION: "bounces with e = {got} where {expected} is stated",
@@ -40,9 +41,11 @@ WORDS = {
     Departure.WALL_RESTITUTION: "bounces off walls with e = {got} where {expected} is stated",
     Departure.WALL_TANGENTIAL: "a collision with a wall changes the tangential velocity",
 }
-# A disk on the wrong path meets nothing when it should: what follows from it is no other cause.
-BEFORE_ALL = (Departure.MEMORY, Departure.DT_IGNORED, Departure.PATH)
-# Of an engine that breaks no law: a probe -> what it reads. Less than `VISIBLE` is rounding.
+# What these change, all later readings show, so that no other cause is named beside them; and a
+# wrong momentum is also that of what cannot move.
+ALONE = (Departure.DT_IGNORED, Departure.PATH, Departure.SPEED, Departure.GRAVITY_UNSTATED)
+UNMOVED = (Departure.STATIC, Departure.WALL_PASSES)
+# Of an engine that breaks no law: a probe -> what it reads.
 PROPERTIES = {
     "slow_flight": "a free disk of {expected} m/s ends at {got} m/s",
     "fast_flight": "a free disk of {expected} m/s ends at {got} m/s",
@@ -54,12 +57,7 @@ PROPERTIES = {
     "inertia_by_torque": "a torque acts as on {got} kg m2 where {expected} is stated",
     "friction": "friction of {got} acts where none is stated",
     "friction_at_rest": "friction of {got} acts where {expected} is stated",
-    **{
-        f"restitution_{speed:g}": f"at {speed:g} m/s e is {{got}} where {{expected}} is stated"
-        for speed in SPEEDS
-    },
 }
-VISIBLE = 1e-4  # of the expected number: float32 rounds by 6e-8, a thousand times here
 SCENES = {
     "gravity_is_stated": "gravity",
     "pair_keeps_e": "collisions of disks",
@@ -80,12 +78,11 @@ def own_engine_sentences(findings: Sequence[Finding]) -> list[str]:
     missed = {row["probe"]: row for row in findings if row["verdict"] in ("departs", "breaks")}
     broken = {row["departure"]: row for row in missed.values() if row.get("departure")}
     laws = [law for law in WORDS if law in broken]
-    laws = [law for law in laws if law in BEFORE_ALL] or laws
-    words = [WORDS[law].format(**in_words(broken[law])) for law in laws] or [
-        PROPERTIES[probe].format(**in_words(row))
-        for probe, row in missed.items()
-        if probe in PROPERTIES and is_visible(row)
-    ]
+    if any(law in ALONE for law in laws):
+        laws = [law for law in laws if law in (*ALONE, Departure.MEMORY)]
+    if Departure.MASSES in laws or Departure.MOMENTUM in laws:
+        laws = [law for law in laws if law not in UNMOVED]
+    words = [WORDS[law].format(**in_words(broken[law])) for law in laws] or properties(missed)
     refused = {row["probe"] for row in findings if row["verdict"] == "not asked"}
     scenes = [scene for probe, scene in SCENES.items() if probe in refused]
     if not words and not scenes:
@@ -97,12 +94,28 @@ def own_engine_sentences(findings: Sequence[Finding]) -> list[str]:
     return [f"{said} Not asked, because it refuses them: {listed(scenes)}." if scenes else said]
 
 
+def properties(missed: Mapping[str, Finding]) -> list[str]:
+    """The departures of an engine that breaks no law, such as a threshold."""
+    visible = {probe: row for probe, row in missed.items() if is_visible(row)}
+    words = [
+        PROPERTIES[probe].format(**in_words(visible[probe]))
+        for probe in PROPERTIES
+        if probe in visible
+    ]
+    speeds: dict[str, list[str]] = {}
+    for speed in SPEEDS:
+        if row := visible.get(f"restitution_{speed:g}"):
+            e = "e = {got} where {expected} is stated".format(**in_words(row))
+            speeds.setdefault(e, []).append(f"{speed:g}")
+    return [*words, *(f"collisions at {listed(at)} m/s have {e}" for e, at in speeds.items())]
+
+
 def is_visible(row: Finding) -> bool:
-    """Whether a reading is a number, and off by more than rounding."""
+    """Whether a reading is a number, and off by more than a law allows."""
     got, expected = row["got"], row["expected"]
     if isinstance(got, str) or isinstance(expected, str):
         return False
-    return not abs(got - expected) <= VISIBLE * max(abs(expected), VISIBLE)
+    return not abs(got - expected) <= ALLOWED * (abs(expected) or 1.0)
 
 
 def in_words(row: Finding) -> dict[str, str]:
