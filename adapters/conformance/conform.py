@@ -110,7 +110,7 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
         verdict,
         reading.note,
         # `crosscheck check` says what a solver of the exercise breaks, whose e may be its own
-        "" if verdict == "keeps" or row.exercise else str(reading.departure),
+        "" if verdict == "keeps" or row.exercise else reading.departure or "",
     )
 
 

@@ -296,7 +296,7 @@ def static_stays(row: EngineRow) -> ProbeReading:
     return ProbeReading(
         "; ".join(f"{name} changed" for name in moved) or stays,
         "stays" if stays == "stays" else "stays, reported disk 0 and disk 1",
-        departure=Departure.STATIC if moved else Departure.NONE,
+        departure=Departure.STATIC if moved else None,
     )
 
 

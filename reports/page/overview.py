@@ -166,10 +166,7 @@ def outcome_at_middle_dt(comparison: Comparison) -> dict[str, tuple[str, str]]:
 
 
 def summary(
-    comparisons: Sequence[Comparison],
-    names: Sequence[str],
-    untrusted: Set[str],
-    lawless: Set[str] = frozenset(),
+    comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
 ) -> dict[str, list[OverviewCell]]:
     """`engine:profile` -> a cell for each of `SUMMARY`: the median over the scenarios and the worst
     of them; the last cell counts the scenarios not played.
@@ -177,8 +174,7 @@ def summary(
     A scene that a solver's own file refuses, because the file is written for another restitution,
     does not count; a file that refuses all of them was not asked. The best is the lowest of its
     group (`situations.grouped`), and all that show the same number. Engines in `untrusted` broke
-    the protocol of the harness and are not scored;
-    none in `lawless` is the best.
+    the protocol of the harness and are not scored.
     """
     found = [values(comparison) for comparison in comparisons]
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
@@ -199,7 +195,7 @@ def summary(
             if metric != "failed"
         ]
         if name in untrusted:
-            broken = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
+            broken = OverviewCell("breaks", "breaks the protocol or a law: not scored", failed=True)
             cells = [broken] * len(cells)
         asked = [each for each in failed if not refused_by_file(name, each)]
         count = sum(name in each for each in asked)
@@ -212,8 +208,7 @@ def summary(
             cells = [OverviewCell("–", REFUSAL) for _ in cells[:-1]] + [OverviewCell(NO_FRICTION)]
         rows[name] = cells
     groups = situations.grouped(names)
-    unranked = untrusted | lawless
-    marked = [mark_best({name: rows[name] for name in each}, unranked) for each in groups.values()]
+    marked = [mark_best({name: rows[name] for name in each}, untrusted) for each in groups.values()]
     return {name: each[name] for name in names for each in marked if name in each}
 
 

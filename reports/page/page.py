@@ -31,7 +31,6 @@ def write_page(
     *,
     findings: Sequence[str],
     untrusted: Set[str],
-    lawless: Set[str] = frozenset(),
     conformance: pd.DataFrame,
     known_answers: pd.DataFrame,
     about: Mapping[str, Any],
@@ -45,7 +44,6 @@ def write_page(
     Args:
         findings: the sentences of the first screen.
         untrusted: the engines that are not scored, as they break the protocol.
-        lawless: the reader's own engines that are not ranked, as they break a law.
         conformance: a row for each question of a probe.
         known_answers: a row for each reproduced published number.
         about: command, seed, machine, versions, started, seconds, and why it is unfinished, or "".
@@ -55,7 +53,7 @@ def write_page(
         on_paper: the scenarios that get half a page each in print.
     """
     names = overview.names_of(comparisons)
-    tables = page_tables(comparisons, untrusted, conformance, known_answers, lawless)
+    tables = page_tables(comparisons, untrusted, conformance, known_answers)
     html = render(
         "page/page.html.j2",
         generator=GENERATOR,
@@ -64,8 +62,7 @@ def write_page(
         plotly=True,
         names=names,
         untrusted=untrusted,
-        lawless=lawless,
-        first=first_screen(comparisons, untrusted | lawless, clock, findings, said),
+        first=first_screen(comparisons, untrusted, clock, findings, said),
         tables=tables,
         panels=panels(comparisons, names, tables.heat_map, clock),
         marked=MARKED,

@@ -59,12 +59,10 @@ def page_tables(
     untrusted: Set[str],
     conformance: pd.DataFrame,
     known_answers: pd.DataFrame,
-    lawless: Set[str] = frozenset(),
 ) -> PageTables:
-    """All tables of `comparisons`; an engine in `untrusted` is not scored, and none in `lawless` is
-    the best."""
+    """All tables of `comparisons`; an engine in `untrusted` is not scored."""
     heat_map = overview.heat_map(comparisons, overview.names_of(comparisons))
-    medians = summaries(*situations.by_friction(comparisons), untrusted, lawless)
+    medians = summaries(*situations.by_friction(comparisons), untrusted)
     shown = [column for table in medians for column in table.columns]
     return PageTables(
         columns={key: column for key, column in overview.SUMMARY.items() if column in shown},
@@ -96,18 +94,14 @@ class Summary(NamedTuple):
 
 
 def summaries(
-    smooth: Sequence[Comparison],
-    rough: Sequence[Comparison],
-    untrusted: Set[str],
-    lawless: Set[str] = frozenset(),
+    smooth: Sequence[Comparison], rough: Sequence[Comparison], untrusted: Set[str]
 ) -> list[Summary]:
     """The table of medians, and a second one for the scenes with friction if there are both
     kinds."""
     found = []
     for comparisons, title in ((smooth, ""), (rough, "Summary of the scenes with friction")):
         names = overview.names_of(comparisons)
-        cells = overview.summary(comparisons, names, untrusted, lawless)
-        columns, rows = overview.with_numbers(cells)
+        columns, rows = overview.with_numbers(overview.summary(comparisons, names, untrusted))
         groups = situations.grouped(names)
         found += (
             [Summary(title, len(comparisons), columns, rows, groups)]

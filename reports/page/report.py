@@ -33,8 +33,8 @@ class Report:
         comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
-        untrusted: the engines that broke the protocol: their rows stay in the tables, but they are
-            not scored.
+        untrusted: the engines that broke the protocol, and the reader's own that break a law:
+            their rows stay in the tables, but they are not scored.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
@@ -97,9 +97,9 @@ def made_report(
         if row["verdict"] == "breaks"
     }
     untrusted = set(broken)
-    lawless = {name for name, rows in zip(engines, asked) if is_lawless(rows)}
+    untrusted |= {name for name, rows in zip(engines, asked) if is_lawless(rows)}
     own = [sentence for rows in asked for sentence in own_engine_sentences(rows)]
-    sentences = [*own, *findings(comparisons, untrusted | lawless), *not_counted(broken)]
+    sentences = [*own, *findings(comparisons, untrusted), *not_counted(broken)]
     checks = {
         name: archive.checked[name]["checked"]
         for name in header["engines"]
@@ -110,7 +110,6 @@ def made_report(
         comparisons,
         findings=sentences,
         untrusted=untrusted,
-        lawless=lawless,
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
         about=header | {"seconds": archive.seconds, "unfinished": unfinished(archive)},
