@@ -202,7 +202,9 @@ def summary(
         played = sum(name not in each for each in failed)
         cells.append(OverviewCell(f"{count} of {played}", failed=count > 0, value=count))
         if name in untrusted:
-            untested = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
+            untested = OverviewCell(
+                "breaks", "breaks the protocol or a law: not scored", failed=True
+            )
             cells = [untested] * len(cells)
         asked = [each for each in failed if not refused_by_file(name, each)]
         count = sum(name in each for each in asked)

@@ -12,6 +12,7 @@ import pandas as pd
 from reports.compare.comparison import Comparison
 from reports.page.cost_points import RunTimes
 from reports.page.findings import findings, not_counted
+from reports.page.own_engines import is_lawless, own_engine_sentences
 from reports.page.own_solvers import with_lines
 from reports.page.page import write_page
 from reports.run.archive import Archive
@@ -32,8 +33,8 @@ class Report:
         comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
-        untrusted: the engines that broke the protocol: their rows stay in the tables, but they are
-            not scored.
+        untrusted: the engines that broke the protocol, and the reader's own that break a law:
+            their rows stay in the tables, but they are not scored.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
@@ -96,7 +97,9 @@ def made_report(
         if row["verdict"] == "breaks"
     }
     untrusted = set(broken)
-    sentences = [*findings(comparisons, untrusted), *not_counted(broken)]
+    untrusted |= {name for name, rows in zip(engines, asked) if is_lawless(rows)}
+    own = [sentence for rows in asked for sentence in own_engine_sentences(rows)]
+    sentences = [*own, *findings(comparisons, untrusted), *not_counted(broken)]
     checks = {
         name: archive.checked[name]["checked"]
         for name in header["engines"]
