@@ -6,6 +6,7 @@ import numpy as np
 
 from reports.compare import laws, scales
 from reports.compare.collisions import match, pair_keys, who
+from reports.compare.faces import on_faces, thrown_off
 from reports.compare.view import cut
 from reports.stability.predicates import Predicate, Reading, largest
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
@@ -25,6 +26,7 @@ def _usable(scenario: Scenario, played: Trajectory) -> Reading:
             _escape(scenario, played),
             _slowed(scenario, played),
             _wrong_collisions(scenario, played),
+            _thrown(scenario, played),
         )
         if part is not None
     ]
@@ -126,7 +128,7 @@ def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
     """(times, n, 1 + walls): how often each disk has met other disks, and each wall, up to and
     including the times `t` (s)."""
     counts = np.zeros((len(t) + 1, scene.n, 1 + len(scene.walls)))
-    hits = played.collisions
+    hits = on_faces(played, scene)
     when = np.searchsorted(t, hits.t)
     for disk, other in ((hits.i, hits.j), (hits.j, hits.i)):
         of_disk = disk >= 0
@@ -141,10 +143,9 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
     k = min(len(played), len(true))
     played, true = cut(played, k), cut(true, k)
     dt = scenario.dt(scenario.substeps[0])
-    found = match(played.collisions, true.collisions, float(true.t[-1]), dt)
-    wrong = found.first_wrong or never_collision(
-        played.collisions, true.collisions, float(true.t[-1]) - 3 * dt
-    )
+    mine, its = (on_faces(one, scenario.scene) for one in (played, true))
+    found = match(mine, its, float(true.t[-1]), dt)
+    wrong = found.first_wrong or never_collision(mine, its, float(true.t[-1]) - 3 * dt)
     if wrong is None:
         return None
     at, what = wrong
@@ -157,6 +158,16 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
         "collisions",
         disk=int(pair.split("-")[0]),
     )
+
+
+def _thrown(scenario: Scenario, played: Trajectory) -> Reading | None:
+    """A ghost collision: the disk hits the end of the next wall of a floor."""
+    scenario, true = answered(scenario)
+    if true is None:
+        return None
+    value, at, disk, wall = thrown_off(played, true, scenario.scene)
+    event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
+    return Reading(value, at, event, "ghost collision", disk=disk)
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
@@ -177,6 +188,7 @@ USABLE = Predicate(
     1.0,
     "a number is not finite, a disk goes through a wall, energy grows by 5 %, disks overlap by a"
     " tenth of a radius, a disk in free flight moves by half its distance only (its speed is"
-    " capped, or its position has too few digits), or a collision is wrong",
+    " capped, or its position has too few digits), a collision is wrong, or a disk is thrown off a"
+    " floor on which it lies",
     _usable,
 )
