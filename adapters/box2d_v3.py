@@ -172,7 +172,12 @@ class Box2DV3:
         return tuned(self.chosen)
 
     def _options(self) -> dict[str, float]:
-        given = ({"maximum_linear_speed": 1e9} if self.matched else {}) | self.chosen
+        given: dict[str, float] = {}
+        if self.matched:
+            given = {"maximum_linear_speed": 1e9}
+        elif "length_unit" in self.chosen:  # which would scale these, too
+            given = {"maximum_linear_speed": 400.0, "restitution_threshold": 1.0}
+        given = given | self.chosen
         return {
             name: given[name]
             for name in ("restitution_threshold", "maximum_linear_speed")

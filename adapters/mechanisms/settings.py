@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
-from math import inf, isfinite, isnan, pi, sqrt
+from math import ceil, inf, isfinite, isnan, pi, sqrt
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from adapters.engines import row_of
 from scenarios.model import Scene
@@ -14,6 +16,7 @@ from scenarios.model import Scene
 MOST = 3  # settings that are changed one after the other
 GONE = 0.5  # of the error: a change that leaves more of it does not remove its cause
 NO_LIMIT = 1e9
+FINER = "finer"  # among the parameters of a setting: the steps in place of one
 
 
 class Setting(NamedTuple):
@@ -94,14 +97,24 @@ def find_remedy(
     return Remedy(tuple(chosen), before, left, tuple(dict.fromkeys(one.name for one in settings)))
 
 
+def without_finer(parameters: Mapping[str, Any]) -> tuple[dict[str, Any], int]:
+    """The parameters of `EngineRow.make`, and the steps in place of one."""
+    return {name: it for name, it in parameters.items() if name != FINER}, parameters.get(FINER, 1)
+
+
 def off(error: float) -> float:
     """The error; inf if there is none, because the run failed."""
     return inf if isnan(error) else error
 
 
 def merged(settings: Sequence[Setting]) -> dict[str, Any]:
-    """The parameters of several settings."""
-    return {name: value for each in settings for name, value in each.parameters.items()}
+    """The parameters of several settings; units of time are multiplied."""
+    parameters = dict[str, Any]()
+    for each in settings:
+        for name, value in each.parameters.items():
+            before = parameters.get(name, 1.0)
+            parameters[name] = before * value if name == "time_unit" else value
+    return parameters
 
 
 def _friction(default: float, scene: Scene, name: str = "friction") -> list[Setting]:
@@ -141,8 +154,8 @@ def _box2d(scene: Scene, dt: float) -> list[Setting]:
             Setting(
                 name,
                 f"{value} units of length{by}, compiled in",
-                f"give lengths in units of {plain(unit)} m",
-                {"length_unit": unit / radius},
+                f"give lengths in units of {plain(unit)} m and times in units of {plain(unit)} s",
+                {"length_unit": unit / radius, "time_unit": unit},
             )
             for name, value, by, unit, bites in (
                 ("b2_linearSlop", 0.005, "", small, small < 1.0),
@@ -150,9 +163,10 @@ def _box2d(scene: Scene, dt: float) -> list[Setting]:
             )
             if bites
         ),
-        Setting("radius of an edge", "0.01 units of length", 0, {"skin": False}),
+        Setting("b2EdgeShape.radius", "0.01 units of length", 0, {"skin": False}),
         *_swept("continuousPhysics", "bullet"),
         Setting("positionIterations", 3, 0, dict.fromkeys(CORRECTIONS, 0)),
+        *_spin_cap("b2_maxRotation", pi / 2, scene, dt),
     ]
 
 
@@ -167,6 +181,14 @@ def _swept(world: str, body: str) -> list[Setting]:
     ]
 
 
+def _spin_cap(name: str, most: float, scene: Scene, dt: float) -> list[Setting]:
+    """A cap on the rotation in a step that no setting lifts: only steps that it does not reach."""
+    steps = ceil(1.1 * float(np.abs(scene.angular_velocity).max()) * dt / most)
+    shorter = f"take steps of {plain(1e3 * dt / max(steps, 1))} ms"
+    value = f"{plain(most)} rad a step, compiled in"
+    return [Setting(name, value, shorter, {FINER: steps})] if steps > 1 else []
+
+
 def _planck(scene: Scene, _dt: float) -> list[Setting]:
     slop = 0.005 * 0.25 * float(scene.radius.min())
     shipped = {"velocityThreshold": 1.0, "linearSlop": 0.005, "maxTranslation": 2.0}
@@ -179,13 +201,13 @@ def _planck(scene: Scene, _dt: float) -> list[Setting]:
             Setting(f"Settings.{name}", value, needed[name], {name: needed[name]})
             for name, value in shipped.items()
         ),
-        Setting("radius of an edge", "twice the slop", 0, {"skin": False}),
+        Setting("Edge.m_radius", "twice the slop", 0, {"skin": False}),
         *_swept("continuousPhysics", "bullet"),
         Setting("positionIterations", 3, 0, dict.fromkeys(CORRECTIONS, 0)),
     ]
 
 
-def _box2d_v3(scene: Scene, _dt: float) -> list[Setting]:
+def _box2d_v3(scene: Scene, dt: float) -> list[Setting]:
     unit = 0.5 * float(scene.radius.min())
     return [
         *_friction(0.6, scene),
@@ -196,20 +218,25 @@ def _box2d_v3(scene: Scene, _dt: float) -> list[Setting]:
         Setting("set_contact_tuning: hertz", 30.0, NO_LIMIT, {"hertz": NO_LIMIT}),
         Setting("continuous_enabled", True, False, {"continuous": False}),
         Setting("is_bullet", False, True, {"bullet": True}),
+        *_spin_cap("B2_MAX_ROTATION", pi / 4, scene, dt),
     ]
 
 
-def _rapier2d(scene: Scene, _dt: float) -> list[Setting]:
-    unit = 0.5 * float(scene.radius.min())
+def _rapier2d(scene: Scene, dt: float) -> list[Setting]:
+    from adapters.box2d import fastest
+
+    radius, fast = float(scene.radius.min()), fastest(scene) / 200  # it cuts at 400 units a second
+    units = [0.5 * radius, *([fast] if fast > 2 else [])]
     return [
         *_friction(0.5, scene),
         Setting("canSleep", True, False, {"sleeping": False}),
-        Setting("lengthUnit", 1.0, unit, {"length_unit": 0.5}),
+        *(Setting("lengthUnit", 1.0, unit, {"length_unit": unit / radius}) for unit in units),
         Setting("normalizedPredictionDistance", 0.02, 0.002, {"prediction": 0.002}),
         Setting("contact_natural_frequency", 30.0, 1000.0, {"hertz": 1000.0}),
         Setting("numSolverIterations", 4, 16, {"iterations": 16}),
         Setting("ccdEnabled", False, True, {"continuous": True}),
         Setting("maxCcdSubsteps", 1, 0, {"continuous_steps": 0}),
+        *_spin_cap("the cap on rotation", pi / 4, scene, dt),
     ]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from adapters.engines import row_of
 from adapters.mechanisms.ablated import AblatedReference
-from adapters.mechanisms.settings import GONE, find_remedy, settings_of
+from adapters.mechanisms.settings import GONE, find_remedy, settings_of, without_finer
 from adapters.mechanisms.table import END_OF_STEP, MECHANISMS
 from adapters.play import play_once
 from reports.compare import laws
@@ -29,6 +29,7 @@ from reports.speed.budget import (
     budget_of,
     window_of,
 )
+from reports.speed.explained import LEAST
 from reports.speed.purposes import PURPOSES
 from reports.speed.scored_part import scored
 from reports.terminal.counts import listed
@@ -56,7 +57,8 @@ def cause_of(scene: str, seed: int, name: str, substeps: int, purpose: str, boun
     dt, jumps = scenario.dt(substeps), jumps_of(truth, scenario)
 
     def error(parameters: Mapping[str, Any]) -> float:
-        run = play_once(partial(row_of(name).make, **parameters), name, scenario, dt)
+        chosen, steps = without_finer(parameters)
+        run = play_once(partial(row_of(name).make, **chosen), name, scenario, dt / steps)
         if run.status != "ok" or run.trajectory is None:
             return np.inf
         return PURPOSES[purpose].error(beside(scenario, run, truth, jumps))
@@ -103,7 +105,7 @@ def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) 
             for words, changes in CANDIDATES.items()
         }
     least = min(left, key=lambda part: left[part])
-    if left[least] <= GONE * total:
+    if total > LEAST and left[least] <= GONE * total:
         return f"{least}: without it {number(left[least] / total, 2)} of the error is left"
     return f"not known: without any of these more than half of it is left: {'; '.join(left)}"
 

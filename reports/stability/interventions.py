@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from adapters.engines import row_of
-from adapters.mechanisms.settings import find_remedy, settings_of
+from adapters.mechanisms.settings import find_remedy, settings_of, without_finer
 from reports.compare.faces import ALONG, first_on_line
 from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
@@ -202,8 +202,10 @@ def with_settings(search: LimitSearch, limit: Limit) -> Limit:
     scenario, predicate = seen[0], search.case.predicate
 
     def error(parameters: Mapping[str, Any]) -> float:
-        make = partial(row_of(search.engine).make, **parameters)
-        judged, run = search.case.play(DrivenEngine(search.engine, make), scenario)
+        chosen, steps = without_finer(parameters)
+        driven = DrivenEngine(search.engine, partial(row_of(search.engine).make, **chosen))
+        finer = replace(scenario, substeps=(scenario.substeps[0] * steps,))
+        judged, run = search.case.play(driven, finer)
         reading = judge(predicate, judged, run)
         return reading.value / (predicate.bound or 1.0) if reading.failed else 0.0
 

@@ -69,17 +69,6 @@ def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, 
     assert limit.why == limit.reason
 
 
-def test_a_threshold_shows_where_the_scene_closes_at_it():
-    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene less than half as large; later a
-    collision is missing for it."""
-    path = str(SCENES / "two.toml")
-    search = LimitSearch(case_of_file(path, "scale"), "box2d:shipped", QUICK)
-    assert not search.trial(0.4).works
-    assert search.trial(1.0).works
-    matched = LimitSearch(case_of_file(path, "scale"), "box2d:matched", QUICK)
-    assert matched.trial(0.4).works
-
-
 def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_called_not_known():
     """Where the step is what is varied, a finer one is no proof: end-of-step detection alone has
     the limit. Or nothing helps."""
