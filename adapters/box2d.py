@@ -146,11 +146,11 @@ class Box2DEngine:
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
         chosen = self.chosen
         # s per engine unit of time, engine units of length per m
-        self.time, self.length = 1.0, 1.0
-        if self.matched:
-            self.time = chosen["time_unit"]
+        self.time, self.length = chosen.get("time_unit", 1.0), 1.0
+        if "length_unit" in chosen:
             least = chosen["length_unit"] * scene.radius.min()
-            self.length = float(1.0 / max(least, chosen["step_unit"] * fastest(scene) * dt))
+            step = chosen.get("step_unit", 0.0) * fastest(scene) * dt
+            self.length = float(1.0 / max(least, step))
         self.speed = self.time * self.length
         must_fit(scene, self.length, self.time)
         self.speed_cap = Box2D.b2_maxTranslation / self.length / dt

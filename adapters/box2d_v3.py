@@ -3,7 +3,7 @@ sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from math import atan2, cos, pi, sin
 from threading import Lock
@@ -142,7 +142,9 @@ class Box2DV3:
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
         self.log: list[ContactImpulse] = []
-        self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
+        self.unit = 1.0
+        if "length_unit" in self.chosen:
+            self.unit = float(self.chosen["length_unit"] * scene.radius.min())
         pyb2d3.set_length_units_per_meter(self.unit)
         # The binding has no way to ask for the unit, but the default of this limit is 400 of it.
         self.unit_found = pyb2d3.WorldDef().maximum_linear_speed / 400
@@ -151,7 +153,7 @@ class Box2DV3:
         self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
         self.world.continuous_enabled = self.chosen["continuous"]
         self.world.sleeping_enabled = self.sleeping
-        if self.matched:
+        if self.matched or self._tuning() != tuned(SHIPPED):
             self.world.set_contact_tuning(*self._tuning())
         self.world.hit_event_threshold = 0.0  # listening only: report every collision
         self.bodies = [self._disk(i) for i in range(scene.n)]
@@ -167,13 +169,20 @@ class Box2DV3:
         )
 
     def _tuning(self) -> tuple[float, float, float]:
-        return self.chosen["hertz"], self.chosen["damping_ratio"], self.chosen["push_speed"]
+        return tuned(self.chosen)
 
     def _options(self) -> dict[str, float]:
-        options = {
-            name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen
+        given: dict[str, float] = {}
+        if self.matched:
+            given = {"maximum_linear_speed": 1e9}
+        elif "length_unit" in self.chosen:  # which would scale these, too
+            given = {"maximum_linear_speed": 400.0, "restitution_threshold": 1.0}
+        given = given | self.chosen
+        return {
+            name: given[name]
+            for name in ("restitution_threshold", "maximum_linear_speed")
+            if name in given
         }
-        return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
 
     def _shape(self) -> Any:
         friction = {} if self.friction is None else {"friction": self.friction}
@@ -311,6 +320,11 @@ class Box2DV3:
         """Bodies before the world: using one afterwards is a segmentation fault."""
         self.bodies, self.every = [], None
         self.world = None
+
+
+def tuned(chosen: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Hertz, damping ratio and push speed in m/s, as `set_contact_tuning` takes them."""
+    return chosen["hertz"], chosen["damping_ratio"], chosen["push_speed"]
 
 
 def vector(array: Array) -> tuple[float, float]:

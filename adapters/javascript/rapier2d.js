@@ -17,7 +17,7 @@
     const { dt, restitution } = scene;
     const space = new RAPIER.World(vector(scene.gravity));
     space.timestep = dt;
-    if (chosen.matched) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
+    if (chosen.length_unit) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
     if (chosen.iterations !== null) space.numSolverIterations = chosen.iterations;
     const parameters = space.integrationParameters;
     if (chosen.continuous_steps !== null) parameters.maxCcdSubsteps = chosen.continuous_steps;

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from reports.compare.collisions import FAR, by_pair, pair_keys
-from reports.compare.faces import SAME
+from reports.compare.faces import SAME, thrown_off
 from reports.compare.restitution import Restitutions
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 
@@ -72,8 +72,15 @@ def collisions_missed(view: View) -> Value | None:
 
 
 def collisions_spurious(view: View) -> Value | None:
-    """Collisions of the engine that the truth, or the other engine, does not have at their time."""
-    return _unjudged(view) or Value(len(view.matched.spurious), note=_carried(view))
+    """Collisions of the engine that the truth, or the other engine, does not have at their time;
+    and one if a disk that lies, slides or rolls on a floor of several walls is thrown off it."""
+    spurious = len(view.matched.spurious)
+    if view.jumps is not None and view.other is not None:
+        share, at, disk, wall = thrown_off(view.played, view.other, view.scenario.scene)
+        if share > 1.0:
+            note = f"thrown off the surface of wall {wall}, where two of its walls meet"
+            return Value(spurious + 1, disk, at, note)
+    return _unjudged(view) or Value(spurious, note=_carried(view))
 
 
 def first_wrong_collision_s(view: View) -> Value | None:

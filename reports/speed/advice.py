@@ -16,7 +16,6 @@ import pandas as pd
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
-from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
@@ -28,7 +27,7 @@ from reports.run.scenes import open_scene
 from reports.run.stepping import Stepping
 from reports.run.timing import Sample, Timed, interleaved
 from reports.run.worker_process import Failure
-from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
+from reports.speed.causes import cause_of
 from reports.speed.effort import doublings
 from reports.speed.measure import done
 from reports.speed.plan import PLAIN
@@ -252,7 +251,7 @@ class Inquiry:
             len(scored(self.scene, self.seed).truth.collisions),
             [scenario.dt(k) for k in ladder],
             sorted(plain.values(), key=lambda one: one.cost),
-            self.reasons([each for name, each in by_engine.items() if not kept[name]]),
+            self.reasons([each for name, each in by_engine.items() if not kept[name]], bound),
             partly,
             [
                 ChangedOption(plain[one.name], one, errors_nearby(one, ladder, error_at))
@@ -339,25 +338,24 @@ class Inquiry:
         }
         return priced, differences, busy
 
-    def reasons(self, ladders: Sequence[Sequence[Attempt]]) -> list[OutOfReach]:
+    def reasons(self, ladders: Sequence[Sequence[Attempt]], bound: float) -> list[OutOfReach]:
         """What each engine, of which all attempts are given, coarse to fine, comes to; and the
-        largest contribution to its error at the finest step, from the error budget."""
-        finest = self.ladder[-1]
+        cause of its error, at the coarsest step that has at most twice its least error."""
         best = [min(each, key=smallest) for each in ladders]
-        tasks = {
-            one.task: partial(budget_of, self.scene, self.seed, played_as(one.name), finest)
-            for one in best
-            if played_as(one.name) in MECHANISMS and isfinite(one.error)
-        }
-        budgets = self.done(tasks, "error budget")
-        measure = "energy" if self.purpose == "energy" else "position_radii"
+        tasks = {}
+        for least, each in zip(best, ladders):
+            if isfinite(least.error):
+                at = next(one for one in each if one.error <= 2 * least.error)
+                asked = played_as(least.name), at.substeps, self.purpose, bound
+                tasks[least.task] = partial(cause_of, self.scene, self.seed, *asked)
+        causes = self.done(tasks, "cause of the error")
+        unknown = "not known: the search for it did not end"
         return [
             OutOfReach(
                 one,
                 each[-1].error,
                 one.reason
-                or (ASK_THE_EXERCISE if row_of(one.name).exercise else "")
-                or largest(budgets.get(one.task), measure),
+                or (unknown if isinstance(causes[one.task], Failure) else causes[one.task]),
             )
             for one, each in zip(best, ladders)
         ]
@@ -434,24 +432,6 @@ def times_of_whole(
     return interleaved(what, ROUNDS, BUDGET, seed)
 
 
-ASK_THE_EXERCISE = (
-    "not known of a file; a right solver of the exercise has the error of reference:exercise, so"
-    " ask with --engine reference:exercise"
-)
-
-
 def played_as(name: str) -> str:
     """The engine whose bits this engine gives in the scene, which may be itself."""
     return row_of(name).bits_of or name
-
-
-def largest(budget: Any, measure: str) -> str:
-    """The mechanism with the largest contribution, as the end of a sentence."""
-    if budget is None or isinstance(budget, Failure):
-        return "not known: this engine has no error budget here"
-    left_out = (*TOTALS, INTERPLAY)
-    parts = [row for row in budget if row["contribution"] not in left_out and measure in row]
-    if not parts:
-        return "not known: the error budget says nothing of this error"
-    most = str(max(parts, key=lambda row: row[measure])["contribution"])
-    return "mostly " + {TIME: "end-of-step detection", RESIDUAL: "unknown"}.get(most, most)

@@ -50,6 +50,8 @@ COLUMNS = [
     "position_radii",
     "energy",
     "share",
+    "left_position_radii",
+    "left_energy",
     "off_engine_radii",
     "off_reference_radii",
     "off_deviation_radii",
@@ -106,6 +108,8 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
             the energy at hand.
         share: the part of the total position error that the contribution makes up; all parts sum
             to 1; negative: it cancels others.
+        left_position_radii, left_energy: what is left of the error without the contribution, root
+            mean square. Parts that cancel leave more than the error.
         off_engine_radii, off_reference_radii, off_deviation_radii: what disabling it changes in the
             engine, what it changes in the reference with all other mechanisms, and how far these
             two differ.
@@ -136,7 +140,11 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         "closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)
     }
     shares = {
-        contribution: {"share": each.share_of(contributions[TOTAL])}
+        contribution: {
+            "share": each.share_of(contributions[TOTAL]),
+            "left_position_radii": (contributions[TOTAL] - each).radii,
+            "left_energy": (contributions[TOTAL] - each).of_energy,
+        }
         for contribution, each in contributions.items()
         if contribution not in TOTALS
     }

@@ -192,6 +192,8 @@ class Limit:
         seconds: of processor time that the search took.
         intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was
             found, or looked for.
+        settings: of the engine with which the failing run works, in words; without `settings_help`
+            those that do not help; "" if none were tried.
         mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; ""
             if none were found, or looked for.
         reason, source: why, and where that stands.
@@ -209,6 +211,8 @@ class Limit:
     monotone: bool = True
     spacing: float = nan
     intervention: str = ""
+    settings: str = ""
+    settings_help: bool = False
     mechanisms: str = ""
     reason: str = ""
     source: str = ""

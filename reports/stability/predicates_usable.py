@@ -6,6 +6,7 @@ import numpy as np
 
 from reports.compare import laws
 from reports.compare.collisions import match, pair_keys, who
+from reports.compare.faces import on_faces, thrown_off
 from reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
 from reports.compare.view import cut
 from reports.stability.predicates import Predicate, Reading, largest
@@ -22,6 +23,7 @@ def _usable(scenario: Scenario, played: Trajectory) -> Reading:
         _overlap(scenario, played),
         _slowed(scenario, played),
         _wrong_collisions(scenario, played),
+        _thrown(scenario, played),
         *(_reading(verdict) for verdict in judged if verdict.id in ("tunnelled", "energy_gained")),
     ]
     # for a single free disk nothing is checked
@@ -108,7 +110,7 @@ def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
     """(times, n, 1 + walls): how often each disk has met other disks, and each wall, up to and
     including the times `t` (s)."""
     counts = np.zeros((len(t) + 1, scene.n, 1 + len(scene.walls)))
-    hits = played.collisions
+    hits = on_faces(played, scene)
     when = np.searchsorted(t, hits.t)
     for disk, other in ((hits.i, hits.j), (hits.j, hits.i)):
         of_disk = disk >= 0
@@ -123,10 +125,9 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
     k = min(len(played), len(true))
     played, true = cut(played, k), cut(true, k)
     dt = scenario.dt(scenario.substeps[0])
-    found = match(played.collisions, true.collisions, float(true.t[-1]), dt)
-    wrong = found.first_wrong or never_collision(
-        played.collisions, true.collisions, float(true.t[-1]) - 3 * dt
-    )
+    mine, its = (on_faces(one, scenario.scene) for one in (played, true))
+    found = match(mine, its, float(true.t[-1]), dt)
+    wrong = found.first_wrong or never_collision(mine, its, float(true.t[-1]) - 3 * dt)
     if wrong is None:
         return None
     at, what = wrong
@@ -139,6 +140,16 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
         "collisions",
         disk=int(pair.split("-")[0]),
     )
+
+
+def _thrown(scenario: Scenario, played: Trajectory) -> Reading | None:
+    """A ghost collision: the disk hits the end of the next wall of a floor."""
+    scenario, true = answered(scenario)
+    if true is None:
+        return None
+    value, at, disk, wall = thrown_off(played, true, scenario.scene)
+    event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
+    return Reading(value, at, event, "ghost collision", disk=disk)
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
