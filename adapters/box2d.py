@@ -9,6 +9,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
+from adapters.advance import onto_torus
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from adapters.friction import of_shapes
@@ -218,8 +219,7 @@ class Box2DEngine:
         self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `Step`; if the scene wraps, disks that leave are set onto the opposite
-        edge."""
+        """`count` calls of `Step`; Box2D has no torus: disks that leave are shifted."""
         dt = self.dt / self.time
         for _ in range(count):
             self.world.Step(dt, self.velocity_iterations, self.position_iterations)
@@ -235,11 +235,7 @@ class Box2DEngine:
         for body in self.bodies:
             x, y = body.position
             if not (x0 <= x <= x1 and y0 <= y <= y1):
-                over = (
-                    x1 if x < x0 else x0 if x > x1 else x,
-                    y1 if y < y0 else y0 if y > y1 else y,
-                )
-                body.transform = (over, body.angle)
+                body.transform = ((onto_torus(x, x0, x1), onto_torus(y, y0, y1)), body.angle)
 
     def read(self) -> State:
         """Attribute by attribute: box2d-py has no bulk read."""

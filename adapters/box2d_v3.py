@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
+from adapters.advance import onto_torus
 from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from adapters.friction import of_shapes
@@ -253,8 +254,8 @@ class Box2DV3:
         low, high = self.scene.wrap
         at = self.every.get_positions(np.empty((self.scene.n, 2), np.float32))
         for i in np.flatnonzero(((at < low) | (at > high)).any(axis=1)):
-            over = np.where(at[i] < low, high, np.where(at[i] > high, low, at[i]))
-            self.bodies[i].set_transform(vector(over), self.bodies[i].rotation)
+            x, y = map(onto_torus, at[i].tolist(), low.tolist(), high.tolist())
+            self.bodies[i].set_transform(vector(np.array([x, y])), self.bodies[i].rotation)
 
     def read(self) -> State:
         """All bodies at once, as float32. The engine keeps (cos, sin), so the angle is unwound from

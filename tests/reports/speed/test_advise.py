@@ -227,6 +227,37 @@ def test_advice_names_those_that_keep_the_error_and_those_that_do_not(
     assert all(one["error"] > 0.001 and one["why"] for one in short.values())
 
 
+TORUS = """
+name = "torus"
+asks = "Where is a free disk on a torus?"
+duration = 5.0
+sample_interval = 0.02
+gravity = [0.0, 0.0]
+restitution = 1.0
+[[disk]]
+position = [0.3, -0.4]
+velocity = [3.1, -1.7]
+radius = 0.25
+mass = 1.0
+[wrap]
+low = [-2.0, -2.0]
+high = [2.0, 2.0]
+"""
+
+
+@pytest.mark.slow
+def test_on_a_torus_free_flight_needs_no_small_step(tmp_path: Path):
+    """20 ms, the coarsest; the exercise loses a part of a step at every edge."""
+    (tmp_path / "torus.toml").write_text(TORUS)
+    engines = ["--engine", "reference:exercise", "--engine", "pymunk:matched"]
+
+    done = crosscheck("advise", "torus.toml", *engines, "--error", "1%", "--json", cwd=tmp_path)
+
+    steps = {one["engine"]: one["dt_s"] for one in json.loads(done.stdout)["cheapest_first"]}
+    assert steps["pymunk:matched"] == 0.02
+    assert steps.get("reference:exercise", 0.0) < 0.001
+
+
 @pytest.mark.long
 def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Path):
     """Exit 1, as a comparison that was asked for could not be made."""
