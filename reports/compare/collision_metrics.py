@@ -119,8 +119,8 @@ def _read(value: float, read: Restitutions) -> Value:
 
 def _unread(read: Restitutions) -> Value | None:
     """Why no collision could be read; None without a collision."""
-    reasons = f"{_unread_ones(read)}{_so_many(read.slow, 'too slow')}"
-    reasons += _so_many(read.unclear, "not alone, or of an unclear normal")
+    unclear = _so_many(read.unclear, "not alone, too slow, or of an unclear normal")
+    reasons = _unread_ones(read) + unclear
     return not_judged(f"no collision read{reasons}") if reasons else None
 
 

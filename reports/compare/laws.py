@@ -137,8 +137,12 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
 def tunnelled(trajectory: Trajectory, scene: Scene) -> np.ndarray:
     """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line.
     If a sample lies on the wall itself, the side of the sample before it counts. A disk that wraps
-    moves out of one edge and in at the other, and not across the box."""
-    through = np.zeros(scene.n, dtype=bool)
+    moves out of one edge and in at the other, and not across the box; one so fast that it may have
+    gone round either way is not judged."""
+    through, known = np.zeros(scene.n, dtype=bool), np.True_
+    if scene.wrap is not None:  # which way a disk takes round the torus
+        steps = lengths(trajectory.velocity[1:]) * np.diff(trajectory.t)[:, None]
+        known = steps < (scene.wrap[1] - scene.wrap[0]).min() / 2
     x, number = trajectory.position, np.arange(len(trajectory))[:, None]
     for a, b in scene.walls:
         side = cross(x - a, b - a)
@@ -146,14 +150,13 @@ def tunnelled(trajectory: Trajectory, scene: Scene) -> np.ndarray:
         last = np.maximum.accumulate(np.where(tells, number, 0), axis=0)[:-1]
         start, end = np.take_along_axis(x, last[..., None], axis=0), x[1:]
         way = nearer_way(end - start, scene)
-        # a wrap cuts the way in two: one part leaves the start, the other arrives at the end
-        parts = (
-            [(start, start + way), (end - way, end)] if scene.wrap is not None else [(start, end)]
-        )
+        parts = [(start, end)]
+        if scene.wrap is not None:  # it leaves at one edge, and arrives from the other
+            parts = [(start, start + way), (end - way, end)]
         for first, second in parts:
             sides = cross(first - a, b - a) * cross(second - a, b - a)
             ends = cross(a - first, way) * cross(b - first, way)
-            through |= ((sides < 0) & tells[1:] & (ends <= 0)).any(axis=0)
+            through |= ((sides < 0) & tells[1:] & known & (ends <= 0)).any(axis=0)
     return through
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from inspect import getdoc
 
 import numpy as np
@@ -24,27 +24,23 @@ from scenarios.model import Array
 Measure = Callable[[View], Value | None]
 
 
-def over(samples: Callable[[View], np.ndarray]) -> Callable[[Measure], Measure]:
+def over_judged(
+    measure: Measure, samples: Callable[[View], np.ndarray] = lambda view: view.judged
+) -> Measure:
     """The metric with the number of judged `samples` (k, n) in its note; "not judged" where they
     are fewer than `LEAST_SHARE` (view.py)."""
 
-    def over_samples(measure: Measure) -> Measure:
-        @wraps(measure)
-        def carried(view: View) -> Value | None:
-            found = measure(view)
-            if found is None or view.other is None:
-                return found
-            judged = samples(view)
-            if view.share(judged) < LEAST_SHARE:
-                return not_judged(f"only {view.carried(judged)}")
-            return found._replace(note=", ".join(filter(None, (view.carried(judged), found.note))))
+    @wraps(measure)
+    def carried(view: View) -> Value | None:
+        found = measure(view)
+        if found is None or view.other is None:
+            return found
+        judged = samples(view)
+        if view.share(judged) < LEAST_SHARE:
+            return not_judged(f"only {view.carried(judged)}")
+        return found._replace(note=", ".join(filter(None, (view.carried(judged), found.note))))
 
-        return carried
-
-    return over_samples
-
-
-over_judged = over(lambda view: view.judged)
+    return carried
 
 
 def momentum_error(view: View) -> Value | None:
@@ -182,7 +178,7 @@ def velocity_max(view: View) -> Value | None:
     return _largest_of_disks(np.where(view.judged, view.velocity_deviation, 0.0), view)
 
 
-@over(lambda view: view.judged_spin)
+@partial(over_judged, samples=lambda view: view.judged_spin)
 def angular_velocity_max(view: View) -> Value | None:
     """Largest difference of angular velocity of any disk, in the samples in which `velocity_max` is
     judged; with friction only where the disk has no collision within 3.2 steps."""
@@ -274,15 +270,9 @@ class Metric:
 
 
 SCALES = {
-    f"{name} at hand": " ".join((getdoc(scale) or "").split())
-    for name, scale in (
-        ("momentum", scales.momentum),
-        ("angular momentum", scales.angular_momentum),
-        ("energy", scales.energy),
-    )
+    f"{scale.__name__.replace('_', ' ')} at hand": " ".join((getdoc(scale) or "").split())
+    for scale in (scales.momentum, scales.angular_momentum, scales.energy)
 }
-
-
 METRICS: dict[str, Metric] = {
     "position_max_radii": Metric(
         position_max_radii, "radii", (TRUTH, ENGINE), title="Position, largest error"

@@ -21,8 +21,8 @@ class Restitutions(NamedTuple):
         below: how many were below the floor, or, with friction, only graze.
         unfinished: how many did not end before the next collision of a disk, or before the end of
             the run.
-        slow: how many closed too slowly for the gravity that acts.
-        unclear: how many were not alone, or do not have the change of velocity of one collision.
+        unclear: how many were not alone, too slow for the gravity that acts, or do not have the
+            change of velocity of one collision.
     """
 
     values: Array
@@ -30,7 +30,6 @@ class Restitutions(NamedTuple):
     times: Array
     below: int
     unfinished: int
-    slow: int = 0
     unclear: int = 0
 
 
@@ -39,10 +38,11 @@ class Restitutions(NamedTuple):
 CLEAN = 1e-4
 # a change of velocity must be this many times its rounding: e is then accurate to about 0.01
 FLOOR = 100
+TINY = 1e-300  # in place of 0 in a denominator
 # of the closing speed: two that come nearer by less have stopped, e is 0 to that
 STOPPED = 0.01
 GRAZE = 0.1  # of the relative speed: two disks that close more slowly graze each other
-# of the change of velocity: by so much friction's impulses on velocity and on spin may differ
+# of an impulse: by so much friction's share of it may differ from what the spins say
 RUBBED = 0.2
 # of the velocity that gravity gives: a disk that gains less lies on something
 FREE = 0.9
@@ -90,54 +90,38 @@ def effective_restitution(
     count = in_intervals(every, len(t), scene.n)
     within = every.of((before >= 0) & (before < len(t) - 1) & (every.i >= 0))
     read = within.of(is_alone(within, count))
-    crowded = len(within.k) - len(read.k)
     noise = is_rounding(trajectory, scene, read, rounding)
     read = read.of(~noise)
     after, held = first_apart(trajectory, scene, read, count, rounding)
     over = after < len(t)
     read, after, held = read.of(over), after[over], held[over]
-    number = np.arange(len(after))
-    turned = (spin[after] - spin[read.k])[number[:, None], np.stack([read.i, read.other], axis=1)]
-    falls = (
-        acceleration(trajectory, scene, read, read.k - 1, count),
-        acceleration(trajectory, scene, read, after, count),
-    )
+    disks = np.stack([read.i, read.other], axis=1)
+    turned = spin[after[:, None], disks] - spin[read.k[:, None], disks]
+    falls = [acceleration(trajectory, scene, read, k, count) for k in (read.k - 1, after)]
     earlier = velocities(trajectory, read, read.k, falls[0])
     later = velocities(trajectory, read, after, falls[1])
-    closing, separating, gained, lost = speeds_along_normal(
-        earlier,
-        later,
-        falls,
-        scene,
-        read,
-        turned,
-        trajectory.position[read.k, read.i],
-        held,
-    )
+    closing, separating, normal = speeds_along_normal(earlier, later, scene, read, turned)
+    closing, separating = np.where(held > 0, [held, 0 * held], [closing, separating])
+    gained, lost = (-np.vecdot(fall[:, 0] - fall[:, 1], normal) * dt for fall in falls)
+    lost[held > 0] = 0.0
     # with friction: noise of a contact, or a graze, whose normal the spins do not tell well enough
     speed = laws.lengths(earlier[:, 0] - earlier[:, 1])
-    rubs = np.abs(turned[:, 0]) * scene.radius[read.i] > CLEAN * speed
-    rubs &= closing <= np.where(read.j < 0, STOPPED, GRAZE) * speed
-    closing = np.where(rubs, 0.0, closing)
-    separating = np.where(held, 0.0, separating)
-    gained, lost = gained * dt, np.where(held, 0.0, lost * dt)
-    fast = closing > np.maximum(slowest * (after - read.k), gained)
-    late = (closing > slowest) & ~fast
-    unclear = crowded + int(np.isnan(closing).sum())
-    # what closes more slowly is the weight of a disk that lies
-    slow = int(((closing > slowest / 5) & ~fast & ~late).sum())
-    closing, separating, gained, lost = (
-        column[fast] for column in (closing, separating, gained, lost)
-    )
-    ends = np.stack([separating / closing, (separating + lost) / (closing - gained)])
+    grazes = np.abs(turned[:, 0]) * scene.radius[read.i] > CLEAN * speed
+    grazes &= closing <= np.where(read.j < 0, STOPPED, GRAZE) * speed
+    fast = (closing > np.maximum(slowest * (after - read.k), gained)) & ~grazes
+    late = (closing > slowest) & ~fast & ~grazes
+    lies = closing <= slowest / 5  # the weight of a disk that lies
+    below, unfinished = int(noise.sum() + grazes.sum()), int((~over).sum() + late.sum())
+    first = separating[fast] / closing[fast]
+    second = (separating + lost)[fast] / (closing - gained)[fast]
+    least, most = np.minimum(first, second), np.maximum(first, second)
     return Restitutions(
-        values=np.clip(scene.restitution, ends.min(axis=0), ends.max(axis=0)),
-        spread=np.ptp(ends, axis=0),
+        values=np.clip(scene.restitution, least, most),
+        spread=most - least,
         times=read.when[fast],
-        below=int(noise.sum() + rubs.sum()),
-        unfinished=int((~over).sum() + late.sum()),
-        slow=slow,
-        unclear=unclear,
+        below=below,
+        unfinished=unfinished,
+        unclear=len(within.k) - int(fast.sum() + (lies & ~grazes).sum()) - below - unfinished,
     )
 
 
@@ -188,41 +172,39 @@ def is_alone(read: Pairs, count: np.ndarray) -> np.ndarray:
 
 def first_apart(
     trajectory: Trajectory, scene: Scene, read: Pairs, count: np.ndarray, rounding: float
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, Array]:
     """(m,) the first sample after each collision at which the two do not approach, or are held; the
-    number of samples if there is none before another collision of either. (m,) whether they are
-    held."""
+    number of samples if there is none before another collision of either. (m,) m/s, the closing
+    speed of those that are held, else 0."""
     samples, after = len(trajectory), read.k + 1
-    held = np.zeros(len(after), bool)
+    held = np.zeros(len(after))
     left = np.arange(len(after))  # the pairs that approach at every sample so far
     while len(left):
         left = left[approach(trajectory, scene, read.of(left), after[left], rounding)]
+        held[left] = held_speed(trajectory, scene, read.of(left), after[left])
+        left = left[held[left] == 0]
         pairs, following = read.of(left), after[left] + 1
         again = (count[following + 1, pairs.i] > 0) | (count[following + 1, pairs.other] > 0)
-        held[left] = is_held(trajectory, scene, pairs, after[left])
-        ended = np.where(again, samples, following)
-        after[left] = np.where(held[left], after[left], ended)
-        left = left[~held[left] & (ended < samples)]
+        after[left] = np.where(again, samples, following)
+        left = left[after[left] < samples]
     return after, held
 
 
-def is_held(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> np.ndarray:
-    """(m,) whether the two of each pair, whose velocities approach at sample k, (m,), and at the
-    next, come nearer by less than half of that, or by less than `STOPPED` of their closing speed.
-    """
+def held_speed(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
+    """(m,) m/s, the closing speed of those whose velocities approach at sample k, (m,), and at the
+    next, but who come nearer by less than half of that, or than `STOPPED` of their closing speed;
+    else 0."""
     nexts = np.minimum(k + 1, len(trajectory) - 1)
-    nothing = np.zeros((len(k), 2, 2))
     gaps, speeds = [], []
     for sample in (pairs.k, k, nexts):
         way = separation(trajectory, scene, pairs, sample)
-        v = velocities(trajectory, pairs, sample, nothing)
+        v = velocities(trajectory, pairs, sample, np.zeros((len(k), 2, 2)))
         gaps.append(laws.lengths(way))
-        speeds.append(-np.vecdot(way, v[:, 0] - v[:, 1]) / np.where(gaps[-1] > 0, gaps[-1], 1.0))
+        speeds.append(-np.vecdot(way, v[:, 0] - v[:, 1]) / np.maximum(gaps[-1], TINY))
     least = np.minimum(speeds[1], speeds[2])
     nearer = (gaps[1] - gaps[2]) / interval(trajectory)
-    held: np.ndarray = (nexts > k) & (least > 0)
-    held &= nearer < np.maximum(least / 2, STOPPED * speeds[0])
-    return held
+    held = (nexts > k) & (least > 0) & (nearer < np.maximum(least / 2, STOPPED * speeds[0]))
+    return np.where(held, np.maximum(speeds[0], 0.0), 0.0)
 
 
 def separation(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
@@ -261,16 +243,13 @@ def acceleration(
 ) -> Array:
     """(m, 2, 2) m/s2 of both sides of each pair between sample k, (m,), and the next: gravity, or
     what the samples say of a disk that gains less than `FREE` of it and has no collision there."""
-    fall, t = falling(scene, pairs), trajectory.t
-    inside = (k >= 0) & (k + 1 < len(t))
-    first = np.where(inside, k, 0)
-    second = np.minimum(first + 1, len(t) - 1)
+    fall, inside = falling(scene, pairs), (k >= 0) & (k + 1 < len(trajectory))
+    k = np.where(inside, k, 0)
     for side, disk in enumerate((pairs.i, pairs.other)):
-        gained = (trajectory.velocity[second, disk] - trajectory.velocity[first, disk]) / (
-            interval(trajectory) or 1.0
-        )
-        lies = inside & (count[first + 1, disk] == 0)
-        lies &= laws.lengths(gained) < FREE * laws.lengths(fall[:, side])
+        change = trajectory.velocity[k + 1, disk] - trajectory.velocity[k, disk]
+        gained = change / interval(trajectory)
+        lies = inside & (laws.lengths(gained) < FREE * laws.lengths(fall[:, side]))
+        lies &= count[k + 1, disk] == 0
         fall[lies, side] = gained[lies]
     return fall
 
@@ -302,60 +281,41 @@ def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
 
 
 def speeds_along_normal(
-    earlier: Array,
-    later: Array,
-    falls: tuple[Array, Array],
-    scene: Scene,
-    pairs: Pairs,
-    turned: Array,
-    x: Array,
-    held: np.ndarray,
-) -> tuple[Array, Array, Array, Array]:
-    """(m,) m/s, closing speed before and separating speed after each collision, and m/s2, what the
-    accelerations before and after it, `falls`, add to the first and take from the second; `turned`
-    (m, 2) rad/s, the change of spin of both sides, `x` (m, 2) m the first disk.
+    earlier: Array, later: Array, scene: Scene, pairs: Pairs, turned: Array
+) -> tuple[Array, Array, Array]:
+    """(m,) m/s, closing speed before and separating speed after each collision, and (m, 2) the
+    normal; `turned` (m, 2) rad/s is the change of spin of both sides.
 
     The normal is the direction of the change of their relative velocity, whichever of the two is
     named first. Friction adds an impulse J along the tangent, which turns both disks by -J r / I,
-    and is subtracted; at a wall, away from its ends, the normal is that of the wall. The speeds are
-    nan if the change is not that of one collision.
+    so that the spins tell the angle; a wall's normal is known. The speeds are nan if the change is
+    not that of one collision.
     """
     both, wall = second_moves(scene, pairs), pairs.j < 0
     disks = np.stack([pairs.i, pairs.other], axis=1)
-    moves = np.stack([np.ones_like(both), both], axis=1)
+    moves = np.stack([~wall | wall, both], axis=1)
     change = np.where(moves[..., None], later - earlier, 0.0)
+    turned = np.where(moves, turned, 0.0)
+    slid = (np.abs(turned) * scene.radius[disks] > CLEAN * laws.lengths(change)).any(axis=1)
     kicks = laws.moving_mass(scene)[disks][..., None] * change
-    rubs = -laws.moving_inertia(scene)[disks] / scene.radius[disks] * np.where(moves, turned, 0.0)
-    slid = (moves & (np.abs(turned) * scene.radius[disks] > CLEAN * laws.lengths(change))).any(
-        axis=1
-    )
-    strongest, first = laws.lengths(kicks).max(axis=1), laws.lengths(kicks[:, 0])
+    size, strongest = laws.lengths(kicks[:, 0]), laws.lengths(kicks).max(axis=1)
     strange = both & (laws.lengths(kicks.sum(axis=1)) > CLEAN * strongest)
+    rubs = -turned * laws.moving_inertia(scene)[disks] / scene.radius[disks]
     rub = np.where(rubs[:, 0] == 0.0, rubs[:, 1], rubs[:, 0])
-    unequal = (rubs != 0.0).all(axis=1) & (np.abs(rubs[:, 0] - rubs[:, 1]) > RUBBED * first)
-    strange |= slid & (unequal | (np.abs(rub) >= first))
+    strange |= slid & (np.abs(rub) >= size)
+    strange |= slid & (rubs != 0.0).all(axis=1) & (np.abs(np.diff(rubs)[:, 0]) > RUBBED * size)
     between = change[:, 0] - change[:, 1]
-    length = np.sqrt(np.vecdot(between, between))
-    normal = between / np.where(length == 0.0, 1.0, length)[:, None]
-    sine = np.where(slid & ~strange, rub / np.where(first == 0.0, 1.0, first), 0.0)
-    tilted = np.sqrt(1 - sine**2)[:, None] * normal
-    normal = tilted + sine[:, None] * np.stack([normal[:, 1], -normal[:, 0]], axis=1)
-    start, span = (
-        scene.walls[-1 - pairs.j[wall], 0],
-        np.diff(scene.walls[-1 - pairs.j[wall]], axis=1)[:, 0],
-    )
-    size = laws.lengths(span)
-    along = np.vecdot(x[wall] - start, span) / size**2
-    across = np.stack([-span[:, 1], span[:, 0]], axis=1) / size[:, None]
-    across *= -np.sign(np.vecdot(across, earlier[wall, 0]))[:, None]
-    slip = np.abs(np.vecdot(kicks[wall, 0], span)) / size
+    ahead = between / np.maximum(np.sqrt(np.vecdot(between, between)), TINY)[:, None]
+    sine = np.where(slid & ~strange, rub / np.maximum(size, TINY), 0.0)[:, None]
+    normal = np.sqrt(1 - sine**2) * ahead + sine * np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
+    span = np.diff(scene.walls[-1 - pairs.j[wall]], axis=1)[:, 0]
+    across = np.stack([-span[:, 1], span[:, 0]], axis=1) / laws.lengths(span)[:, None]
     # friction changes velocity and spin by the same impulse; else the disk met something else, too
-    same = held[wall] | (np.abs(slip - np.abs(rub[wall])) <= RUBBED * first[wall])
-    known = slid[wall] & (along >= 0) & (along <= 1) & same
-    normal[wall] = np.where(known[:, None], across, normal[wall])
-    strange[wall] = ~known & (slid[wall] | (slip > CLEAN * first[wall]))
+    tilt = np.abs(laws.cross(across, normal[wall]))
+    strange[wall] |= tilt > np.where(slid[wall], RUBBED, CLEAN)
+    across *= np.sign(np.vecdot(across, normal[wall]))[:, None]
+    normal[wall] = np.where(slid[wall, None], across, normal[wall])
     closing, separating = (
         sign * np.vecdot(v[:, 0] - v[:, 1], normal) for sign, v in ((-1, earlier), (1, later))
     )
-    gained, lost = (-np.vecdot(fall[:, 0] - fall[:, 1], normal) for fall in falls)
-    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating), gained, lost
+    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating), normal

@@ -19,8 +19,9 @@ from reports.compare.restitution import Restitutions
 from reports.compare.view import NOT_JUDGED, Value, View, beside
 from scenarios import catalogue
 from scenarios.files.scene_file import read_scene_file
-from scenarios.model import Scenario, Scene, Thrust, Trajectory
+from scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
 from scenarios.no_truth import answered
+from tests.reports.compare.answers import beside_truth, truth_of
 
 CASES = Path(__file__).parents[2] / "data" / "cases"
 STOPPED = 1e-6  # e of a float32 engine that stops a disk: its rounding of a velocity
@@ -289,3 +290,34 @@ def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
         table = Comparison(fast, None, (), None)  # type: ignore[arg-type]
 
         assert can_pass(table) is passes
+
+
+def test_a_disk_that_slips_to_the_end_has_a_lower_bound():
+    """The time at which it begins to roll is not known."""
+    one, truth = truth_of("slip_to_roll")
+    slips = replace(
+        truth,
+        velocity=np.broadcast_to(truth.velocity[0], truth.velocity.shape),
+        angular_velocity=np.broadcast_to(truth.angular_velocity[0], truth.angular_velocity.shape),
+    )
+    value = METRICS["time_to_roll_error_s"].of(beside_truth(one, one.dt(1), slips, truth))
+
+    assert value is not None
+    assert value.value > 0
+    assert value.note == "at least: it slips to the end"
+
+
+def test_a_collision_found_forty_steps_late_is_counted_in_the_note():
+    """It is not missed; its delay is a number of its own."""
+    one, truth = truth_of("head_on_equal_e05")
+    met, dt = truth.collisions, one.dt(8)
+    late = replace(truth, collisions=Collisions(met.t + 40 * dt, met.i, met.j, met.impulse))
+    found, control = (
+        METRICS["collisions_missed"].of(beside_truth(one, dt, played, truth))
+        for played in (late, truth)
+    )
+
+    assert found is not None
+    assert control is not None
+    assert (found.value, control.value) == (0, 0)
+    assert found.note == f"{control.note}, 1 found more than 20 steps late or early"
