@@ -20,7 +20,7 @@ from reports.speed.measure import Measured
 from reports.speed.plan import SCENE, middle
 from reports.speed.versus import COMPARED
 from scenarios.catalogue import SCENARIOS, scenario
-from tests.measured import MEASURED
+from tests.measured import MEASURED, NOT_YET_TIMED
 from tests.reports.speed import statements as speed_figures
 from tests.reports.speed.statements import MATCHED, SHIPPED
 
@@ -74,11 +74,12 @@ def test_the_kept_tables_have_every_scene_and_measured_engine():
         speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED)
     )
 
+    scenes = set(SCENARIOS) - NOT_YET_TIMED
     assert set(zip(orders.scenario, orders.name)) == {
-        (scene, name) for scene in SCENARIOS for name in DISTINCT if name in MEASURED
+        (scene, name) for scene in scenes for name in DISTINCT if name in MEASURED
     }
     assert set(zip(budgets.scenario, budgets.name)) == {
-        (scene, name) for scene in SCENARIOS for name in WITH_MECHANISMS
+        (scene, name) for scene in scenes for name in WITH_MECHANISMS
     }
 
 
