@@ -11,8 +11,8 @@ import numpy as np
 
 from adapters.play import play_once
 from reports.compare import laws
-from reports.compare.verdicts import verdicts
-from reports.compare.view import cut, rounding_of
+from reports.compare.comparison import first_failed
+from reports.compare.view import cut
 from reports.run.scenes import open_scene
 from reports.run.stepping import Make, Stepping, overheads
 from reports.run.timing import Sample, Timed, interleaved
@@ -42,21 +42,19 @@ def errors_of(
         if run.status != "ok" and scenario.duration < whole.duration:
             run = play_once(make, name, scenario, scenario.dt(k))
         row = error_row(scene, seed, name, k, run.status, run.reason)
-        played, judged = None, []
-        if run.status == "ok" and run.trajectory is not None:
-            played = cut(run.trajectory, len(truth))
-            judged = verdicts(whole, run.trajectory, run.dt, rounding_of(name), truth)
-        if failed := next((verdict for verdict in judged if verdict.failed), None):
+        played = run.trajectory if run.status == "ok" else None
+        if played is not None and (failed := first_failed(run, whole, truth)):
             row |= {"status": FAILS, "reason": failed.text}
             played = None
-        elif played is not None:
+        if played is not None:
+            played = cut(played, len(truth))
             row["error_radii"] = float(
                 (laws.deviation(played, truth, scenario.scene) / radius).max()
             )
-        if played is not None and before is not None:
-            row["change_radii"] = float(
-                (laws.deviation(played, before, scenario.scene) / radius).max()
-            )
+            if before is not None:
+                row["change_radii"] = float(
+                    (laws.deviation(played, before, scenario.scene) / radius).max()
+                )
         before = played
         rows.append(row)
     return rows
