@@ -14,7 +14,7 @@ from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
 from reports.compare.table import TableRow, deviation_row, status_row, table_of, verdict_row
-from reports.compare.verdicts import fails, in_words, verdicts
+from reports.compare.verdicts import Verdict, fails, in_words, verdicts
 from reports.compare.view import View, beside, not_judged, rounding_of
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -68,10 +68,19 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
         for versus, other, silent in _opponents(run, runs, truth):
             view = beside(scenario, run, other, jumps if versus == TRUTH else None, silent)
             rows += _measure(run, view, versus)
-        assert run.trajectory is not None
-        judged = verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
-        rows += [verdict_row(run, verdict) for verdict in judged]
+        rows += [verdict_row(run, verdict) for verdict in verdicts_on(run, scenario, truth)]
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
+
+
+def verdicts_on(run: Run, scenario: Scenario, truth: Trajectory | None) -> list[Verdict]:
+    """The verdicts on a run that was played to its end."""
+    assert run.trajectory is not None
+    return verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
+
+
+def first_failed(run: Run, scenario: Scenario, truth: Trajectory | None) -> Verdict | None:
+    """The first verdict that the run fails."""
+    return next((each for each in verdicts_on(run, scenario, truth) if each.failed), None)
 
 
 def _opponents(

@@ -7,7 +7,7 @@
 - Energy or overlap of one or two samples only: inside a collision an engine may overlap, and read
   velocity and position of different instants.
 - On a torus, an interval in which a disk may be set onto the opposite edge, and an overlap that
-  it has from there until the two are apart.
+  begins so.
 - The part of a scene without exact answer in which disks come to rest: there only what jitters in
   place is seen, and what sinks into something.
 
@@ -222,13 +222,13 @@ class Judge:
         disks = len({disk for _, disk, _ in passed})
         at, *who = passed[0] if passed else (np.nan,)
         yield Verdict("tunnelled", disks, 0.0, at, tuple(map(int, who)))
-        worst = max(map(self.overlap, self.pairs), key=lambda each: each.value - each.bound)
-        yield worst
+        yield max(map(self.overlap, self.pairs), key=lambda each: each.value - each.bound)
 
     def through_walls(self) -> Iterator[tuple[float, int, int]]:
         """(s, disk, -1 - wall): the centre crosses the wall between two samples. Of a sample on the
         wall itself the side of the sample before it counts."""
-        scene, x, t = self.scenario.scene, self.played.position, self.played.t
+        scene, t = self.scenario.scene, self.played.t
+        x, v = self.played.position, self.played.velocity
         number = np.arange(len(x))[:, None]
         for w, (a, b) in enumerate(scene.walls):
             length = float(laws.lengths(b - a))
@@ -240,14 +240,10 @@ class Judge:
             ends = laws.cross(a - start, x[1:] - start) * laws.cross(b - start, x[1:] - start)
             for k, i in np.argwhere((sides < 0) & tells[1:] & (ends <= 0) & ~self.jumps):
                 along = (b - a) / length * scene.radius[i]
-                way = (t[k + 1] - t[last[k, i]]) * (self.disk_speed[k : k + 2, i].max())
+                speed = laws.lengths(v[k : k + 2, i]).max() + self.g * self.interval
+                way = (t[k + 1] - t[last[k, i]]) * speed
                 if all(detour(start[k, i], x[k + 1, i], q) > way for q in (a - along, b + along)):
                     yield float(t[k + 1]), int(i), -1 - w
-
-    @cached_property
-    def disk_speed(self) -> Array:
-        """(k, n) m/s, with what gravity adds in an interval."""
-        return laws.lengths(self.played.velocity) + self.g * self.interval
 
     def through_disks(self) -> Iterator[tuple[float, int, int]]:
         """(s, disk, disk): between two samples two disks change sides, and the centre of one passes
@@ -278,7 +274,7 @@ class Judge:
 
         A right engine that detects collisions at the end of a step overlaps by the approach in it.
         """
-        depth = pair.overlap / pair.smaller
+        depth, number = pair.overlap / pair.smaller, np.arange(len(self.played))[:, None]
         seen = np.flatnonzero((depth > 0).any(axis=0))
         if not len(seen):
             return Verdict("overlap", 0.0, MOST_OVERLAP)
@@ -291,23 +287,17 @@ class Judge:
         allowed[lasting] = MOST_OVERLAP
         depth = np.where(lasting, np.concatenate([depth[:2], stays]), depth)
         if self.jumps.any():
-            ends = pair.others[seen]
-            jumped = self.jumps[:, [pair.disk]] | np.where(ends >= 0, self.jumps[:, ends], False)
-            depth = np.where(self.met_after(jumped, depth), depth, 0.0)
+            # not one that they are set into: they were apart after the last jump of either
+            ends = np.where(pair.others >= 0, pair.others, pair.disk)[seen]
+            jumped = np.vstack([depth[:1] < 0, self.jumps[:, [pair.disk]] | self.jumps[:, ends]])
+            last = [np.where(event, number, -1) for event in (depth <= 0, jumped)]
+            apart, jump = (np.maximum.accumulate(each) for each in last)
+            depth = np.where(apart >= jump, depth, 0.0)
         k, m = np.unravel_index(int(np.argmax(depth - allowed)), depth.shape)
         above = ~(depth[:, m] <= allowed[:, m])
         at = self.played.t[np.argmax(above) if above.any() else k]
         who = pair.disk, int(pair.others[seen[m]])
         return Verdict("overlap", float(depth[k, m]), float(allowed[k, m]), float(at), who)
-
-    def met_after(self, jumped: NDArray[np.bool_], depth: Array) -> NDArray[np.bool_]:
-        """(k, m), whether two were apart after the last time that one of them was set onto another
-        edge: before, its overlap is none that it moved into."""
-        number = np.arange(len(depth))[:, None]
-        last = np.where(np.concatenate([np.zeros_like(jumped[:1]), jumped]), number, 0)
-        apart = np.where(depth <= 0, number, -1)
-        met: NDArray[np.bool_] = np.maximum.accumulate(apart) >= np.maximum.accumulate(last)
-        return met
 
     # Energy and momentum.
 
@@ -327,40 +317,23 @@ class Judge:
         yield from self.bounces(scale)
 
     def bounces(self, scale: float) -> Iterator[Verdict]:
-        """`bounce_gained`: of the disk that gains most, from its first flight to its last, over the
-        bounces between; of disks that meet nothing that moves. A step in which the disk is moved
-        out of a wall lifts it by v dt at most."""
-        scene, t = self.scenario.scene, self.played.t
-        if not self.g:
+        """`bounce_gained`, where one disk moves: from its first flight to its last, over the
+        bounces between. A step in which the disk is moved out of a wall lifts it by v dt at most.
+        """
+        scene, moving = self.scenario.scene, np.flatnonzero(~self.scenario.scene.static)
+        if not self.g or len(moving) != 1:
             return
-        off = np.diff(self.played.velocity, axis=0) - self.interval * scene.gravity
-        # a thousandth of what gravity changes, and of the rounding of the speed
+        off = np.diff(self.played.velocity[:, moving[0]], axis=0) - self.interval * scene.gravity
+        # of what gravity changes, and of the rounding of the speed
         small = 1e-3 * self.g * self.interval + 100 * self.rounding * self.speed[1:]
-        found = []
-        for i in np.flatnonzero(~scene.static & ~self.meets_moving):
-            free = laws.lengths(off[:, i]) <= small
-            starts = np.flatnonzero(free & ~np.append(False, free[:-1]))
-            if len(starts) < 2:
-                continue
-            count = len(starts) - 1
-            energy = laws.energies(self.played, scene)[:, i]
-            lifted = scene.mass[i] * self.g * self.dt * self.speed[starts[1:]].mean()
-            gain = float(energy[starts[-1]] - energy[starts[0]]) / count / scale
-            bound = MOST_BOUNCE + float(lifted) / scale
-            found.append(Verdict("bounce_gained", gain, bound, float(t[starts[-1]]), (int(i),)))
-        yield from sorted(found, key=lambda each: each.bound - each.value)[:1]
-
-    @cached_property
-    def meets_moving(self) -> NDArray[np.bool_]:
-        """(n,), which disks come near another that moves."""
-        static = self.scenario.scene.static
-        meets = np.zeros(len(static), bool)
-        for disk, others, overlap, *_ in self.pairs:
-            if others[0] >= 0:
-                near = others[(overlap > -self.reach[:, None]).any(axis=0)]
-                meets[near] |= not static[disk]
-                meets[disk] |= bool((~static[near]).any())
-        return meets
+        free = laws.lengths(off) <= small
+        starts = np.flatnonzero(free & ~np.append(False, free[:-1]))
+        if len(starts) > 1:
+            energy = laws.energy(self.played, scene)[starts] / scale
+            gain = (energy[-1] - energy[0]) / (len(starts) - 1)
+            lifted = self.g * self.dt * self.speed[starts[1:]].mean() * scene.mass[moving[0]]
+            bound, at = MOST_BOUNCE + lifted / scale, self.played.t[starts[-1]]
+            yield Verdict("bounce_gained", float(gain), float(bound), float(at), (int(moving[0]),))
 
     # Free flight.
 
@@ -378,9 +351,8 @@ class Judge:
         free = (self.room > self.reach[:, None] + MOST_OVERLAP * scene.radius)[1:-1]
         free &= ~(scene.static | self.jumps[1:] | self.jumps[:-1])
         fall = np.diff(x, n=2, axis=0) @ scene.gravity / (self.g * self.interval) ** 2
-        if free.any() and 4 * self.rounding * np.abs(x).max() < MOST_LOST / 10 * (
-            self.g * self.interval**2
-        ):
+        rounding = 4 * self.rounding * np.abs(x).max() / (self.g * self.interval**2)
+        if free.any() and rounding < MOST_LOST / 10:
             missing = float(np.median(np.abs(fall[free] - 1)))
             at = float(t[1 + np.argmax(free.any(axis=1))])
             yield Verdict("gravity", missing, MOST_LOST, at)
@@ -397,11 +369,6 @@ class Judge:
 
     # Rest.
 
-    @cached_property
-    def own_speed(self) -> float:
-        """sqrt(g R) m/s, the speed after a fall of half a radius."""
-        return own_speed(self.scenario)
-
     def rest(self) -> Iterator[Verdict]:
         """Where the scene can come to rest: `jitters`, and beside an exact answer that is at rest
         at its end the others.
@@ -410,23 +377,31 @@ class Judge:
         ball hops on in a right stepping engine, too, or stops up to 2 dt / (1 - e)^2 early.
         """
         scenario, scene, played = self.scenario, self.scenario.scene, self.played
-        if not can_rest(scenario):
+        held, falls = len(scene.walls) or scene.static.any(), self.g and not scene.static.all()
+        if (
+            not (held and falls and scene.restitution < 1)
+            or scenario.thrusts
+            or scene.wrap is not None
+        ):
             return
-        step = self.g * self.dt / (1 - scene.restitution) / self.own_speed
-        speed = laws.lengths(played.velocity)[:, ~scene.static] / self.own_speed
+        unit, intervals = own_speed(scenario), len(played) - 1
+        step = self.g * self.dt / (1 - scene.restitution) / unit
+        speed = laws.lengths(played.velocity)[:, ~scene.static] / unit
         yield from self.jitter(speed, MOST_JITTER + step)
-        if self.truth is None or (rest := rests_from(self.truth, scenario)) is None:
+        if self.truth is None:
             return
-        bound = MOST_RESIDUAL + step
-        fastest, exact = speed.max(axis=1), laws.lengths(self.truth.velocity).max(axis=1)
-        first = settled_from(fastest, bound)
-        late = abs(first - settled_from(exact / self.own_speed, bound)) / (len(played) - 1)
-        from_ = min(rest + int(np.ceil(SETTLED * (len(played) - 1))), len(played) - LASTS)
-        after = np.sqrt((speed[from_:] ** 2).mean(axis=1))
-        yield from self.moved(from_, step)
-        yield worst_of("not_at_rest", played.t[from_:], after, bound)
+        exact, bound = laws.lengths(self.truth.velocity).max(axis=1) / unit, MOST_RESIDUAL + step
+        rest = settled_from(exact, 1e-6)  # nothing that is judged here
+        if rest > len(exact) - LASTS:  # a disk that turns round is at rest at one sample
+            return
+        first = settled_from(speed.max(axis=1), bound)
+        late = abs(first - settled_from(exact, bound)) / intervals
+        start = min(rest + int(np.ceil(SETTLED * intervals)), len(played) - LASTS)
+        yield from self.moved(start, step)
+        after = np.sqrt((speed[start:] ** 2).mean(axis=1))
+        yield worst_of("not_at_rest", played.t[start:], after, bound)
         early = 2 * self.dt / (1 - scene.restitution) ** 2 / float(played.t[-1])
-        at = float(played.t[min(first, len(fastest) - 1)])
+        at = float(played.t[min(first, intervals)])
         yield Verdict("time_of_rest", late, SETTLED + early, at)
 
     def jitter(self, speed: Array, bound: float) -> Iterator[Verdict]:
@@ -438,19 +413,15 @@ class Judge:
         """
         scene, k = self.scenario.scene, len(self.played)
         hops = 1 + (np.log(STAYS) / np.log(scene.restitution) if scene.restitution else 0)
-        if k // 4 * self.interval < 0.9 * hops * self.own_speed / self.g:
+        if k // 4 * self.interval < 0.9 * hops * own_speed(self.scenario) / self.g:
             return
-        x = self.played.position[k // 2 :, ~scene.static]
-        stays = laws.lengths(np.ptp(x, axis=0)) <= MOST_SINKING * scene.radius[~scene.static]
-        before, last = (
-            np.sqrt((part**2).mean(axis=0))
-            for part in (speed[k // 2 : k - k // 4], speed[k - k // 4 :])
-        )
+        moving, x = np.flatnonzero(~scene.static), self.played.position[k // 2 :]
+        stays = laws.lengths(np.ptp(x[:, moving], axis=0)) <= MOST_SINKING * scene.radius[moving]
+        parts = speed[k // 2 : k - k // 4], speed[k - k // 4 :]
+        before, last = (np.sqrt((part**2).mean(axis=0)) for part in parts)
         value = np.where(stays & (last >= STAYS * before), last, 0.0)
-        worst = int(np.argmax(value))
-        disk = int(np.flatnonzero(~scene.static)[worst])
-        at = float(self.played.t[k // 2])
-        yield Verdict("jitters", float(value[worst]), bound, at, (disk,))
+        worst, at = int(np.argmax(value)), float(self.played.t[k // 2])
+        yield Verdict("jitters", float(value[worst]), bound, at, (int(moving[worst]),))
 
     def moved(self, first: int, step: float) -> Iterator[Verdict]:
         """`sinks`, `hops` and `creeps`: how far a disk moves after sample `first`, beside the hop
@@ -468,22 +439,6 @@ class Judge:
 def own_speed(scenario: Scenario) -> float:
     """sqrt(g R) m/s, the speed after a fall of half a radius."""
     return float(np.sqrt(np.linalg.norm(scenario.scene.gravity) * scenario.scene.radius.min()))
-
-
-def can_rest(scenario: Scenario) -> bool:
-    """Whether disks can come to rest: they fall, lose energy, and something holds them."""
-    scene = scenario.scene
-    held = len(scene.walls) or scene.static.any()
-    falls = scene.gravity.any() and scene.restitution < 1 and not scene.static.all()
-    return bool(held and falls and not scenario.thrusts and scene.wrap is None)
-
-
-def rests_from(truth: Trajectory, scenario: Scenario) -> int | None:
-    """The sample from which all disks of an exact answer are at rest up to its end, for three
-    samples at least: a disk that turns round is at rest at one."""
-    speed = laws.lengths(truth.velocity).max(axis=1) / own_speed(scenario)
-    first = settled_from(speed, 1e-6)  # radii in the time of a fall: nothing that is judged here
-    return first if first <= len(truth) - LASTS else None
 
 
 def settled_from(speed: Array, bound: float) -> int:

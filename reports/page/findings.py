@@ -64,10 +64,7 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
     broken = broken_laws(comparisons, untrusted)
     sentences = [
         closest(engines),
-        *failing(
-            {name: each for name, each in broken.items() if everyone or name in engines},
-            len(comparisons),
-        ),
+        *failing({k: v for k, v in broken.items() if everyone or k in engines}, len(comparisons)),
         worth_of_settings(engines),
         where_it_fails(engines, statuses),
     ]
@@ -75,10 +72,7 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
         unranked_sentence(name, off, FAR_OFF, len(refused.get(name, ())), broken.get(name, {}))
         for name in groups.get(YOURS, [])
     ]
-    exact = [
-        unranked_sentence(name, off, RIGHT, 0, broken.get(name, {}))
-        for name in groups.get(EXACT, [])
-    ]
+    exact = [unranked_sentence(k, off, RIGHT, 0, broken.get(k, {})) for k in groups.get(EXACT, [])]
     return sentences if everyone else [*own, *sentences, *exact]
 
 

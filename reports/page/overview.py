@@ -367,32 +367,24 @@ def scenario_table(
     """(metric, unit, which value is better, a cell for each name) of every metric of this
     scenario, and of every verdict that an engine fails."""
     found, failed = values(comparison), outcome_at_middle_dt(comparison)
-    rows = []
     table = fails(comparison.table[comparison.table.dt_s == comparison.middle_dt])
     broken = {*zip(table.engine + ":" + table.profile, table.metric)}
-    for key, (unit, *_) in VERDICTS.items():
-        if any((name, key) in broken for name in names):
-            each = [found.get((name, key)) for name in names]
-            cells = [
-                OverviewCell(cell.text, cell.remark, failed=(name, key) in broken)
-                if cell
-                else OverviewCell("–")
-                for name, cell in zip(names, each)
-            ]
-            rows.append((key, "" if unit == "1" else unit, "↓", cells))
-    for key, metric in METRICS.items():
+    kinds = {key: (kind.unit, "lower") for key, kind in VERDICTS.items() if key in {*table.metric}}
+    kinds |= {key: (metric.unit, metric.better) for key, metric in METRICS.items()}
+    rows = []
+    for key, (unit, best) in kinds.items():
         if not any((name, key) in found for name in names):
             continue
         cells = []
         for name in names:
             if (name, key) in found:
-                text, remark = found[name, key].text, found[name, key].remark
-                cells.append(OverviewCell(text, remark, share=share_of(key, remark)))
+                _, remark, _ = cell = found[name, key]
+                share, is_broken = share_of(key, remark), (name, key) in broken
+                cells.append(OverviewCell(cell.text, remark, failed=is_broken, share=share))
             else:
                 cells.append(outcome_cell(failed[name]) if name in failed else OverviewCell("–"))
-        unit = "" if metric.unit == "1" else metric.unit
-        better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
-        rows.append((key, unit, better, cells))
+        better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[best]
+        rows.append((key, "" if unit == "1" else unit, better, cells))
     return rows
 
 

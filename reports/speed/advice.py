@@ -17,10 +17,10 @@ from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
 from adapters.play import play_once
+from reports.compare.comparison import first_failed
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
-from reports.compare.verdicts import verdicts
-from reports.compare.view import beside, rounding_of
+from reports.compare.view import beside
 from reports.page.style import number
 from reports.run.machine import busy_cores
 from reports.run.scenes import open_scene
@@ -410,10 +410,8 @@ def end_of(scene: str, seed: int, one: Attempt) -> tuple[str, bool]:
     fails in it; "" if neither; and whether it is a verdict."""
     scenario = open_scene(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
-    if run.status == "ok" and run.trajectory is not None:
-        truth = scored(scene, seed).truth
-        judged = verdicts(scenario, run.trajectory, one.dt, rounding_of(one.name), truth)
-        failed = next((verdict for verdict in judged if verdict.failed), None)
+    if run.status == "ok":
+        failed = first_failed(run, scenario, scored(scene, seed).truth)
         return (f"{failed.text} at {failed.at:.3g} s", True) if failed else ("", False)
     until = f", up to {run.trajectory.t[-1]:.3g} s" if run.trajectory is not None else ""
     return f"{run.status}{until}: {run.reason}", False

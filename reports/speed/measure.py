@@ -122,7 +122,7 @@ class Measuring:
                 {"kind": measurement.kind, "change": measurement.change} | row for row in found
             )
             if measurement.seed == self.plan.seed:
-                well = tuple(row["substeps"] for row in found if row["status"] == "ok")
+                well = tuple(r["substeps"] for r in found if r["status"] in ("ok", ladder.FAILS))
                 played.append(measurement._replace(step_sizes=well))
         self.measured.errors = pd.DataFrame(rows)
         return played
