@@ -67,8 +67,9 @@ def settings_of(name: str, scene: Scene, dt: float) -> list[Setting]:
     row, settings = row_of(name), list[Setting]()
     if profile == "shipped" and library in SETTINGS:
         settings = [each for each in SETTINGS[library](scene, dt) if each.shipped != each.value]
-    if row.work is not None:
-        settings.append(tweak(row.work.setting, "as it is", row.work.values[-1]))
+    if row.work is not None and row.searched is not None:
+        usual = row.searched().chosen[row.work.setting]  # of both profiles
+        settings.append(tweak(row.work.setting, usual, row.work.values[-1]))
     return settings
 
 
