@@ -20,13 +20,14 @@ FINER = "finer"  # among the parameters of a setting: the steps in place of one
 
 
 class Setting(NamedTuple):
-    """A setting by its public name: its value in the profile, the value to set, and the parameters
-    of `EngineRow.make` that set it."""
+    """A setting by its public name: its value in the profile, the value to set, the parameters of
+    `EngineRow.make` that set it, and whether the matched profile sets it so, too."""
 
     name: str
     shipped: Any
     value: Any
     parameters: Mapping[str, Any]
+    matched: bool = True
 
     @property
     def advice(self) -> str:
@@ -66,10 +67,9 @@ def settings_of(name: str, scene: Scene, dt: float) -> list[Setting]:
     row, settings = row_of(name), list[Setting]()
     if profile == "shipped" and library in SETTINGS:
         settings = [each for each in SETTINGS[library](scene, dt) if each.shipped != each.value]
-    if row.work is not None:
-        most = row.work.values[-1]
-        key = row.work.setting
-        settings.append(Setting(key, "as the manual has it", most, {key: most}))
+    if row.work is not None and row.searched is not None:
+        usual = row.searched().chosen[row.work.setting]  # of both profiles
+        settings.append(tweak(row.work.setting, usual, row.work.values[-1]))
     return settings
 
 
@@ -79,7 +79,8 @@ def find_remedy(
     """The fewest settings with which `error` of the engine's parameters is at most `bound`, or at
     least `GONE` of it goes; none if no change of a setting does that.
 
-    Each step changes the one that leaves least. Where none helps alone, two are changed at once.
+    Each step changes the one that leaves least. Where none helps alone, two are changed at once;
+    where these are not enough, all of the matched profile, without those that are not needed.
     """
     before, chosen = off(error({})), list[Setting]()
     left = before
@@ -94,6 +95,15 @@ def find_remedy(
                 break
         else:
             break
+    if left > bound:
+        enough = max(bound, 0.0 if chosen or not isfinite(before) else GONE * before)
+        needed = [each for each in settings if each.matched]
+        if off(error(merged(needed))) <= enough:
+            for each in list(needed):
+                fewer = [other for other in needed if other is not each]
+                if off(error(merged(fewer))) <= enough:
+                    needed = fewer
+            chosen, left = needed, off(error(merged(needed)))
     return Remedy(tuple(chosen), before, left, tuple(dict.fromkeys(one.name for one in settings)))
 
 
@@ -117,21 +127,41 @@ def merged(settings: Sequence[Setting]) -> dict[str, Any]:
     return parameters
 
 
-def _friction(default: float, scene: Scene, name: str = "friction") -> list[Setting]:
-    """The friction that a library has where nobody states one."""
-    stated = scene.friction > 0
-    return [] if stated else [Setting(name, default, 0.0, {"friction": 0.0})]
+def tweak(name: str, shipped: Any, value: Any, *keys: str) -> Setting:
+    """The same of a setting that the matched profile leaves as it is."""
+    return one(name, shipped, value, *keys)._replace(matched=False)
+
+
+def one(name: str, shipped: Any, value: Any, *keys: str) -> Setting:
+    """The setting that parameters of `EngineRow.make` of these names set, or of its own name."""
+    return Setting(name, shipped, value, dict.fromkeys(keys or [name], value))
 
 
 def _pymunk(scene: Scene, _dt: float) -> list[Setting]:
-    e, mu, slop = scene.restitution, scene.friction, 1e-6 * float(scene.radius.min())
     return [
-        Setting("elasticity", e, sqrt(e), {"elasticity": sqrt(e)}),
-        Setting("friction", mu, sqrt(mu), {"friction": sqrt(mu)}),
-        Setting("collision_slop", 0.1, slop, {"collision_slop": slop}),
-        Setting("collision_bias", 0.9**60, 1.0, {"collision_bias": 1.0}),
-        Setting("collision_bias", 0.9**60, 0.0, {"collision_bias": 0.0}),
-        Setting("collision_persistence", 3, 1, {"collision_persistence": 1}),
+        one("elasticity", scene.restitution, sqrt(scene.restitution)),
+        one("friction", scene.friction, sqrt(scene.friction)),
+        one("collision_slop", 0.1, 1e-6 * float(scene.radius.min())),
+        tweak("collision_bias", 0.9**60, 1.0),
+        tweak("collision_bias", 0.9**60, 0.0),
+        one("collision_persistence", 3, 1),
+    ]
+
+
+def _unstated(friction: float, scene: Scene) -> list[Setting]:
+    """The friction that a library has where nobody states one."""
+    return [] if scene.friction else [one("friction", friction, 0.0)]
+
+
+def _as_box2d(scene: Scene, sleep: str, edge: str, skin: str) -> list[Setting]:
+    """What Box2D 2.3 and planck have in common."""
+    return [
+        *_unstated(0.2, scene),
+        one(sleep, True, False, "sleeping"),
+        one(edge, skin, 0, "skin"),
+        tweak("continuousPhysics", True, False, "continuous", "elastic_continuous"),
+        tweak("bullet", False, True, "bullet", "elastic_bullet"),
+        tweak("positionIterations", 3, 0, "position_iterations", "elastic_position_iterations"),
     ]
 
 
@@ -139,46 +169,20 @@ def _box2d(scene: Scene, dt: float) -> list[Setting]:
     """What is compiled in is moved by the units in which the scene is given."""
     from adapters.box2d import fastest
 
-    radius = float(scene.radius.min())
-    small, step = 0.25 * radius, 2 * fastest(scene) * dt
-    return [
-        *_friction(0.2, scene),
-        Setting("SetAllowSleeping", True, False, {"sleeping": False}),
-        Setting(
-            "b2_velocityThreshold",
-            "1 unit of length a unit of time, compiled in",
-            "give times in units of 1000 s",
-            {"time_unit": 1000.0},
-        ),
-        *(
-            Setting(
-                name,
-                f"{value} units of length{by}, compiled in",
-                f"give lengths in units of {plain(unit)} m and times in units of {plain(unit)} s",
-                {"length_unit": unit / radius, "time_unit": unit},
-            )
-            for name, value, by, unit, bites in (
-                ("b2_linearSlop", 0.005, "", small, small < 1.0),
-                ("b2_maxTranslation", 2, " a step", step, step > 1.0),
-            )
-            if bites
-        ),
-        Setting("b2EdgeShape.radius", "0.01 units of length", 0, {"skin": False}),
-        *_swept("continuousPhysics", "bullet"),
-        Setting("positionIterations", 3, 0, dict.fromkeys(CORRECTIONS, 0)),
+    threshold = "1 unit of length a unit of time, compiled in", "give times in units of 1000 s"
+    settings = [
+        *_as_box2d(scene, "SetAllowSleeping", "b2EdgeShape.radius", "0.01 units of length"),
+        Setting("b2_velocityThreshold", *threshold, {"time_unit": 1000.0}),
         *_spin_cap("b2_maxRotation", pi / 2, scene, dt),
     ]
-
-
-CORRECTIONS = ("position_iterations", "elastic_position_iterations")
-
-
-def _swept(world: str, body: str) -> list[Setting]:
-    """Continuous collision of Box2D 2.3 and of planck: with walls, and between disks."""
-    return [
-        Setting(world, True, False, {"continuous": False, "elastic_continuous": False}),
-        Setting(body, False, True, {"bullet": True, "elastic_bullet": True}),
-    ]
+    radius, step = float(scene.radius.min()), 2 * fastest(scene) * dt
+    slop = "b2_linearSlop", "0.005 units of length, compiled in", 0.25 * radius
+    cap = "b2_maxTranslation", "2 units of length a step, compiled in", step
+    for name, value, unit in [slop] * (0.25 * radius < 1.0) + [cap] * (step > 1.0):
+        units = f"give lengths in units of {plain(unit)} m and times in units of {plain(unit)} s"
+        in_units = {"length_unit": unit / radius, "time_unit": unit}
+        settings.append(Setting(name, value, units, in_units))
+    return settings
 
 
 def _spin_cap(name: str, most: float, scene: Scene, dt: float) -> list[Setting]:
@@ -191,33 +195,32 @@ def _spin_cap(name: str, most: float, scene: Scene, dt: float) -> list[Setting]:
 
 def _planck(scene: Scene, _dt: float) -> list[Setting]:
     slop = 0.005 * 0.25 * float(scene.radius.min())
-    shipped = {"velocityThreshold": 1.0, "linearSlop": 0.005, "maxTranslation": 2.0}
-    shipped["maxRotation"] = pi / 2
-    needed = dict.fromkeys(shipped, NO_LIMIT) | {"velocityThreshold": 0.0, "linearSlop": slop}
     return [
-        *_friction(0.2, scene),
-        Setting("allowSleep", True, False, {"sleeping": False}),
-        *(
-            Setting(f"Settings.{name}", value, needed[name], {name: needed[name]})
-            for name, value in shipped.items()
-        ),
-        Setting("Edge.m_radius", "twice the slop", 0, {"skin": False}),
-        *_swept("continuousPhysics", "bullet"),
-        Setting("positionIterations", 3, 0, dict.fromkeys(CORRECTIONS, 0)),
+        *_as_box2d(scene, "allowSleep", "Edge.m_radius", "twice the slop"),
+        one("Settings.velocityThreshold", 1.0, 0.0, "velocityThreshold"),
+        one("Settings.linearSlop", 0.005, slop, "linearSlop"),
+        one("Settings.maxTranslation", 2.0, NO_LIMIT, "maxTranslation"),
+        one("Settings.maxRotation", pi / 2, NO_LIMIT, "maxRotation"),
     ]
 
 
 def _box2d_v3(scene: Scene, dt: float) -> list[Setting]:
-    unit = 0.5 * float(scene.radius.min())
+    from adapters.box2d import fastest
+
+    # contacts are foreseen within 0.02 units: fast disks need more
+    radius, wide = float(scene.radius.min()), fastest(scene) * dt / 0.02
+    unit, name = 0.5 * radius, "length_units_per_meter"
+    foreseen = Setting(name, 1.0, wide, {"length_unit": wide / radius}, matched=False)
     return [
-        *_friction(0.6, scene),
-        Setting("enable_sleep", True, False, {"sleeping": False}),
-        Setting("restitution_threshold", 1.0, 0.0, {"restitution_threshold": 0.0}),
-        Setting("maximum_linear_speed", 400.0, NO_LIMIT, {"maximum_linear_speed": NO_LIMIT}),
-        Setting("length_units_per_meter", 1.0, unit, {"length_unit": 0.5}),
-        Setting("set_contact_tuning: hertz", 30.0, NO_LIMIT, {"hertz": NO_LIMIT}),
-        Setting("continuous_enabled", True, False, {"continuous": False}),
-        Setting("is_bullet", False, True, {"bullet": True}),
+        *_unstated(0.6, scene),
+        one("enable_sleep", True, False, "sleeping"),
+        one("restitution_threshold", 1.0, 0.0),
+        one("maximum_linear_speed", 400.0, NO_LIMIT),
+        Setting(name, 1.0, unit, {"length_unit": 0.5}),
+        *([foreseen] if wide > 1.0 else []),
+        one("set_contact_tuning: hertz", 30.0, NO_LIMIT, "hertz"),
+        one("continuous_enabled", True, False, "continuous"),
+        tweak("is_bullet", False, True, "bullet"),
         *_spin_cap("B2_MAX_ROTATION", pi / 4, scene, dt),
     ]
 
@@ -228,31 +231,30 @@ def _rapier2d(scene: Scene, dt: float) -> list[Setting]:
     radius, fast = float(scene.radius.min()), fastest(scene) / 200  # it cuts at 400 units a second
     units = [0.5 * radius, *([fast] if fast > 2 else [])]
     return [
-        *_friction(0.5, scene),
-        Setting("canSleep", True, False, {"sleeping": False}),
+        *_unstated(0.5, scene),
+        one("canSleep", True, False, "sleeping"),
         *(Setting("lengthUnit", 1.0, unit, {"length_unit": unit / radius}) for unit in units),
-        Setting("normalizedPredictionDistance", 0.02, 0.002, {"prediction": 0.002}),
-        Setting("contact_natural_frequency", 30.0, 1000.0, {"hertz": 1000.0}),
-        Setting("numSolverIterations", 4, 16, {"iterations": 16}),
-        Setting("ccdEnabled", False, True, {"continuous": True}),
-        Setting("maxCcdSubsteps", 1, 0, {"continuous_steps": 0}),
+        tweak("normalizedPredictionDistance", 0.02, 0.002, "prediction"),
+        tweak("contact_natural_frequency", 30.0, 1000.0, "hertz"),
+        tweak("numSolverIterations", 4, 16, "iterations"),
+        tweak("ccdEnabled", False, True, "continuous"),
+        tweak("maxCcdSubsteps", 1, 0, "continuous_steps"),
         *_spin_cap("the cap on rotation", pi / 4, scene, dt),
     ]
 
 
 def _matter(scene: Scene, _dt: float) -> list[Setting]:
-    pixels = 1e5 / float(scene.radius.min())
     return [
-        Setting("frictionAir", 0.01, 0.0, {"friction_air": 0.0}),
-        *_friction(0.1, scene),
-        Setting("frictionStatic", 0.5, 0.0, {"friction_static": 0.0}),
-        Setting("slop", 0.05, 0.0, {"slop": 0.0}),
-        Setting("Resolver._restingThresh", 2.0, 0.0, {"resting": 0.0}),
-        Setting("pixels a metre", 100.0, pixels, {"pixels": pixels}),
-        Setting("maxSides", 25, 200, {"sides": 200}),
-        Setting("positionIterations", 6, 0, {"position_iterations": 0}),
-        Setting("velocityIterations", 4, 1, {"velocity_iterations": 1}),
-        Setting("velocityIterations", 4, 20, {"velocity_iterations": 20}),
+        one("frictionAir", 0.01, 0.0, "friction_air"),
+        *_unstated(0.1, scene),
+        tweak("frictionStatic", 0.5, 0.0, "friction_static"),
+        tweak("slop", 0.05, 0.0),
+        tweak("Resolver._restingThresh", 2.0, 0.0, "resting"),
+        one("pixels a metre", 100.0, 1e5 / float(scene.radius.min()), "pixels"),
+        one("maxSides", 25, 200, "sides"),
+        tweak("positionIterations", 6, 0, "position_iterations"),
+        tweak("velocityIterations", 4, 1, "velocity_iterations"),
+        tweak("velocityIterations", 4, 20, "velocity_iterations"),
     ]
 
 

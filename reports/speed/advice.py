@@ -39,6 +39,7 @@ from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
 
 PATIENCE, ALL_ROUNDS = 60.0, 600.0  # s that a run, and all timings together, may take
+SEARCH = 180.0  # s for the search of a cause, some ten runs and the error budget
 ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
 # steps times disks of one run, some seconds of the slowest engine; fewer than `FEW` disks count as
 # `FEW`, as a step with them costs no less
@@ -348,7 +349,7 @@ class Inquiry:
                 at = next(one for one in each if one.error <= 2 * least.error)
                 asked = played_as(least.name), at.substeps, self.purpose, bound
                 tasks[least.task] = partial(cause_of, self.scene, self.seed, *asked)
-        causes = self.done(tasks, "cause of the error")
+        causes = self.done(tasks, "cause of the error", SEARCH)
         unknown = "not known: the search for it did not end"
         return [
             OutOfReach(
@@ -360,9 +361,11 @@ class Inquiry:
             for one, each in zip(best, ladders)
         ]
 
-    def done(self, tasks: Mapping[Any, Any], what: str) -> dict[Any, Any]:
-        """The outcome of each task, from worker processes."""
-        return dict(done(tasks, self.workers, self.progress, what, PATIENCE))
+    def done(
+        self, tasks: Mapping[Any, Any], what: str, patience: float = PATIENCE
+    ) -> dict[Any, Any]:
+        """The outcome of each task, from worker processes; each may take `patience` s."""
+        return dict(done(tasks, self.workers, self.progress, what, patience))
 
 
 def neighbours(substeps: int, ladder: Sequence[int]) -> list[int]:

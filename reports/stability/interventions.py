@@ -25,9 +25,6 @@ from scenarios.model import Array, Scenario, Scene
 from scenarios.truth.exact import with_oracle
 
 FINER = 8
-# a power of two: an engine without length and time scales of its own plays the same to the last
-# bit, so that no change helps by chance
-UNITS = 32.0
 
 
 def finer(one: Scenario) -> Scenario:
@@ -101,35 +98,6 @@ INTERVENTIONS = {
         "positions are float32, too coarse so far from the origin",
         "at the origin",
         at_home,
-    ),
-    "faster": Intervention(
-        "[pb]*",
-        "*",
-        "too slow for a time scale of the engine (threshold of restitution, rate of position"
-        " correction)",
-        "32 times as fast",
-        partial(similar, tempo=UNITS),
-    ),
-    "slower": Intervention(
-        "[pb]*",
-        "*",
-        "too fast for a time scale of the engine (cap on speed, rate of position correction)",
-        "32 times as slow",
-        partial(similar, tempo=1 / UNITS),
-    ),
-    "larger": Intervention(
-        "[pb]*",
-        "*",
-        "too small for a length scale of the engine (slop, margin, skin)",
-        "32 times as large, at the same speeds",
-        partial(similar, size=UNITS, tempo=1 / UNITS),
-    ),
-    "smaller": Intervention(
-        "[pb]*",
-        "*",
-        "too large for a length scale of the engine (limit on displacement in a step, slop)",
-        "32 times as small, at the same speeds",
-        partial(similar, size=1 / UNITS, tempo=UNITS),
     ),
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
@@ -230,10 +198,10 @@ def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
         return intervention.reason, "", f"works {intervention.how}"
     if failing.broken == "refused":
         return "the engine refuses it", "", SAYS_SO
-    tried = [
+    tried = dict.fromkeys(
         intervention.how
-        for intervention in INTERVENTIONS.values()
-        if intervention.fits(limit.engine, varied)
-    ]
+        for name, intervention in INTERVENTIONS.items()
+        if name not in FIRST and intervention.fits(limit.engine, varied)
+    )
     also = [f"it also fails {', '.join(tried)}"] if tried else []
     return "; ".join([NOT_KNOWN, *also, *filter(None, [limit.settings])]), "", ""
