@@ -248,9 +248,11 @@ class Box2DEngine:
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
         if self.matched:
             speed = np.hypot(velocity[:, 0], velocity[:, 1])
-            unit = f": {Box2D.b2_maxTranslation:g} of its length units of {1 / self.length:.3g} m"
+            unit = f"{Box2D.b2_maxTranslation:g} of its length units of {1 / self.length:.3g} m"
+            unit += " (b2_maxTranslation, compiled into 2.3)"
             must_not_be_cut("speed", speed, self.speed_cap, "m/s", unit)
-            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
+            turn = "a quarter of a turn (b2_maxRotation, compiled into 2.3)"
+            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s", turn)
         return State(position, velocity, angle, angular_velocity)
 
     def collisions(self) -> list[ContactImpulse]:

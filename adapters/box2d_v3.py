@@ -77,8 +77,10 @@ SEARCHED = Searched(
     {
         "restitution_threshold": "0: as the scene states",
         "maximum_linear_speed": "1e9 m/s: no speed is cut",
-        "warm starting, speculative contacts": "not in the binding",
-        "linear slop, speculative margin": "compiled in; moved by the length unit alone",
+        "allowFastRotation, warm starting, speculative contacts": (
+            "in the header of Box2D 3.1; pyb2d3 does not hand them on"
+        ),
+        "linear slop, speculative margin": "compiled into Box2D; moved by the length unit alone",
         "joint tuning": "no joints here",
         "walls of chains or boxes": "a chain is one-sided, a segment of the scene is not",
         "friction": "as the scene states: that of a pair is the root of the product",
@@ -87,6 +89,10 @@ SEARCHED = Searched(
     },
 )
 
+SPIN_CAP = (
+    "an eighth of a turn, without b2BodyDef::allowFastRotation of Box2D 3.1, which pyb2d3 does not"
+    " hand on"
+)
 # it is global to the process: threads take turns, so that each world gets its own unit
 LENGTH_UNIT = Lock()
 
@@ -110,8 +116,8 @@ class Box2DV3:
     length unit is half of the smallest radius: slop and speculative margin are fractions of it. A
     larger margin predicts more collisions, but this is the largest without a spurious collision if
     two disks pass at 1 % of a radius. Contacts have the largest stiffness that the engine allows,
-    an eighth of the substep rate. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
-    cannot be lifted: a scene that reaches it is refused.
+    an eighth of the substep rate. The values are `MATCHED`, by `crosscheck tune`. A scene that
+    reaches the cap on spins, which pyb2d3 cannot lift, is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -265,7 +271,7 @@ class Box2DV3:
         velocity = every.get_linear_velocities(np.empty((n, 2), np.float32)).astype(float)
         angular_velocity = every.get_angular_velocities(np.empty(n, np.float32)).astype(float)
         if self.matched:
-            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
+            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s", SPIN_CAP)
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:

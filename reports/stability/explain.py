@@ -100,7 +100,7 @@ def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Lim
     other = by_name.get((limit.case, variant))
     if other and farther(other, limit):
         tests.append(f"{variant} gets farther")
-    if limit.failing is not None and limit.failing.broken == "refused":
+    if limit.refused:
         tests.append(SAYS_SO)
     return tests
 

@@ -226,16 +226,17 @@ class Limit:
         return next((trial for trial in self.trials if trial.value == self.fails_at), None)
 
     @property
+    def refused(self) -> bool:
+        """Whether the engine does not play what it meets at `fails_at`: that is no limit of it."""
+        return self.failing is not None and self.failing.broken == "refused"
+
+    @property
     def word(self) -> str:
         """The word that a table shows in place of a limit, "" where there is a limit."""
         if self.status != "ok":
             return self.status
         if self.verdict == NEVER_WORKS:
-            return (
-                "refused"
-                if self.failing is not None and self.failing.broken == "refused"
-                else "everywhere"
-            )
+            return "refused" if self.refused else "everywhere"
         return "–" if self.verdict == NEVER_FAILS else ""
 
     @property
