@@ -574,7 +574,7 @@ def new_engine(
 def list_(
     what: Annotated[
         str,
-        typer.Argument(metavar="engines|scenarios|metrics", help="Default: all three."),
+        typer.Argument(metavar="engines|scenarios|metrics|verdicts", help="Default: all."),
     ] = "",
 ) -> None:
     """List engines, scenarios, metrics and verdicts, and say what each is."""

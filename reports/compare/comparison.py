@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -14,8 +13,8 @@ from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
 from reports.compare.table import TableRow, deviation_row, status_row, table_of, verdict_row
-from reports.compare.verdicts import Verdict, fails, in_words, verdicts
-from reports.compare.view import View, beside, not_judged, rounding_of
+from reports.compare.verdicts import verdicts_on
+from reports.compare.view import View, beside, not_judged
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
 
@@ -28,18 +27,6 @@ class Comparison:
     truth: Trajectory | None  # the exact answer up to its horizon
     runs: Sequence[Run]  # also failed and refused ones, in the order of `ENGINES`, coarse dt first
     table: pd.DataFrame  # one number a row
-
-    @cached_property
-    def failed(self) -> Mapping[tuple[str, float], str]:
-        """(`engine:profile`, dt in s) -> the first verdict that the run fails, in words."""
-        rows = fails(self.table)[::-1]  # of several the first stays
-        names = zip(rows.engine + ":" + rows.profile, rows.dt_s.astype(float))
-        return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
-
-    @cached_property
-    def failed_at_middle_dt(self) -> Mapping[str, str]:
-        """`engine:profile` -> the first verdict that it fails at the middle step size."""
-        return {name: words for (name, dt), words in self.failed.items() if dt == self.middle_dt}
 
     @property
     def middle_dt(self) -> float:
@@ -70,17 +57,6 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
             rows += _measure(run, view, versus)
         rows += [verdict_row(run, verdict) for verdict in verdicts_on(run, scenario, truth)]
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
-
-
-def verdicts_on(run: Run, scenario: Scenario, truth: Trajectory | None) -> list[Verdict]:
-    """The verdicts on a run that was played to its end."""
-    assert run.trajectory is not None
-    return verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
-
-
-def first_failed(run: Run, scenario: Scenario, truth: Trajectory | None) -> Verdict | None:
-    """The first verdict that the run fails."""
-    return next((each for each in verdicts_on(run, scenario, truth) if each.failed), None)
 
 
 def _opponents(

@@ -26,9 +26,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from adapters.engine_row import FLOAT64
+from adapters.run import Run
 from reports.compare import laws, scales, violations
 from reports.compare.against import ITSELF
-from reports.compare.view import View
+from reports.compare.view import View, rounding_of
 from scenarios.model import Array, Scenario, Trajectory
 
 MOST_OVERLAP = 0.1  # radii, beyond what disks approach in two steps
@@ -123,6 +124,29 @@ def verdicts(
         return [*judge.contacts(), *judge.energy(), *judge.flight(), *judge.rest()]
 
 
+def verdicts_on(run: Run, scenario: Scenario, truth: Trajectory | None) -> list[Verdict]:
+    """The verdicts on a run that was played to its end."""
+    assert run.trajectory is not None
+    return verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
+
+
+def first_failed(run: Run, scenario: Scenario, truth: Trajectory | None) -> Verdict | None:
+    """The first verdict that the run fails."""
+    return next((each for each in verdicts_on(run, scenario, truth) if each.failed), None)
+
+
+def failures(table: pd.DataFrame) -> dict[tuple[str, float], str]:
+    """(`engine:profile`, dt in s) -> the first verdict that fails in deviations.csv, in words."""
+    rows = fails(table)[::-1]  # of several the first stays
+    names = zip(rows.engine + ":" + rows.profile, rows.dt_s.astype(float))
+    return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
+
+
+def failures_at(table: pd.DataFrame, dt: float) -> dict[str, str]:
+    """The same at one step size, by `engine:profile`."""
+    return {name: words for (name, _), words in failures(table[table.dt_s == dt]).items()}
+
+
 def fails(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of deviations.csv of failed verdicts."""
     return table[
@@ -132,7 +156,8 @@ def fails(table: pd.DataFrame) -> pd.DataFrame:
 
 def in_words(kind: str, value: float) -> str:
     """A failed verdict in a few words: "sinks by 0.3 R"."""
-    return VERDICTS[kind].said.format(f"{value:.2g}", f"{100 * value:.2g} %")
+    number, percent = (f"{x:.0f}" if x > 9.9 else f"{x:.2g}" for x in (value, 100 * value))
+    return VERDICTS[kind].said.format(number, f"{percent} %")
 
 
 class Pair(NamedTuple):

@@ -12,6 +12,7 @@ from adapters.engines import ENGINES
 from adapters.engines import OWN as OWN_PROFILE
 from adapters.friction import REFUSAL
 from reports.compare.comparison import Comparison
+from reports.compare.verdicts import failures_at
 from reports.page import pooled
 from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
 from reports.page.style import number
@@ -19,7 +20,7 @@ from reports.terminal.counts import counted, listed
 from scenarios.catalogue import SCENARIOS
 
 PROJECT = {name for name, row in ENGINES.items() if not row.outside}
-FEW = 2  # scenes that are named of each engine that fails
+FEW = 1  # scenes that are named of each engine that fails
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
@@ -41,7 +42,11 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     off = ranked(position_errors(scores, rough), groups)
     played = [name for name in off.columns if np.isfinite(off[name]).any()]
     said = closest(off[played or list(off.columns)])  # one that refuses friction is not the last
-    return [*sentences, f"Scenes with friction, which are not counted above. {said}"]
+    broken = " ".join(failing(broken_laws(rough, untrusted), len(rough)))
+    return [
+        *sentences,
+        f"Scenes with friction, which are not counted above. {said} {broken}".strip(),
+    ]
 
 
 def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
@@ -83,7 +88,7 @@ def broken_laws(
     project's solvers first, then those that fail most."""
     scenes: dict[str, dict[str, str]] = {}
     for comparison in comparisons:
-        for name, words in comparison.failed_at_middle_dt.items():
+        for name, words in failures_at(comparison.table, comparison.middle_dt).items():
             if name not in untrusted:
                 scenes.setdefault(name, {})[comparison.scenario.name] = words
     order = sorted(scenes, key=lambda name: (name not in PROJECT, -len(scenes[name])))

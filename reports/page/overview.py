@@ -15,7 +15,7 @@ from reports.compare import laws
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
-from reports.compare.verdicts import VERDICTS, fails
+from reports.compare.verdicts import VERDICTS, fails, failures_at
 from reports.compare.view import NOT_JUDGED
 from reports.page import pooled, situations
 from reports.page.style import TRUTH, heat, number
@@ -186,7 +186,7 @@ def summary(
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
     scores = pooled.scores(comparisons)
     scored = set(scores.scenario)
-    broken = [comparison.failed_at_middle_dt for comparison in comparisons]
+    broken = [failures_at(each.table, each.middle_dt) for each in comparisons]
     rows: dict[str, list[OverviewCell]] = {}
     for name in names:
         lost = [
@@ -325,7 +325,7 @@ def heat_map(
     for comparison in comparisons:
         found, failed = values(comparison), outcome_at_middle_dt(comparison)
         played = {run.name for run in comparison.middle_runs}
-        broken = comparison.failed_at_middle_dt
+        broken = failures_at(comparison.table, comparison.middle_dt)
         cells = []
         for name in names:
             if name in failed:

@@ -10,6 +10,7 @@ import pandas as pd
 from adapters.engines import OWN
 from adapters.run import Run
 from reports.compare.comparison import Comparison
+from reports.compare.verdicts import failures
 from reports.compare.view import LEAST_SHARE, NOT_JUDGED
 from reports.page import situations, style
 from reports.page.charts import ChartLine, Drawing, figure_of
@@ -38,8 +39,9 @@ def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
         keys = zip(judged.engine + ":" + judged.profile, judged.dt_s, judged.metric)
         found = dict(zip(keys, judged.value.to_numpy(float)))
         steps = sorted({run.dt for run in comparison.runs}, reverse=True)
+        failed = failures(table)
         for run in comparison.runs:
-            fails = (run.name, run.dt) in comparison.failed
+            fails = (run.name, run.dt) in failed
             if (run.name.endswith(OWN) and run.status == "unsupported") or not (
                 fails or scored(comparison)
             ):

@@ -17,9 +17,9 @@ from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
 from adapters.play import play_once
-from reports.compare.comparison import first_failed
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
+from reports.compare.verdicts import first_failed
 from reports.compare.view import beside
 from reports.page.style import number
 from reports.run.machine import busy_cores

@@ -11,7 +11,7 @@ import numpy as np
 
 from adapters.play import play_once
 from reports.compare import laws
-from reports.compare.comparison import first_failed
+from reports.compare.verdicts import first_failed
 from reports.compare.view import cut
 from reports.run.scenes import open_scene
 from reports.run.stepping import Make, Stepping, overheads

@@ -262,3 +262,4 @@ def test_a_verdict_is_said_in_a_few_words():
     assert in_words("sinks", 0.3) == "sinks by 0.3 R"
     assert in_words("bounce_gained", 0.05) == "gains 5 % a bounce"
     assert in_words("tunnelled", 2.0) == "tunnels"
+    assert in_words("energy_lost", 0.9996) == "loses 100 %"
