@@ -173,7 +173,7 @@ def truths(folder: Path) -> Numbers:
     """Exact answers and horizons of all scenes and of random ones."""
     scenes = {name: build() for name, build in load("SCENARIOS").items()}
     for number in range(RANDOM_SCENES):
-        (path := folder / "scene.toml").write_text(random_scene(number))
+        (path := folder / "scene.toml").write_text(random_scene(number), encoding="utf-8")
         scenes[f"random-{number}"] = load("read_scene_file")(path)
     for name, scene in scenes.items():
         try:
@@ -217,15 +217,15 @@ def probes(_folder: Path) -> Numbers:
 def check(folder: Path) -> Numbers:
     """Verdict and points of each task, of every mutant and every right solver."""
     texts = {mutant.name: mutant.text for mutant in load("MUTANTS")}
-    texts |= {f"right-{path.name}": path.read_text() for path in load("CORRECT")}
+    texts |= {f"right-{path.name}": path.read_text(encoding="utf-8") for path in load("CORRECT")}
     for name, text in texts.items():
         (student := folder / "class" / name.replace(".", "-")).mkdir(parents=True)
         file = "solver.py" if name.endswith(".py") else "Exercise.js"
-        (student / file).write_text(text)
+        (student / file).write_text(text, encoding="utf-8")
         shutil.copy(load("GL_MATRIX"), student)  # some call it
     marks = folder / "marks.json"
     crosscheck("check", folder / "class", "--format", "json", "--out", marks)
-    for solver in json.loads(marks.read_text())["files"]:
+    for solver in json.loads(marks.read_text(encoding="utf-8"))["files"]:
         name = f"check/{solver['id']}"
         yield f"{name}/points", solver["points"]
         yield from ((f"{name}/{task}/verdict", word) for task, word in solver["tasks"].items())
@@ -287,7 +287,7 @@ def exits(folder: Path) -> Numbers:
     """Exit statuses of command lines with good and bad input."""
     os.chdir(folder)
     for name, text in FILES.items():
-        (folder / name).write_text(text)
+        (folder / name).write_text(text, encoding="utf-8")
     shutil.copy(next(path for path in load("CORRECT") if path.suffix == ".js"), "right.js")
     times: Counter[str] = Counter()
     for line in LINES.split("|"):
@@ -310,7 +310,7 @@ def write_group(name: str, out: Path) -> int:
                 raise ValueError(f"{key}: twice")
             lines[key] = value if isinstance(value, str) else float(value).hex()
     text = "".join(f"{key}\t{lines[key]}\n" for key in sorted(lines))
-    (out / f"{name}.tsv").write_text(text, "utf-8")
+    (out / f"{name}.tsv").write_text(text, encoding="utf-8")
     return 0
 
 
@@ -351,7 +351,7 @@ def measure(out: Path, root: Path, groups: list[str]) -> int:
 def read(folder: Path, groups: list[str]) -> dict[str, str]:
     """The ids and values of those groups that were measured."""
     paths = [path for name in groups if (path := folder / f"{name}.tsv").exists()]
-    lines = [line for path in paths for line in path.read_text("utf-8").splitlines()]
+    lines = [line for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
     return dict(line.split("\t") for line in lines)
 
 
@@ -435,14 +435,14 @@ def show(base: Path, new: Path, groups: list[str]) -> int:
     lacking = [path for pair in places.values() for path in pair if not path.exists()]
     whole = [name for name in groups if not {*places[name]} & {*lacking}]
     before, after = read(base, whole), read(new, whole)
-    kept = tomllib.loads((KEPT / "base.toml").read_text())["numbers"]
+    kept = tomllib.loads((KEPT / "base.toml").read_text(encoding="utf-8"))["numbers"]
     for kind, now in hashes(before).items():
         if now != kept.get(kind):
             print(f"note: {kind}: the base has other bits here than those kept in base.toml")
-    changes = (KEPT / "changed.toml").read_text()
+    changes = (KEPT / "changed.toml").read_text(encoding="utf-8")
     faults = [f"missing\t{path}" for path in lacking]
     faults += compare(before, after, changes, len(whole) == len(GROUPS))
-    (new / "faults.tsv").write_text("".join(f"{fault}\n" for fault in faults), "utf-8")
+    (new / "faults.tsv").write_text("".join(f"{fault}\n" for fault in faults), encoding="utf-8")
     print("".join(f"{fault}\n" for fault in faults[:PRINTED]), end="")
     for what, count in Counter(fault.partition("/")[0] for fault in faults).items():
         print(f"{count} {what}")
@@ -453,7 +453,7 @@ def show(base: Path, new: Path, groups: list[str]) -> int:
 
 def make_base(groups: list[str]) -> Path:
     """The numbers of the base, kept for this commit and this script; measured where missing."""
-    commit = tomllib.loads((KEPT / "base.toml").read_text())["commit"]
+    commit = tomllib.loads((KEPT / "base.toml").read_text(encoding="utf-8"))["commit"]
     code = CACHE / commit / "code"
     numbers = CACHE / commit / hashlib.sha256(HERE.read_bytes()).hexdigest()[:12]
     if lacking := [name for name in groups if not (numbers / f"{name}.tsv").exists()]:
@@ -476,7 +476,7 @@ def keep(base: Path, commit: str) -> int:
     lines = [f'{kind} = "{text}"\n' for kind, text in hashes(read(base, [*GROUPS])).items()]
     head = "# The base: its commit, and of each kind of number how many there are and their hash.\n"
     text = f'{head}commit = "{commit}"\n\n[numbers]\n{"".join(lines)}'
-    (KEPT / "base.toml").write_text(text)
+    (KEPT / "base.toml").write_text(text, encoding="utf-8")
     return 0
 
 
