@@ -307,12 +307,15 @@ def pool(
     if not totals:
         return OverviewCell(number(np.nan), remark)
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
-    worst = totals[worst_in]
-    shown = "fails" if np.isinf(worst) else number(worst) if worst else ""
-    scenes = len(totals)
+    worst = in_text(totals[worst_in]) if totals[worst_in] else ""
     return OverviewCell(
-        number(value), remark, value=value, worst=shown, worst_in=worst_in, scenes=scenes
+        in_text(value), remark, value=value, worst=worst, worst_in=worst_in, scenes=len(totals)
     )
+
+
+def in_text(value: float) -> str:
+    """A number of a table of errors; an infinite one is that of a run that failed."""
+    return "fails" if np.isinf(value) else number(value)
 
 
 def heat_map(
