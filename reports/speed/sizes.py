@@ -21,6 +21,7 @@ WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3
 # steps after which a gas starts again: where collisions lose energy, disks fall asleep and cost
 # nothing
 RESTART_AFTER = 400
+REPLAYS = 3  # of the same steps; what is dear in one alone is due to the machine
 FIT_FROM = 100  # disks; with fewer the fixed cost of a step hides the growth
 STOPPED = "stopped: a step would take longer than {:g} s"
 
@@ -50,14 +51,14 @@ def costs(
     budget: float,
     patience: float,
     seed: int,
-) -> tuple[list[Sample], dict[tuple[str, int], str]]:
-    """Samples in s a step, by (name, n), from few disks to many; and which engines were not
-    measured at which sizes, and why.
+) -> tuple[list[Sample], list[Sample], dict[tuple[str, int], str]]:
+    """Samples in s a step, by (name, n), from few disks to many; one sample of the worst step of
+    each; and which engines were not measured at which sizes, and why.
 
     An engine stops before a size at which a step would take longer than `patience` s,
     extrapolated from its last two sizes.
     """
-    samples: list[Sample] = []
+    samples, worst = list[Sample](), list[Sample]()
     left_out: dict[tuple[str, int], str] = {}
     course: dict[str, list[tuple[int, float]]] = {name: [] for name in engines}
     for n in sizes:
@@ -73,10 +74,12 @@ def costs(
         what = [Timed((name, n), going, going.steps) for name, going in awake.items()]
         here = interleaved(what, rounds, budget, seed)
         for name, going in awake.items():
-            course[name].append((n, min(sample.cost for sample in here if sample.key == (name, n))))
+            least = min(sample.cost for sample in here if sample.key == (name, n))
+            course[name].append((n, least))
+            worst.append(Sample((name, n), 0, 0, going.worst_step(least, budget), 0.0, 1))
             going.engine.close()
         samples += here
-    return samples, left_out
+    return samples, worst, left_out
 
 
 class RunningGas:
@@ -106,6 +109,19 @@ class RunningGas:
         seconds = perf_counter() - started
         self.taken += self.steps
         return Spent(seconds)
+
+    def worst_step(self, mean: float, budget: float) -> float:
+        """s, of the dearest of up to `RESTART_AFTER` steps: each is taken in `REPLAYS` runs from
+        the same start, and the least of its times counts."""
+        count = int(np.clip(budget / mean, WARM_STEPS, RESTART_AFTER))
+        times = np.empty((REPLAYS, count))
+        for row in times:
+            self.begin()
+            for k in range(count):
+                started = perf_counter()
+                self.engine.step(1)
+                row[k] = perf_counter() - started
+        return float(times.min(axis=0).max())
 
 
 def extrapolated_cost(course: Sequence[tuple[int, float]], n: int) -> float:

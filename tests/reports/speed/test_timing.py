@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from time import sleep
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ from reports.speed import ladder, sizes
 from reports.speed.effort import QUICK
 from reports.speed.estimate import READY, all_rounds
 from reports.speed.scored_part import scored
-from reports.speed.tables import summed_up
+from reports.speed.tables import end_of_all_pairs, summed_up
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
@@ -154,13 +155,50 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
     assert max(ages) <= sizes.RESTART_AFTER + sizes.WARM_STEPS
 
 
+def test_the_worst_step_is_that_of_the_engine_and_not_of_the_machine():
+    """The fourth step of a gas takes 5 ms; a pause that comes in one replay alone is no step."""
+    pauses = iter([*[0.0] * 7, 0.05, *[0.0] * 99])  # in the first replay, at the seventh step
+
+    class Slow(Sleeper):
+        def load(self, scene: Scene, dt: float) -> None:
+            super().load(scene, dt)
+            self.taken = 0
+
+        def step(self, count: int = 1) -> None:
+            self.taken += count
+            sleep(next(pauses) + (5e-3 if self.taken == 4 else 0.0))
+
+    gas = sizes.RunningGas.__new__(sizes.RunningGas)
+    gas.engine, gas.scene = Slow(0.0), sizes.gas(3, 0)
+
+    # a sleep may take longer, the 50 ms would stand out
+    assert 5e-3 <= gas.worst_step(1e-3, 8e-3) < 0.04
+
+
+@pytest.mark.parametrize(
+    ("costs", "sentence"),
+    [
+        ({10: 2.0, 100: 8.0}, "Testing all pairs costs more than fast:own from 32 disks on."),
+        ({10: 0.5, 100: 1.0}, ""),  # dearer everywhere
+        ({10: 99.0, 100: 999.0}, ""),  # nowhere
+    ],
+)
+def test_where_all_pairs_stop_paying_is_said_in_a_sentence(costs: dict[int, float], sentence: str):
+    """All pairs cost 1 and 16: equal to an engine of 2 and 8 at the square root of 10 times 100."""
+    rows = [("reference", "exercise", n, cost) for n, cost in ((10, 1.0), (100, 16.0))]
+    rows += [("fast", "own", n, cost) for n, cost in costs.items()]
+    table = pd.DataFrame(rows, columns=["engine", "profile", "n", "cost"])
+
+    assert end_of_all_pairs(table) == sentence
+
+
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
     """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below
     that."""
     engines = {"sleeper:own": partial(Sleeper, 2e-3)}
-    samples, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
+    samples, worst, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
 
-    assert {sample.key[1] for sample in samples} == {3, 4}
+    assert {sample.key[1] for sample in samples} == {3, 4} == {sample.key[1] for sample in worst}
     assert list(stopped) == [("sleeper:own", 5)]
     assert "longer than 0.001 s" in stopped["sleeper:own", 5]
 
