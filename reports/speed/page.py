@@ -221,7 +221,8 @@ def sizes_section(results: Results) -> SpeedSection | None:
     drawing = Drawing(
         "Cost of a step against the number of disks",
         "A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. Bars are quartiles; hover for the"
-        f" worst step. {tables.end_of_all_pairs(results.sizes)} {BUILDS}",
+        f" worst step. {tables.end_of_all_pairs(results.sizes)}"
+        f" {tables.cost_of_sleep(results.measured)} {BUILDS}",
         charts.sizes(results.sizes, results.growth),
     )
     return section("sizes", "How the cost grows", "", {"sizes": drawing})

@@ -21,6 +21,7 @@ WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3
 # steps after which a gas starts again: where collisions lose energy, disks fall asleep and cost
 # nothing
 RESTART_AFTER = 400
+PILE, SETTLED = 100, 480  # disks; steps after which they lie still, and sleep if they may
 REPLAYS = 3  # of the same steps; what is dear in one alone is due to the machine
 FIT_FROM = 100  # disks; with fewer the fixed cost of a step hides the growth
 STOPPED = "stopped: a step would take longer than {:g} s"
@@ -42,6 +43,33 @@ def gas(n: int, seed: int) -> Scene:
         walls=box([0.0, 0.0], [side, side]),
         restitution=1.0,
     )
+
+
+def pile(n: int) -> Scene:
+    """`n` equal disks that rest on each other in columns, in a box as wide as they are; e = 0."""
+    across = int(np.ceil(np.sqrt(n)))
+    side = 2 * RADIUS * across
+    return lay_out(
+        position=(np.stack(np.divmod(np.arange(n), across), axis=-1) + 0.5) * 2 * RADIUS,
+        velocity=np.zeros((n, 2)),
+        radius=np.full(n, RADIUS),
+        mass=np.ones(n),
+        gravity=[0.0, -10.0],
+        walls=box([0.0, 0.0], [side, 2 * side]),
+        restitution=0.0,
+    )
+
+
+def pile_costs(
+    engines: Mapping[tuple[str, str], Make], rounds: int, budget: float, seed: int
+) -> list[Sample]:
+    """Samples in s a step of a pile of `PILE` disks that has settled, by the key of the engine."""
+    piles = {key: RunningGas(make(), pile(PILE), SETTLED) for key, make in engines.items()}
+    what = [Timed(key, going, going.steps) for key, going in piles.items()]
+    samples = interleaved(what, rounds, budget, seed)
+    for going in piles.values():
+        going.engine.close()
+    return samples
 
 
 def costs(
@@ -83,11 +111,12 @@ def costs(
 
 
 class RunningGas:
-    """A gas in motion: every sample continues where the last one ended, or starts again."""
+    """A gas in motion: every sample continues where the last one ended, or starts again, `first`
+    steps after the beginning."""
 
-    def __init__(self, engine: Engine, scene: Scene) -> None:
+    def __init__(self, engine: Engine, scene: Scene, first: int = 1) -> None:
         """Load the gas, and determine how many steps fill a sample."""
-        self.engine, self.scene = engine, scene
+        self.engine, self.scene, self.first = engine, scene, first
         engine.listening = False
         self.begin()
         self.steps = 1
@@ -95,9 +124,9 @@ class RunningGas:
         self.steps = int(np.clip(SAMPLE / each, 1, MOST_STEPS))
 
     def begin(self) -> None:
-        """Load, which may compile, and take a first step; not timed."""
+        """Load, which may compile, and take the first steps; not timed."""
         self.engine.load(self.scene, DT)
-        self.engine.step(1)
+        self.engine.step(self.first)
         self.taken = 1
 
     def __call__(self) -> Spent:

@@ -24,9 +24,10 @@ from reports.compare.pareto import (
     yardstick_of,
 )
 from reports.compare.pooling import POOLED, WHO, pooled
+from reports.page import style
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
 from reports.run.timing import WARM_UP
-from reports.speed.measure import SIZE, WORST_STEP, Measured
+from reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.sizes import exponent
 from reports.terminal.counts import listed
@@ -340,6 +341,23 @@ def end_of_all_pairs(costs: pd.DataFrame) -> str:
             n = np.interp(0.0, ratio[k - 1 : k + 1], np.log(both.index[k - 1 : k + 1]))
             ends.append(f"{name} from {np.exp(n):.2g} disks on")
     return f"Testing all pairs costs more than {listed(ends)}." if ends else ""
+
+
+def cost_of_sleep(measured: Measured) -> str:
+    """A sentence: what a step of a settled pile costs, and with sleeping allowed; "" if none was
+    timed."""
+    samples = measured.samples[measured.samples.kind == IN_PILE]
+    costs = in_us(summed_up(samples, [*WHO, "change", "n"]))
+    named = costs.assign(name=costs.engine + ":" + costs.profile)
+    table = named.pivot(index="name", columns="change", values="cost")
+    both = [
+        f"{name} {style.number(row[PLAIN], 2)}, with sleeping {style.number(row[SLEEPING], 2)}"
+        for name, row in table.iterrows()
+        if len(row.dropna()) > 1
+    ]
+    if not both:
+        return ""
+    return f"A step of a settled pile of {costs.n.max()} disks costs, in µs: {'; '.join(both)}."
 
 
 def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from time import sleep
@@ -10,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from adapters.engines import ENGINES
 from reports.run.stepping import Spent
 from reports.run.timing import (
     FEWEST_ROUNDS,
@@ -21,8 +23,9 @@ from reports.run.timing import (
 from reports.speed import ladder, sizes
 from reports.speed.effort import QUICK
 from reports.speed.estimate import READY, all_rounds
+from reports.speed.measure import IN_PILE, Measured, samples_table
 from reports.speed.scored_part import scored
-from reports.speed.tables import end_of_all_pairs, summed_up
+from reports.speed.tables import cost_of_sleep, end_of_all_pairs, summed_up
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
@@ -169,7 +172,7 @@ def test_the_worst_step_is_that_of_the_engine_and_not_of_the_machine():
             sleep(next(pauses) + (5e-3 if self.taken == 4 else 0.0))
 
     gas = sizes.RunningGas.__new__(sizes.RunningGas)
-    gas.engine, gas.scene = Slow(0.0), sizes.gas(3, 0)
+    gas.engine, gas.scene, gas.first = Slow(0.0), sizes.gas(3, 0), 1
 
     # a sleep may take longer, the 50 ms would stand out
     assert 5e-3 <= gas.worst_step(1e-3, 8e-3) < 0.04
@@ -190,6 +193,51 @@ def test_where_all_pairs_stop_paying_is_said_in_a_sentence(costs: dict[int, floa
     table = pd.DataFrame(rows, columns=["engine", "profile", "n", "cost"])
 
     assert end_of_all_pairs(table) == sentence
+
+
+def test_a_settled_pile_costs_less_asleep_and_nothing_in_it_moves():
+    """Columns of disks at rest: awake each step solves its contacts."""
+    engines = {
+        ("pymunk:matched", change): partial(ENGINES["pymunk:matched"].make, **settings)
+        for change, settings in (("", {}), ("sleeping", {"sleep_time_threshold": 0.5}))
+    }
+    samples = sizes.pile_costs(engines, 5, 0.1, seed=0)
+    least = {key: min(s.cost for s in samples if s.key == key) for key in engines}
+    with closing(ENGINES["pymunk:matched"].make()) as engine:
+        start = sizes.pile(sizes.PILE)
+        engine.load(start, sizes.DT)
+        engine.step(sizes.SETTLED)
+        moved = np.abs(engine.read().position - start.position).max()
+
+    assert 3 * least["pymunk:matched", "sleeping"] < least["pymunk:matched", ""]
+    assert moved < sizes.RADIUS / 5
+
+
+def test_the_cost_of_sleep_is_a_sentence():
+    """Of the engines that were timed both ways."""
+    rows = [
+        {"kind": IN_PILE, "engine": "a", "profile": "b", "change": change, "n": 100, "cost": cost}
+        for change, cost in (("", 2e-5), ("sleeping", 1e-6))
+    ]
+    samples = samples_table(
+        [
+            {
+                "round": 0,
+                "wrapping": 0.0,
+                "runs": 1,
+                "dt_s": 0.0,
+                "copy_of": 0,
+                "place": 0,
+                "scenario": "",
+                **row,
+            }
+            for row in rows
+        ]
+    )
+
+    said = cost_of_sleep(Measured(samples=samples))
+    assert said == "A step of a settled pile of 100 disks costs, in µs: a:b 20, with sleeping 1."
+    assert cost_of_sleep(Measured()) == ""
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
