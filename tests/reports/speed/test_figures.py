@@ -244,7 +244,7 @@ def test_the_readme_says_how_much_each_form_measures():
     root = Path(__file__).parents[3]
     text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
 
-    assert f"the cost of up to {QUICK.sizes[-1]} disks" in text
+    assert f"the cost of up to {QUICK.sizes[-1]:,} disks".replace(",", " ") in text
     assert f"`--full` takes all scenes and up to {FULL.sizes[-1]:,} disks".replace(",", " ") in text
     assert set(FULL.scenes) == set(SCENARIOS)
     assert {len(scenario(name).substeps) for name in SCENARIOS} == {4}
