@@ -199,28 +199,6 @@ def report(
 
 
 @app.command()
-def replay(
-    cell: Annotated[
-        str,
-        typer.Argument(
-            metavar="CELL",
-            help="From the column cell of runs.csv; its first characters are enough.",
-        ),
-    ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder of the run.")] = DEFAULT_OUT,
-    timeout: Timeout = 60.0,
-) -> None:
-    """Play one cell of a run again, step by step.
-
-    A cell that failed begins at its last good state, any other cell at the start. The output of
-    the engine is shown.
-    """
-    from reports.commands import replay as replay_command
-
-    replay_command.replay(cell, out, timeout)
-
-
-@app.command()
 def bits(
     out: Annotated[
         Path | None,

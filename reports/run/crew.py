@@ -14,11 +14,11 @@ from reports.run.worker_process import Failure
 ATTEMPTS = 3  # of a task whose worker is killed from outside
 
 
-def new_worker(memory: int, show: bool = False) -> Worker:
+def new_worker(memory: int) -> Worker:
     """A worker of the kind that this operating system supports; see `Worker`."""
     if system.KERNEL:
-        return Worker(memory, show)
-    return PortableWorker(memory, show)
+        return Worker(memory)
+    return PortableWorker(memory)
 
 
 class Crew:
