@@ -287,8 +287,8 @@ def check(
             "--format",
             metavar="NAME",
             help=(
-                "Write the marks as table, json, junit, gradescope, prairielearn, classroom or csv."
-                " Repeatable, each with its --out."
+                "Write the marks as table, json, junit, gradescope or csv. Repeatable, each with"
+                " its --out."
             ),
         ),
     ] = None,
@@ -329,7 +329,7 @@ def check(
     scaffold: Annotated[
         str,
         typer.Option(
-            metavar="gradescope|classroom|prairielearn",
+            metavar="gradescope",
             help="Write an autograder to DIR, and check nothing.",
         ),
     ] = "",

@@ -96,8 +96,7 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     beside = {file: passed_over(file, home) for file, home in homes.items()}
     places = [f"{homes[file].name}/{one}" for file, others in beside.items() for one in others]
     not_read = [*others_in(path, files), *places] if several else []
-    wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
-    scenes = scenes_of(checks[0]) if any(wanted) else []
+    scenes = scenes_of(checks[0]) if page is not None and not several else []
     marked = marks_of(path, checks, grading, not_read, beside, scenes)
     printed = next((one.format for one in outputs if one.path is None), "")
     if printed:

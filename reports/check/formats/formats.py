@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from reports.check.formats.classroom import classroom_text
 from reports.check.formats.gradescope import gradescope_text
 from reports.check.formats.junit import JUNIT, as_junit
 from reports.check.formats.marks_csv import csv_text
-from reports.check.formats.prairielearn import prairielearn_text
 from reports.check.formats.questions_json import json_text
 from reports.check.formats.table import TITLE, table_text
 from reports.check.marks import Marked
@@ -24,14 +22,12 @@ class Format(NamedTuple):
             written over.
         single: whether it holds the marks of one student.
         sealed: whether a file that was changed since is known by its end, and kept.
-        scenes: whether it shows the smallest scene of each fault, which takes seconds to find.
     """
 
     text: Callable[[Sequence[Marked]], str]
     mark: bytes
     single: bool = False
     sealed: bool = False
-    scenes: bool = False
 
 
 FORMATS = {
@@ -39,7 +35,5 @@ FORMATS = {
     "json": Format(json_text, b'{\n  "crosscheck": '),
     "junit": Format(as_junit, JUNIT, sealed=True),
     "gradescope": Format(gradescope_text, b'{\n  "extra_data": {\n    "crosscheck"', single=True),
-    "prairielearn": Format(prairielearn_text, b'",\n  "gradable": ', single=True, scenes=True),
-    "classroom": Format(classroom_text, b'",\n  "status": "', single=True),
     "csv": Format(csv_text, b"id,task "),
 }
