@@ -98,7 +98,7 @@ def test_the_terminal_tells_faults_from_free_choices_by_a_word_and_shows_the_lin
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("columns", [pytest.param(80, marks=pytest.mark.long), 40])
+@pytest.mark.parametrize("columns", [pytest.param(80, marks=pytest.mark.long), 60])
 def test_a_check_of_one_file_says_what_it_does_meanwhile(folder: Path, columns: int):
     """It takes seconds: the file, then the search for a scene; gone at the end, and in a pipe."""
     words = ("check", "ben/Exercise.js", "--page", "p.html")
