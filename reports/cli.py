@@ -162,6 +162,14 @@ def run(
     memory: Memory = 0,
     scheduler: Scheduler = "",
     resume: Resume = None,
+    bits: Annotated[
+        bool,
+        typer.Option(
+            "--bits",
+            help="Write hashes of all results at the middle step size to bits.csv, and compare them"
+            " with those kept in reports/bits.csv. Exit status 1: an engine has other bits.",
+        ),
+    ] = False,
 ) -> None:
     """Play scenes through engines, and write the report."""
     from reports.commands import run as run_command
@@ -170,9 +178,12 @@ def run(
     what = scenes or [], engine or [], dt or [], full, seed
     if resume is not None:
         run_command.resume(
-            resume, means, alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT)
+            resume,
+            means,
+            bits,
+            alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT),
         )
-    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, as_typed())
+    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, as_typed(), bits)
 
 
 @app.command()
@@ -196,23 +207,6 @@ def report(
     from reports.commands.report import report_again
 
     report_again(out, scenes or [], printed)
-
-
-@app.command()
-def bits(
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Where to write the table of this machine, a CSV."),
-    ] = None,
-) -> None:
-    """Compare the bits of all engines here with those kept in reports/bits.csv.
-
-    Every scene is played through every engine at its middle step size. The exit status is 1 if an
-    engine has other bits.
-    """
-    from reports.commands.bits import compare_bits
-
-    compare_bits(out)
 
 
 @app.command()

@@ -1,108 +1,59 @@
-"""`crosscheck bits`: which engines give the same bits on this machine as those kept in the
+"""`crosscheck run --bits`: which engines give the same bits on this machine as those kept in the
 repository."""
 
 from __future__ import annotations
 
-import os
 import platform
-import sys
 from collections import Counter
-from collections.abc import Callable, Hashable
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any, NoReturn
 
-from adapters.engines import ENGINES, UNASKED, told_apart
-from reports.run.bits import (
-    COLUMNS,
-    KEPT,
-    ChangedBits,
-    about_of,
-    bits_here,
-    differences,
-    read,
-    written,
-)
-from reports.run.cells import Cell, versions
-from reports.run.runner import run_all
-from reports.run.scenes import open_scene
-from reports.run.worker_process import Failure
+from reports.run.archive import Archive
+from reports.run.bits import KEPT, ChangedBits, about_of, differences, read, rows_of, written
+from reports.run.cells import versions
+from reports.run.made import writing
 from reports.terminal.console import Console
 from reports.terminal.counts import counted, listed
-from reports.terminal.exits import DONE, FAILED, refuse, stoppable
 from reports.terminal.foreign_text import put_text
-from reports.terminal.progress import Progress
 from reports.terminal.tables import print_list, print_table
-from scenarios.catalogue import SCENARIOS
 
+BITS = "bits.csv"  # in the folder of a run
 SHOWN = 12  # differences
 
 
-def compare_bits(out: Path | None) -> NoReturn:
-    """Play every scene through every engine at its middle step size, and print in how many the bits
-    equal the kept ones; write the table to `out`, if given.
-
-    Exits 0, 1 (other bits, or no row to compare) or 2 (`out` cannot be written).
-    """
-    made_by = made_here()
-    with stoppable():
-        rows = play_all()
-    if out is not None:
-        try:
-            put_text(out, written(rows, made_by))
-        except OSError as fault:
-            refuse([f"{out}: {fault.strerror or fault}"])
-    kept = KEPT.read_text(encoding="utf-8")
-    found, both = differences(read(kept), read(written(rows, made_by)))
-    console = Console()
-    counts = Counter((both.engine + ":" + both.profile).tolist())
-    show(console, found, counts)
-    if new := {f"{row['engine']}:{row['profile']}" for row in rows} - {*counts}:
-        console.print(f"No bits are kept of {listed(sorted(new))}.", highlight=False)
-    others = [
-        f"{key} {value} (here {made_by.get(key)})"
-        for key, value in about_of(kept).items()
-        if str(made_by.get(key)) != value
-    ]
-    if others:
-        console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
-    sys.exit(FAILED if found or both.empty else DONE)
-
-
-def made_here() -> dict[str, str]:
-    """System, architecture and versions, which may affect the bits."""
-    return {
+def write_bits(folder: Path) -> None:
+    """Write the table of a run to its folder, below the system, architecture and versions, which
+    may affect the bits."""
+    made_by = {
         "system": platform.system(),
         "architecture": platform.machine(),
         "Python": platform.python_version(),
         **versions(),
     }
+    with writing(folder, [BITS]):
+        put_text(folder / BITS, written(rows_of(Archive.read(folder)), made_by))
 
 
-def play_all() -> list[dict[str, Any]]:
-    """A row of the table for each scene of the catalogue and each engine, in order."""
-    tasks: dict[Hashable, Callable[[], Any]] = {}
-    for scene in SCENARIOS:
-        scenario = open_scene(scene, 0)
-        middle = scenario.substeps[len(scenario.substeps) // 2]
-        for name in told_apart(UNASKED, scenario.scene):
-            cell = Cell(scene, 0, name, middle)
-            bare = replace(scenario, truth=None)  # workers do not need it
-            tasks[scene, name] = partial(bits_here, cell, ENGINES[name], bare)
-    rows: dict[Any, dict[str, Any]] = {}
-    with Progress() as progress:
-        progress.start(len(tasks), len(tasks), "playing")
-        for key, result in run_all(tasks, os.cpu_count() or 1):
-            if isinstance(result, Failure):
-                engine, profile = key[1].split(":")
-                lost = (key[0], engine, profile, "", result.status, "", "")
-                progress.done(" ".join(key), result.status, result.reason)
-                result = dict(zip(COLUMNS, lost))
-            else:
-                progress.done(" ".join(key), result["status"])
-            rows[key] = result
-    return [rows[key] for key in tasks]
+def kept_bits(folder: Path) -> bool:
+    """Print in how many scenes the bits of a run equal the kept ones; whether all that can be
+    compared do, and there is something to compare."""
+    kept, here = KEPT.read_text("utf-8"), (folder / BITS).read_text("utf-8")
+    table, made_by = read(here), about_of(here)
+    changed, both = differences(read(kept), table)
+    console = Console()
+    counts = Counter((both.engine + ":" + both.profile).tolist())
+    show(console, changed, counts)
+    if new := {*(table.engine + ":" + table.profile)} - {*counts}:
+        names = listed(sorted(new))
+        console.print(f"No bits are kept of {names} in these scenes and steps.", highlight=False)
+    others = [
+        f"{key} {value} (here {made_by.get(key)})"
+        for key, value in about_of(kept).items()
+        if made_by.get(key) != value
+    ]
+    if others:
+        console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
+    console.print()
+    return not changed and not both.empty
 
 
 def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> None:

@@ -30,8 +30,9 @@ from reports.terminal.progress import Progress
 from reports.terminal.tables import print_list, print_table
 
 
-def finish(report: Report, out: Path) -> NoReturn:
-    """Print the summary; exit 1 if an engine or a scene is not compared completely."""
+def finish(report: Report, out: Path, status: int = DONE) -> NoReturn:
+    """Print the summary; exit 1 if an engine or a scene is not compared completely, else
+    `status`."""
     print_summary(report, str((out / "report.html").resolve()))
     by_name = report.archive.header["engines"] != of_main_job()
     if lost := never_played(report.comparisons, by_name):
@@ -41,7 +42,7 @@ def finish(report: Report, out: Path) -> NoReturn:
         )
     for name, why in report.unjudged.items():
         say(f"{name} is not judged: {why}")
-    sys.exit(FAILED if lost or report.unjudged else DONE)
+    sys.exit(FAILED if lost or report.unjudged else status)
 
 
 def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:

@@ -11,11 +11,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from reports.run.cells import Cell
-from reports.run.playing import LOADING, ClockStart, play_cell
-from reports.run.worker_process import allow
-from scenarios.model import Scenario, Trajectory
+from reports.run.archive import Archive, stored_trajectory
+from scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"
 COLUMNS = ["scenario", "engine", "profile", "dt_s", "status", "bits", "until"]
@@ -32,13 +29,24 @@ class ChangedBits(NamedTuple):
     other: int
 
 
-def bits_here(cell: Cell, row: EngineRow, scenario: Scenario) -> dict[str, Any]:
-    """The row of the table for a cell, which is played here; called in a worker."""
-    allow(LOADING)
-    run = play_cell(cell, row, scenario, ClockStart())
-    bits, until = ("", "") if run.trajectory is None else bits_of(run.trajectory)
-    what = (scenario.name, *cell.names, f"{scenario.dt(cell.substeps):.9g}", run.status)
-    return dict(zip(COLUMNS, (*what, bits, until)))
+def rows_of(archive: Archive) -> list[dict[str, Any]]:
+    """A row of the table for each scene and engine of a run, at the middle of the step sizes; none
+    for another seed than that of the kept bits, 0, which gives random scenes other starts."""
+    steps: dict[str, set[int]] = {}
+    for record in archive.records:
+        steps.setdefault(record["scene"], set()).add(record["substeps"])
+    middle = {scene: sorted(sizes)[len(sizes) // 2] for scene, sizes in steps.items()}
+    order = [list(archive.header[name]) for name in ("scenes", "engines")]
+    rows = {}
+    for record in archive.records:
+        if record["seed"] == 0 and record["substeps"] == middle[record["scene"]]:
+            name = f"{record['engine']}:{record['profile']}"
+            trajectory = stored_trajectory(archive.folder, record)
+            bits = ("", "") if trajectory is None else bits_of(trajectory)
+            what = [record[key] for key in ("scenario", "engine", "profile")]
+            row = (*what, f"{record['dt_s']:.9g}", record["status"], *bits)
+            rows[order[0].index(record["scene"]), order[1].index(name)] = dict(zip(COLUMNS, row))
+    return [rows[place] for place in sorted(rows)]
 
 
 def bits_of(played: Trajectory) -> tuple[str, str]:
