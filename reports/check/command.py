@@ -1,5 +1,5 @@
-"""`crosscheck check`: checks a file or a folder of them, and writes a table, a page, or a format of
-formats/."""
+"""`crosscheck check`: checks a file or a folder of them, and writes a table, a page, or one of the
+formats."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from adapters.own_solver.file import (
 )
 from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess, keep_processes
-from reports.check.formats.formats import FORMATS
-from reports.check.formats.table import show
+from reports.check.formats import FORMATS, show
 from reports.check.functions import keeps_state
 from reports.check.marks import Marked, id_of, matched, place_of
 from reports.check.points import DEFAULT, BadPoints, Points, read_points

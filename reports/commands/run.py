@@ -13,7 +13,6 @@ from typing import Any, NoReturn
 import psutil
 
 from adapters.engines import row_of
-from reports.commands.bits import BITS, kept_bits, write_bits
 from reports.commands.own_solvers import checks_of
 from reports.commands.report import finish
 from reports.lessons.catalogue import LESSONS
@@ -27,6 +26,7 @@ from reports.run.arguments import (
     opening,
     refusing,
 )
+from reports.run.bits import BITS, kept_bits, write_bits
 from reports.run.folders import (
     RUN,
     given_back,

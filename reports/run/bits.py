@@ -1,10 +1,12 @@
-"""A hash of the bits of every engine in every scene. The repository keeps them, so that another
-machine can find where its bits differ."""
+"""`crosscheck run --bits`: a hash of the bits of every engine in every scene. The repository keeps
+them, so that another machine can find where its bits differ."""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import platform
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +14,12 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from reports.run.archive import Archive, stored_trajectory
+from reports.run.cells import versions
+from reports.run.made import writing
+from reports.terminal.console import Console
+from reports.terminal.counts import counted, listed
+from reports.terminal.foreign_text import put_text
+from reports.terminal.tables import print_list, print_table
 from scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"
@@ -107,3 +115,67 @@ def first_other(one: str, other: str) -> tuple[int, int]:
     # the hashes are those of samples 0, 1, 2, 4 ... and the last
     samples = [0, *(2**p for p in range(len(mine)))]
     return (samples[at - 1] if at else -1), samples[at]
+
+
+BITS = "bits.csv"  # in the folder of a run
+SHOWN = 12  # differences
+
+
+def write_bits(folder: Path) -> None:
+    """Write the table of a run to its folder, below the system, architecture and versions, which
+    may affect the bits."""
+    made_by = {
+        "system": platform.system(),
+        "architecture": platform.machine(),
+        "Python": platform.python_version(),
+        **versions(),
+    }
+    with writing(folder, [BITS]):
+        put_text(folder / BITS, written(rows_of(Archive.read(folder)), made_by))
+
+
+def kept_bits(folder: Path) -> bool:
+    """Print in how many scenes the bits of a run equal the kept ones; whether all that can be
+    compared do, and there is something to compare."""
+    kept, here = KEPT.read_text("utf-8"), (folder / BITS).read_text("utf-8")
+    table, made_by = read(here), about_of(here)
+    changed, both = differences(read(kept), table)
+    console = Console()
+    counts = Counter((both.engine + ":" + both.profile).tolist())
+    show(console, changed, counts)
+    if new := {*(table.engine + ":" + table.profile)} - {*counts}:
+        names = listed(sorted(new))
+        console.print(f"No bits are kept of {names} in these scenes and steps.", highlight=False)
+    others = [
+        f"{key} {value} (here {made_by.get(key)})"
+        for key, value in about_of(kept).items()
+        if made_by.get(key) != value
+    ]
+    if others:
+        console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
+    console.print()
+    return not changed and not both.empty
+
+
+def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> None:
+    """Print a row for each engine, and the first differences."""
+    other = Counter(each.name for each in found)
+    rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
+    title = "In how many scenes the bits are those kept in reports/bits.csv"
+    print_table(console, ["engine", "the same", "of"], rows, title)
+    console.print()
+    print_list(console, [in_words(each) for each in found[:SHOWN]])
+    if len(found) > SHOWN:
+        console.print(f"and {counted(len(found) - SHOWN, 'more difference')}")
+
+
+def in_words(one: ChangedBits) -> str:
+    """A sentence on where the bits differ."""
+    if one.other < 0:
+        return f"{one.name} in {one.scenario}: it did not play to the same sample"
+    if one.same < 0:
+        return f"{one.name} in {one.scenario}: other bits from the start on"
+    return (
+        f"{one.name} in {one.scenario}: the same bits up to sample {one.same}, others by sample"
+        f" {one.other}"
+    )

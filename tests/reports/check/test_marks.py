@@ -17,8 +17,7 @@ import pytest
 
 from reports.check.class_page import write_class_page
 from reports.check.command import alphabetical, grading_of
-from reports.check.formats.formats import FORMATS
-from reports.check.formats.questions_json import SCHEMA
+from reports.check.formats import FORMATS, SCHEMA
 from reports.check.marks import Marked, id_of
 from reports.check.outcomes import OUTCOMES
 from reports.check.points import AS_A_WHOLE, DEFAULT, QUESTIONS, BadPoints, Points, read_points

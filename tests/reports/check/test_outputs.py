@@ -22,8 +22,7 @@ from playwright.sync_api import Browser
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check import command
-from reports.check.formats.formats import FORMATS
-from reports.check.formats.questions_json import SCHEMA
+from reports.check.formats import FORMATS, SCHEMA
 from reports.check.rows import CheckRow
 from reports.check.smallest import smallest_scene, smallest_scenes
 from reports.check.smallest_scene import Smallest

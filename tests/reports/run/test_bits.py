@@ -11,7 +11,6 @@ import pytest
 
 from adapters.engines import ENGINES, UNASKED, told_apart
 from adapters.play import play_once
-from reports.commands import bits as command
 from reports.run import bits
 from reports.run.archive import Archive
 from reports.run.journal import Journal
@@ -98,7 +97,7 @@ def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     """One hash of the kept table is changed: exit status 1, and the engine is named; else 0. An
     engine of which no bits are kept is named, too. A resumed run compares again."""
     kept, again = tmp_path / "kept.csv", ("run", "--resume", "out")
-    monkeypatch.setattr(command, "KEPT", kept)
+    monkeypatch.setattr(bits, "KEPT", kept)
     kept.write_text(bits.written([], {"system": "Linux"}))
     words = ("run", SCENE, "--engine", "pymunk:matched", "--timings", "0", "--bits", "--out", "out")
     empty = crosscheck(*words, cwd=tmp_path)
