@@ -272,7 +272,8 @@ def solvers_below(folder: Path) -> list[Path]:
         if not any(part.startswith(NOBODYS) for part in file.relative_to(folder).parts)
         and file.suffix.lower() in KINDS
         and (file.is_file() or dangling(file))
-        and not is_handed_out(file)
+        # what the exercise's page loads beside a student's file
+        and not (file.match(HANDED_OUT) or file.name == "mainScript.js")
     )
 
 
@@ -334,11 +335,6 @@ def place_for(option: str, path: Path, mark: bytes, what: str, seals: bool = Tru
         refuse([str(fault)])
     except OSError as fault:
         refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
-
-
-def is_handed_out(file: Path) -> bool:
-    """Whether the exercise's page loads it beside a student's file."""
-    return file.match(HANDED_OUT) or file.name == "mainScript.js"
 
 
 def checked(files: Sequence[Path]) -> list[FileCheck]:

@@ -60,19 +60,15 @@ def rows_of(archive: Archive) -> list[dict[str, Any]]:
 def bits_of(played: Trajectory) -> tuple[str, str]:
     """16 hex digits of a hash over all states; and for samples 0, 1, 2, 4, 8 ... and the last,
     `DIGITS` digits of the hash over the states up to there."""
-    digest, marks = hashlib.sha256(), []
+    digest, marks, last = hashlib.sha256(), [], len(played) - 1
+    hashed = {0, *(2**p for p in range(len(played).bit_length()) if 2**p < last), last}
     arrays = (played.position, played.velocity, played.angle, played.angular_velocity)
     for k in range(len(played)):
         for array in arrays:
             digest.update(array[k].astype("<f8").tobytes())
-        if k in samples_of(len(played)):
+        if k in hashed:
             marks.append(digest.hexdigest()[:DIGITS])
     return digest.hexdigest()[:16], " ".join(marks)
-
-
-def samples_of(count: int) -> list[int]:
-    """The samples whose hashes the column `until` holds, if there are `count`."""
-    return [0, *(2**p for p in range(count.bit_length()) if 2**p < count - 1), count - 1]
 
 
 def written(rows: list[dict[str, Any]], about: Mapping[str, str]) -> str:

@@ -124,9 +124,8 @@ class Worker:
         if code == system.OUT_OF_MEMORY:
             return out_of_memory(self.memory)
         what = "worker died" if begun else "its worker could not start"
-        return Failure(
-            "crashed", f"{what}: {name_of_exit(code)}{self.place()}", self.left(), outside=not begun
-        )
+        how = signal.Signals(-code).name if code < 0 else f"exit status {code}"
+        return Failure("crashed", f"{what}: {how}{self.place()}", self.left(), outside=not begun)
 
     def abort(self) -> str:
         """Kill a worker that hangs; returns the place in Python where it hung."""
@@ -187,8 +186,3 @@ def start(theirs: Connection, trail: int, printing: int, memory: int) -> subproc
         pass_fds=(theirs.fileno(), trail),
         env=os.environ | {"PYTHONPATH": path_of_this()},
     )
-
-
-def name_of_exit(code: int) -> str:
-    """The signal behind a negative exit code, or the code."""
-    return signal.Signals(-code).name if code < 0 else f"exit status {code}"
