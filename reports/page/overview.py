@@ -256,7 +256,10 @@ def mark_best(
     scored = [rows[name] for name in rows if name not in untrusted]
     if not scored:
         return dict(rows)
-    lowest = [min(column, key=by_value).text for column in zip(*scored)]
+    lowest = [
+        min(column, key=lambda cell: np.inf if np.isnan(cell.value) else cell.value).text
+        for column in zip(*scored)
+    ]
     return {
         name: [
             cell._replace(best=name not in untrusted and cell.text == best and best != "–")
@@ -264,11 +267,6 @@ def mark_best(
         ]
         for name, cells in rows.items()
     }
-
-
-def by_value(cell: OverviewCell) -> float:
-    """The sort key of a cell of the summary; cells without a number come last."""
-    return np.inf if np.isnan(cell.value) else cell.value
 
 
 def pool(

@@ -128,7 +128,9 @@ def difference(before: Path, after: Path) -> Difference:
             f"differs in scene: {listed(edited)}: edited between the runs, so that no result in it"
             " is called worse or better"
         )
-    numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set(), edited)
+    # of these scene, settings and versions are the same
+    alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
+    numbers, same = changed_numbers(*tables, alike if like else set(), edited)
     statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, both, edited)
     busy = [archive for archive in (one, other) if archive.timings and is_busy(archive)]
     warnings += [
@@ -173,14 +175,6 @@ def by_name(archive: Archive) -> Cells:
     return {
         (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
         for r in archive.records
-    }
-
-
-def equal_keys(before: Cells, after: Cells) -> set[Name]:
-    """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the
-    same."""
-    return {
-        name for name in before if name in after and before[name]["cell"] == after[name]["cell"]
     }
 
 

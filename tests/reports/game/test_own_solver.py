@@ -27,8 +27,7 @@ from reports.commands.own_solvers import checked
 from reports.commands.serve import application
 from reports.game.command import PATIENCE, game_of, own_rows
 from reports.game.flight import FRAME, Flight, field_scenario
-from reports.game.page import labels
-from reports.game.server import Game
+from reports.game.server import Game, labels
 from reports.game.session import Session
 from reports.page import server
 from reports.page.own_solvers import with_lines
