@@ -66,10 +66,11 @@ class TruthRecord:
     orders: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 3))))
     remains: tuple[str, ...] = ()
 
-    def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
-        later times are left out."""
-        t = np.asarray(t, float)
+    def motion(
+        self, scene: Scene, thrusts: Sequence[Thrust], t: Array
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Position and velocity (k, n, 2) m, m/s, and angle and spin (k, n) rad, rad/s, at the
+        times t (k,) s before the horizon."""
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         angle, spin = turning.angle.copy(), turning.angular_velocity.copy()
@@ -79,6 +80,13 @@ class TruthRecord:
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
             if scene.friction:
                 angle[:, i], spin[:, i] = flight(t - leg[:, T], *leg[:, TURN].T)
+        return (position, velocity), (angle, spin)
+
+    def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
+        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
+        later times are left out."""
+        t = np.asarray(t, float)
+        moved, turned = self.motion(scene, thrusts, t)
         # A disk that rests on a wall from the start has a contact without impulse at t = 0. One
         # that comes to rest later is not listed: its contact began with a collision.
         collisions: list[Collision] = [
@@ -95,9 +103,9 @@ class TruthRecord:
         return answer(
             scene,
             t,
-            (position, velocity),
+            moved,
             collisions,
-            (angle, spin),
+            turned,
             until,
             self.error_bound,
             reason,
