@@ -292,8 +292,12 @@ class TangentVectors:
             self.carry(i, t)
         legs, k = self.path.legs[i], self.leg[i]
         x, v = along(legs[k], t)
-        follows = k + 1 < len(legs) and float(legs[k + 1].t) == t
-        after = acceleration(legs[k + 1] if follows else legs[k])
+        following = legs[k]  # the last one from this instant on: a disk that lands may roll at once
+        for leg in legs[k + 1 :]:
+            if float(leg.t) != t:
+                break
+            following = leg
+        after = acceleration(following)
         collided = self.collided_at[i] == t
         before, v = (after, self.v[i]) if collided else (acceleration(legs[k]), v)
         weight = 0.0 if self.scene.static[i] else 1 / float(self.scene.mass[i])
@@ -301,7 +305,7 @@ class TangentVectors:
         turn = legs[k].turn
         if turn is None:
             return body
-        rates = rate(legs[k]), rate(legs[k + 1] if follows else legs[k])
+        rates = rate(legs[k]), rate(following)
         return body._replace(
             spin=self.spin[i] if collided else float(turn.spin) + rates[0] * (t - float(legs[k].t)),
             dw=self.dw[i],

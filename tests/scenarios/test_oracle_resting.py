@@ -96,6 +96,64 @@ def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(
         np.testing.assert_allclose(truth.position[t > still, 0] @ up, 0.5, rtol=0, atol=1e-10)
 
 
+@given(
+    degrees=st.floats(1, 80),
+    friction=st.sampled_from([0.0, 0.1, 0.5]),
+    lift=st.sampled_from([0, 1e-14, 1e-9]),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_ball_placed_on_a_slope_is_followed_to_the_end(degrees, friction, lift):
+    """Whether rounding places it above the slope or into it; g sin less friction, or 2/3 g sin."""
+    a, up = (
+        np.radians(degrees),
+        np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees))]),
+    )
+    along = np.array([np.cos(a), -np.sin(a)])
+    scene = lay_out(
+        position=[-3 * along + (0.2 + lift) * up],
+        velocity=[[0, 0]],
+        radius=[0.2],
+        mass=[1.0],
+        gravity=[0, -10],
+        walls=[[-4 * along, 80 * along]],
+        restitution=0.0,
+        friction=friction,
+    )
+    one = asked(scene, 2.0)
+    record = computed(one)
+    pull = (
+        10 * max(2 / 3 * np.sin(a), np.sin(a) - friction * np.cos(a))
+        if friction
+        else 10 * np.sin(a)
+    )
+
+    assert (record.reason, min(record.float64_horizon, 2.0)) == ("", 2.0)
+    truth = states(one, record)
+    # What friction does while it lies, its impulse does at the landing: to first order in the fall.
+    expected = pull * truth.t**2 / 2 - 3
+    np.testing.assert_allclose(
+        truth.position[:, 0] @ along, expected, rtol=0, atol=1e-12 + 10 * lift
+    )
+
+
+@pytest.mark.parametrize("height", [0.3, 0.9])
+def test_what_overlaps_by_a_rounding_touches(height: float):
+    """0.9 - 0.6 and 0.3 differ by 5e-17, 0.3 - 0.1 and 0.2 by 3e-17."""
+    floor = 0.6 if height > 0.5 else 0.0
+    scene = lay_out(
+        position=[[0, height], [0, height + 0.4]],
+        velocity=[[0, 0], [0, 0]],
+        radius=[0.3, 0.1],
+        mass=[1.0, 1.0],
+        gravity=[0, -10],
+        walls=[[[-9, floor], [9, floor]]],
+        restitution=0.5,
+    )
+    record = computed(asked(scene))
+    assert record.reason == ""
+    assert rests(record) == [(0.0, 0, -1), (0.0, 0, 1)]
+
+
 @pytest.mark.parametrize(
     ("restitution", "heavy", "upper", "lower"),
     [(1.0, 1, 1.0, 0.0), (0.8, 1, 0.638, 0.0144), (0.5, 1, 0.21875, 0.046875)],

@@ -85,6 +85,8 @@ class Bodies:
         no_slip_on: (b,) the wall on which each has exactly no slip since the collision at the start
             of its leg.
         sliding: (b,) the sign of the slip of a disk that rests on a wall with friction.
+        snug: the bodies of a pair, or disk, wall and side -> m, the distance of their centres, or
+            of centre and wall, where they touch at the start but for a rounding.
     """
 
     def __init__(self, scene: Scene, k: Numbers) -> None:
@@ -131,6 +133,7 @@ class Bodies:
         self.nought, self.rates = nought, [nought for _ in self.legs]
         self.no_slip_on: list[Contact | None] = [None for _ in self.legs]
         self.sliding = [0 for _ in self.legs]
+        self.snug: dict[tuple[int, ...], Number] = {}
 
     def _friction(self) -> Friction | None:
         """The data for friction; None without friction."""
@@ -328,6 +331,13 @@ class Bodies:
         px, py, tx, ty, _ = self.walls[contact.j]
         return contact.side * (tx * (y - py) - ty * (x - px))
 
+    def reach(self, contact: Contact) -> Number:
+        """m, the distance of two centres, or of a centre from a wall, that touch each other."""
+        i, j = contact.i, contact.j
+        if contact.kind == "body":
+            return self.snug.get((min(i, j), max(i, j))) or self.radius[i] + self.radius[j]
+        return self.snug.get((i, j, contact.side)) or self.radius[i]
+
     def foot(self, wall: int, x: Number, y: Number) -> Number:
         """m along the wall from its start to the point closest to (x, y)."""
         px, py, tx, ty, _ = self.walls[wall]
@@ -352,7 +362,7 @@ class Bodies:
     def beside(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
         """The position nearest to (x, y) at which disk contact.i touches the wall exactly."""
         px, py, tx, ty, _ = self.walls[contact.j]
-        foot, away = self.foot(contact.j, x, y), contact.side * self.radius[contact.i]
+        foot, away = self.foot(contact.j, x, y), contact.side * self.reach(contact)
         return px + foot * tx - away * ty, py + foot * ty + away * tx
 
     def stays_still(self, one: Contact, other: Contact) -> bool:

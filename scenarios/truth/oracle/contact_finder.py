@@ -131,7 +131,7 @@ class ContactFinder:
             return None
         (x, y, u, v), (px, py, pu, pv) = bodies.state_at(i, now), bodies.state_at(j, now)
         dx, dy, du, dv = px - x, py - y, pu - u, pv - v
-        reach = bodies.radius[i] + bodies.radius[j]
+        reach = bodies.reach(contact)
         c, b, a2 = dx * dx + dy * dy - reach * reach, dx * du + dy * dv, du * du + dv * dv
         if alike:
             return meeting(self.k, c, b, a2)
@@ -146,7 +146,7 @@ class ContactFinder:
         x, y, u, v = bodies.state_at(i, now)
         fall = bodies.outward(contact, leg.ax, leg.ay)
         leans = contact in bodies.leaning[i] and leg.t is now
-        gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
+        gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.reach(contact)
         try:
             after = crossing(self.k, gap, bodies.outward(contact, u, v), fall)
         except Pressed:
@@ -235,11 +235,11 @@ class ContactFinder:
             if key(contact) in known:
                 continue
             if contact.kind == "body":
-                touch, reach = self.touch(contact, now), bodies.radius[i] + bodies.radius[contact.j]
+                touch, reach = self.touch(contact, now), bodies.reach(contact)
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
                 within = True
             else:
-                gap = self.k.sign(bodies.height(contact, x, y) - bodies.radius[i])
+                gap = self.k.sign(bodies.height(contact, x, y) - bodies.reach(contact))
                 within = bodies.foot_on(contact.j, x, y)
             found += [(contact, gap)] if gap <= 0 and within else []
         return found

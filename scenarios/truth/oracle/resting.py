@@ -40,6 +40,9 @@ FAR = 1e-12  # relative to the largest coordinate, added to those lengths
 # relative to the largest coordinate: how far the four ends of two walls in line are off the line by
 # their own rounding and that of the check, a few units in the last place
 ROUNDED = 2.0**-50
+# Units in the last place of the largest coordinate: of centre, radius and wall each is rounded by
+# half of one, and products on the way to them by as much again.
+TOUCHING = 4
 
 
 def settle(
@@ -145,7 +148,7 @@ def room(finder: ContactFinder, contact: Contact, leg: Leg) -> float:
 def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
     """The gap, m, between two bodies, to all digits of float64 even where it is tiny."""
     (x, y, _, _), (px, py, _, _) = bodies.state_at(i, now), bodies.state_at(j, now)
-    dx, dy, reach = px - x, py - y, bodies.radius[i] + bodies.radius[j]
+    dx, dy, reach = px - x, py - y, bodies.reach(Contact("body", i, j))
     gap = dx * dx + dy * dy - reach * reach
     return float(gap / (bodies.k.sqrt(dx * dx + dy * dy) + reach)) - bodies.k.spread(gap) / float(
         reach
@@ -305,8 +308,12 @@ def _carries(bodies: Bodies, contact: Contact) -> bool:
 
 
 def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
-    """The contacts that touch exactly at the start, and dr.dv of each (up to a positive factor);
-    those without approach are noted in `bodies`.
+    """The contacts that touch at the start, and dr.dv of each (up to a positive factor); those
+    without approach are noted in `bodies`.
+
+    What touches but for `TOUCHING` units in the last place of its coordinates touches: its radius
+    is taken larger or smaller by so much. Likewise a disk on a wall has no speed along the normal
+    if that is a rounding of its speed.
 
     Raises:
         NoTruth: bodies overlap.
@@ -315,15 +322,22 @@ def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
     faults, found = [], dict[tuple[Any, ...], tuple[Contact, Fraction]]()
     for i in np.flatnonzero(~scene.static).tolist():
         for contact in finder.touching(i, 0.0):
-            gap, approach, overlap = at_start(bodies, contact)
-            if gap < 0 and key(contact) not in found:
+            gap, approach, overlap, drift = at_start(bodies, contact)
+            touches = abs(overlap) <= TOUCHING * last_place(bodies, contact)
+            if key(contact) in found:
+                continue
+            if gap < 0 and not touches:
                 name = bodies.name(contact)
                 faults.append(
                     f"disk {i} and {name} overlap by {overlap:.3g} m at the start: move them apart"
                     " by that"
                 )
-            if gap <= 0:
-                found[key(contact)] = contact, approach
+            if touches and gap:
+                fit(finder, contact)
+            if touches:
+                speed = np.abs(bodies.table[i, 2:4]).max()
+                along_wall = contact.kind == "wall" and abs(drift) <= TOUCHING * np.spacing(speed)
+                found[key(contact)] = contact, Fraction(0) if along_wall else approach
     if faults:
         raise NoTruth(faults[0] + (f" ({len(faults) - 1} more)" if len(faults) > 1 else ""))
     for contact, approach in found.values():
@@ -332,9 +346,34 @@ def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
     return list(found.values())
 
 
-def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, float]:
-    """The gap and dr.dv of a contact, both exact up to a positive factor, and its overlap, m, from
-    the exact gap: a difference of two lengths in float64 would be 0 for a small one."""
+def last_place(bodies: Bodies, contact: Contact) -> float:
+    """m, one unit in the last place of the largest coordinate or radius of a contact."""
+    wall = contact.kind == "wall"
+    rows = [contact.i] if wall else [contact.i, contact.j]
+    coordinates = [bodies.table[rows, :2].ravel(), bodies.radii[rows]]
+    if wall:
+        coordinates.append(bodies.scene.walls[contact.j].ravel())
+    return float(np.spacing(np.abs(np.concatenate(coordinates)).max()))
+
+
+def fit(finder: ContactFinder, contact: Contact) -> None:
+    """Let a contact that touches but for a rounding touch exactly."""
+    bodies, i, j, root = finder.bodies, contact.i, contact.j, finder.k.sqrt
+    x, y = bodies.legs[i][1:3]
+    if contact.kind == "body":
+        px, py = bodies.legs[j][1:3]
+        distance = root((px - x) * (px - x) + (py - y) * (py - y))
+        bodies.snug[min(i, j), max(i, j)] = distance
+        return
+    distance = bodies.height(contact, x, y)
+    for wall in (_moved_to(finder, contact, k) for k in finder.surface[j]):
+        bodies.snug[i, wall.j, wall.side] = distance
+
+
+def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, float, float]:
+    """The gap and dr.dv of a contact, both exact up to a positive factor; and its overlap, m, and
+    the speed, m/s, at which it opens, from these: a difference of two lengths in float64 would be 0
+    for a small one."""
     rows, scene, i = bodies.table, bodies.scene, contact.i
     (x, y), (u, v), r = (
         rational(rows[i, :2]),
@@ -345,9 +384,10 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
         (px, py), (pu, pv) = rational(rows[contact.j, :2]), rational(rows[contact.j, 2:4])
         r += Fraction(float(bodies.radii[contact.j]))
         dx, dy = px - x, py - y
-        square = dx * dx + dy * dy
-        overlap = float(r * r - square) / (float(r) + float(square) ** 0.5)
-        return square - r * r, dx * (pu - u) + dy * (pv - v), overlap
+        square, opens = dx * dx + dy * dy, dx * (pu - u) + dy * (pv - v)
+        distance = float(square) ** 0.5
+        overlap = float(r * r - square) / (float(r) + distance)
+        return square - r * r, opens, overlap, float(opens) / distance
     (px, py), (qx, qy) = (rational(end) for end in scene.walls[contact.j])
     tx, ty = qx - px, qy - py
     across, foot, square = (
@@ -356,8 +396,8 @@ def at_start(bodies: Bodies, contact: Contact) -> tuple[Fraction, Fraction, floa
         tx * tx + ty * ty,
     )
     if not 0 <= foot <= square:
-        return Fraction(1), Fraction(0), 0.0
-    gap = across * across - r * r * square
+        return Fraction(1), Fraction(0), -np.inf, 0.0
+    gap, opens = across * across - r * r * square, contact.side * (tx * v - ty * u)
     length = float(square) ** 0.5
     overlap = -float(gap) / (length * (float(r) * length + abs(float(across))))
-    return gap, contact.side * (tx * v - ty * u), overlap
+    return gap, opens, overlap, float(opens) / length
