@@ -16,6 +16,7 @@ from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.events import trace
 from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.truth.oracle.path import Path
+from scenarios.truth.oracle.resting import FOR_SERIES
 from scenarios.truth.oracle.work import TimeLimit, WorkLimit
 from scenarios.truth.record import TruthRecord, last_time, record_of
 
@@ -232,9 +233,12 @@ def two_precisions(
             reason = f"numbers of {2 * bits} bits have used up their digits at t = {diverged:.9g} s"
             fine = fine.cut(diverged, reason)
         attempts.append((fine, error, 2 * bits))
-        if diverged >= end or 2 * bits >= MOST_BITS or clock.expired:
+        few = (coarse.few_bits or fine.few_bits) and bits < FOR_SERIES
+        if (diverged >= end and not few) or 2 * bits >= MOST_BITS or clock.expired:
             break
-        needed = ceil(SPARE * bits * until / max(diverged, until * bits / MOST_BITS))
+        needed = FOR_SERIES * few + ceil(
+            SPARE * bits * until / max(diverged, until * bits / MOST_BITS)
+        )
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
     best = (
         max(attempts, key=lambda attempt: min(attempt[0].end, until))

@@ -201,9 +201,10 @@ class TangentVectors:
         contact, arm = leg.held[0], float(self.scene.radius[i])
         start, end = self.scene.walls[contact.j]
         way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
-        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / (
-            acceleration(leg) @ way + arm * rate(leg)
-        )
+        slower = float(acceleration(leg) @ way + arm * rate(leg))
+        if not slower:  # no slip ends: a group of disks begins or ends
+            return np.zeros_like(self.late)
+        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / slower
         return late
 
     def hold(self, i: int, wall: int | None) -> None:

@@ -18,9 +18,9 @@ from scenarios.truth.order import float64_horizon
 EPS = float(np.finfo(float).eps)
 # relative to `reach`: a few roundings, of the start of a leg, of a time and of a sample
 ROUNDINGS = 4 * EPS
-# s; of bounces that die out, those that last less are not listed, as in `walls.bouncing_ball_e09`;
-# in a scene of shorter sample intervals, those that last less than this share of one
-LEAST, LEAST_SHARE = 1e-4, 1e-2
+# of the duration of a scene; of bounces that die out, those that last less are not listed, as in
+# `walls.bouncing_ball_e09`
+LEAST_SHARE = 1e-5
 TOUCH = 1e-6  # m; a disk closer to a wall than this at the end may touch it
 NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
 # The columns of `TruthRecord.legs`; `NORMAL`, `SPEED` and `FALL` are of the bounces, `TURN` is
@@ -252,11 +252,11 @@ def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
 
 
 def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last `LEAST` s,
-    or `LEAST_SHARE` sample intervals, or more."""
+    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last
+    `LEAST_SHARE` of the duration or more."""
     scene = scenario.scene
     e, v, g, disk = scene.restitution, leg[SPEED], leg[FALL], int(leg[DISK])
-    least = min(LEAST, LEAST_SHARE * scenario.sample_interval)
+    least = LEAST_SHARE * scenario.duration
     count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
     for k in range(1, count):
         t = leg[T] + 2 * v / g * float(powers(e, k))

@@ -78,7 +78,10 @@ class Bodies:
         asleep: (b,) whether the bounces of each die out without another contact: it is then left
             out of all searches.
         held: (b,) the contacts each rests on: gap 0, no speed and no acceleration along the normal.
+        group: (b,) the disks that move as one with each, because forces keep them in contact.
+        common: (b,) the kind of such a group and its acceleration, m/s2; else None.
         separated: pair -> the event counts of both when they touched and did not approach.
+        in_step: the same for pairs that touched and had exactly the same velocity.
         leaning: (b,) the walls that each touched without approach at the start of its leg.
         law: masses, restitution and friction.
         rates: (b,) rad/s2, angular acceleration by torques; used only with friction.
@@ -128,6 +131,9 @@ class Bodies:
         )
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
         self.separated: dict[tuple[int, int], tuple[int, int]] = {}
+        self.in_step: dict[tuple[int, int], tuple[int, int]] = {}
+        self.group: list[frozenset[int]] = [frozenset() for _ in self.legs]
+        self.common: list[tuple[int, Number, Number] | None] = [None for _ in self.legs]
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
         self.nought, self.rates = nought, [nought for _ in self.legs]
@@ -200,6 +206,7 @@ class Bodies:
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
+        self.common[i] = None
         self.begin(i, self.leg(i, now, x, y, v))
 
     def leg(self, i: int, now: Number, x: Number, y: Number, v: Velocity) -> Leg:
@@ -214,7 +221,7 @@ class Bodies:
         i, place = edge.i, list(self.state_at(edge.i, now))
         place[edge.j] = self.k.exact(float(self.scene.wrap[0 if edge.side > 0 else 1, edge.j]))
         spin = self.turn_at(i, now).spin
-        self.held[i] = ()
+        self.held[i], self.common[i] = (), None
         x, y, vx, vy = place
         self.begin(i, self.leg(i, now, x, y, (vx, vy, spin)))
 
@@ -241,18 +248,42 @@ class Bodies:
         self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
 
     def hold(
-        self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity, rolls: bool = False
+        self,
+        i: int,
+        now: Number,
+        contacts: tuple[Contact, ...],
+        v: Velocity,
+        rolls: bool = False,
+        common: tuple[int, Number, Number] | None = None,
     ) -> None:
         """Body i goes on with velocity v, resting on these contacts.
 
         rolls: it has exactly no slip on the one wall on which it rests with friction.
+        common: kind and acceleration of its group.
         """
         self.asleep[i] = False
-        self.held[i] = contacts
+        self.held[i], self.common[i] = contacts, common
+        touched_now = self.touched_now(i, now)
         if contacts and self.law.friction is not None:
             self.sliding[i] = 0 if rolls else self.k.sign(self.slip(contacts[0], v))
         x, y, _, _ = self.state_at(i, now)
         self.begin(i, self.leg(i, now, x, y, v))
+        for pairs, pair in touched_now:
+            pairs[pair] = self.count[pair[0]], self.count[pair[1]]
+
+    def touched_now(
+        self, i: int, now: Number
+    ) -> list[tuple[dict[tuple[int, int], tuple[int, int]], tuple[int, int]]]:
+        """The entries of `separated` and `in_step` that body i has got at this instant: they hold
+        on another acceleration, too."""
+        if self.legs[i].t is not now:
+            return []
+        return [
+            (pairs, pair)
+            for pairs in (self.separated, self.in_step)
+            for pair, counts in pairs.items()
+            if i in pair and counts == (self.count[pair[0]], self.count[pair[1]])
+        ]
 
     def slip(self, contact: Contact, v: Velocity) -> Number:
         """m/s, the velocity of the contact point along the wall, positive from its start to its
@@ -271,6 +302,9 @@ class Bodies:
 
     def acceleration(self, i: int) -> tuple[Number, Number, Number]:
         """ax, ay m/s2 and rad/s2 of body i on the contacts it rests on; also sets its kind."""
+        if (common := self.common[i]) is not None:
+            self.kind[i] = common[0]
+            return common[1], common[2], self.nought
         kind, ax, ay = self.free[i]
         rate = self.rates[i]
         walls = [c for c in self.held[i] if c.kind == "wall"]
@@ -325,6 +359,11 @@ class Bodies:
                 self.separated[i, j] = self.count[i], self.count[j]
             elif contact.i in collided or not collided:
                 self.leaning[contact.i].add(contact)
+
+    def keep_in_step(self, contact: Contact) -> None:
+        """Note that both bodies of a contact touch and have exactly the same velocity."""
+        i, j = sorted((contact.i, contact.j))
+        self.separated[i, j] = self.in_step[i, j] = self.count[i], self.count[j]
 
     def height(self, contact: Contact, x: Number, y: Number) -> Number:
         """m from the line of the wall to (x, y), positive on the contact's side of it."""

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from math import log
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array, Thrust
+from scenarios.model import Array, Scene, Thrust
 from scenarios.no_truth import NoTruth
 from scenarios.truth.oracle.bodies import (
     FALLING,
@@ -27,10 +27,12 @@ from scenarios.truth.oracle.bodies import (
     rational,
     square_to,
 )
-from scenarios.truth.oracle.contact_finder import ContactFinder, key, line_span
+from scenarios.truth.oracle.clusters import apply, complementary, delassus, solve
+from scenarios.truth.oracle.contact_finder import ContactFinder, line_span
 from scenarios.truth.oracle.filter import moved
-from scenarios.truth.oracle.numbers import Number
-from scenarios.truth.oracle.ties import Contact
+from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
+from scenarios.truth.oracle.path import MotionEnds
+from scenarios.truth.oracle.ties import Contact, TieOutcome, Touch, Velocities, key
 
 SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disks cannot meet
 # A series that takes more bounces than this to lose all but `SMALL` of its speed is followed bounce
@@ -43,6 +45,12 @@ ROUNDED = 2.0**-50
 # Units in the last place of the largest coordinate: of centre, radius and wall each is rounded by
 # half of one, and products on the way to them by as much again.
 TOUCHING = 4
+# Collisions that die out are followed until their speeds are below this share of a rounding; the
+# factor bounds the limit by the impulses that are left. Gaps are then some 1e-50 m, which takes so
+# many bits where small numbers count as zero.
+LEFT_OVER, SPARE_LIMIT, FOR_SERIES = 1e-10, 1e3, 512
+NO_MATTER = 1e-4  # share of a rounding below which it does not matter how disks collide
+APART = 1e6  # of two speeds that belong to different series
 
 
 def settle(
@@ -209,6 +217,234 @@ def press(finder: ContactFinder, contact: Contact, now: Number) -> bool:
     rolls = bodies.no_slip_on[i] == contact and bodies.legs[i].t is now
     bodies.hold(i, now, (*held, contact), (*along(bodies, contact, *v[:2]), v[2]), rolls)
     return True
+
+
+class Group(NamedTuple):
+    """Disks that move as one: their contacts, velocity m/s, and kind and acceleration m/s2."""
+
+    disks: list[int]
+    contacts: list[Contact]
+    velocity: tuple[Number, Number]
+    common: tuple[int, Number, Number]
+
+
+def lasting(finder: ContactFinder, contact: Contact, now: Number) -> list[Group]:
+    """The groups of disks that forces keep in contact from now on, where a disk is pressed onto
+    another; none if this cannot be followed.
+
+    Of all motions that open or keep the contacts the forces choose the one nearest to free flight
+    (Gauss): a linear complementarity problem in the accelerations. Raises `MotionEnds` where a disk
+    would roll over another.
+    """
+    bodies, k, law = finder.bodies, finder.k, finder.bodies.law
+    touches = [
+        t
+        for t in finder.cluster([contact], now)
+        if key(t.contact) == key(contact) or closed(finder, t, now)
+    ]
+    disks = {i for touch in touches for i in touch.contact.disks}
+    v = {i: bodies.velocity_at(i, now) for i in disks}
+    free = {i: (*bodies.free[i][1:], bodies.nought) for i in disks}
+    matrix = delassus(law, touches)
+    q = [law.approach(touch, free) + turning(finder, touch, v) for touch in touches]
+    forces = complementary(k, matrix, q)
+    if not forces or key(contact) not in {key(touches[a].contact) for a in forces}:
+        return []
+    pressed = [touches[a] for a in forces]
+    after = apply(law, touches, forces, free)
+    if any(bodies.rates[i] is not bodies.nought for i in disks) or any(
+        k.sign(law.slip(touch, v)) or k.sign(law.slip(touch, after)) for touch in pressed
+    ):
+        return []  # friction acts
+    for touch in pressed:
+        if touch.contact.kind == "body" and rolls_over(finder, touch, v, after):
+            raise MotionEnds(float(now), *upper_and_lower(finder, touch))
+    contacts = [touch.contact for touch in pressed]
+    groups = [
+        move_as_one(finder, members, contacts, v) for members in joined(finder.scene, contacts)
+    ]
+    return [group for group in groups if len(group.contacts) > 1]  # `press` does the others
+
+
+class NoLimit(ArithmeticError):
+    """Collisions that accumulate have no limit that can be followed, or not in so `few_bits`."""
+
+    def __init__(self, few_bits: bool = False) -> None:
+        super().__init__()
+        self.few_bits = few_bits
+
+
+def limit_of_series(
+    finder: ContactFinder,
+    touches: Sequence[Touch],
+    v: Velocities,
+    rest: float,
+    share: float = LEFT_OVER,
+) -> TieOutcome | None:
+    """The limit of collisions of these contacts that die out while forces press the disks together;
+    None while their speeds are not yet small enough.
+
+    All their further impulses together end the speeds along the normals. Those are u at most, and
+    the series lasts for about u / a, a the acceleration that presses: so the limit differs by the
+    order of u from the velocities after the impulses that end the speeds at once. u times the rest
+    of the motion, s, is below `share` of a rounding. Raises `NoLimit` where friction acts
+    between disks, a contact is the end of a wall, or the contacts depend on each other.
+    """
+    k, law, scene = finder.k, finder.bodies.law, finder.scene
+    lengths = [float(np.hypot(float(touch.dx), float(touch.dy))) for touch in touches]
+    fast = [abs(float(law.approach(t, v))) / length for t, length in zip(touches, lengths)]
+    least = share * np.finfo(float).eps * scene.radius.min() / (rest + 1)
+    # A disk may bounce to its rest on one wall between two bounces on another one.
+    slow = [speed for speed in fast if speed <= least]
+    if slow and all(speed > APART * max(slow) for speed in fast if speed > least):
+        touches = [touch for touch, speed in zip(touches, fast) if speed <= least]
+    matrix, speeds = delassus(law, touches), [law.approach(touch, v) for touch in touches]
+    ends = any(t.contact.kind == "body" and t.contact.j >= scene.n for t in touches)
+    if law.sticks or ends or not touches:
+        raise NoLimit
+    if len(touches) > 1 and any(k.sign(law.slip(touch, v)) for touch in touches):
+        raise NoLimit
+    if (impulses := solve(k, matrix, [-speed for speed in speeds])) is None:
+        raise NoLimit
+    if not k.proves and k.bits < FOR_SERIES:
+        raise NoLimit(few_bits=True)
+    if len(touches) == len(fast) and max(fast) > least:
+        return None
+    spare = SPARE_LIMIT * max(abs(float(impulse)) for impulse in impulses)
+    forces = {a: impulse + k.between(-spare, spare) for a, impulse in enumerate(impulses)}
+    return TieOutcome(
+        apply(law, touches, forces, v), [], frozenset(touch.contact for touch in touches)
+    )
+
+
+def closed(finder: ContactFinder, touch: Touch, now: Number) -> bool:
+    """Whether a contact that touches has no speed along its normal."""
+    bodies, contact = finder.bodies, touch.contact
+    pair = tuple(sorted((contact.i, contact.j)))
+    if contact.kind == "body" and finder.touches_now(contact, now) and pair in bodies.in_step:
+        return True
+    if any(key(contact) == key(c) for c in bodies.held[contact.i]):
+        return True
+    v = {i: bodies.velocity_at(i, now) for i in contact.disks}
+    return bodies.k.sign(bodies.law.approach(touch, v)) == 0
+
+
+def turning(finder: ContactFinder, touch: Touch, v: Velocities) -> Number:
+    """m2/s2, |dv|^2: what the turning of a contact of two disks adds to dr.da; 0 if they are in
+    step."""
+    contact = touch.contact
+    if contact.kind != "body" or in_step(finder, contact):
+        return finder.k.exact(0.0)
+    (ux, uy, _), (px, py, _) = v[contact.i], v[contact.j]
+    return (px - ux) * (px - ux) + (py - uy) * (py - uy)
+
+
+def in_step(finder: ContactFinder, contact: Contact) -> bool:
+    """Whether two bodies are known to have the same velocity: since they met, or as one group."""
+    bodies, (i, j) = finder.bodies, sorted((contact.i, contact.j))
+    counts = bodies.count[i], bodies.count[j]
+    return j in bodies.group[i] or bodies.in_step.get((i, j)) == counts
+
+
+def rolls_over(finder: ContactFinder, touch: Touch, v: Velocities, after: Velocities) -> bool:
+    """Whether one of two disks that are pressed together moves or is accelerated along the
+    other."""
+    contact, sign = touch.contact, finder.k.sign
+    parts = [after] if in_step(finder, contact) else [v, after]
+    for part in parts:
+        (ux, uy, _), (px, py, _) = part[contact.i], part[contact.j]
+        if sign(touch.dx * (py - uy) - touch.dy * (px - ux)):
+            return True
+    return False
+
+
+def in_step_after(
+    finder: ContactFinder, outcome: TieOutcome, touches: Sequence[Touch]
+) -> tuple[Velocities, list[Contact]]:
+    """The velocities of an outcome, without a speed into walls that stay closed, and to all digits
+    the same for disks whose contact has closed and that do not move along each other; and the
+    contacts of these."""
+    k, velocities = finder.k, dict(outcome.velocities)
+    walls = [c for c in outcome.still if c.kind == "wall" and c.i in velocities]
+    pairs = [
+        touch.contact
+        for touch in touches
+        if touch.contact.kind == "body"
+        and key(touch.contact) in {key(c) for c in outcome.still}
+        and not may_slip(k, touch, velocities)
+    ]
+    contacts = [*pairs, *walls]
+    for members in joined(finder.scene, contacts):
+        vx, vy = move_as_one(finder, members, contacts, velocities).velocity
+        for i in members:
+            velocities[i] = vx, vy, velocities[i][2]
+    return velocities, pairs
+
+
+def may_slip(k: Numbers, touch: Touch, v: Velocities) -> bool:
+    """Whether two disks move along each other, or it is not decided that they do not."""
+    (ux, uy, _), (px, py, _) = v[touch.contact.i], v[touch.contact.j]
+    try:
+        return k.sign(touch.dx * (py - uy) - touch.dy * (px - ux)) != 0
+    except Undecided:
+        return True
+
+
+def upper_and_lower(finder: ContactFinder, touch: Touch) -> tuple[str, list[int]]:
+    """Which disk rolls over what, in words, and the disks."""
+    contact, (gx, gy) = touch.contact, finder.scene.gravity.tolist()
+    upper, lower = f"disk {contact.i}", finder.bodies.name(contact)
+    disks = [i for i in (contact.i, contact.j) if i < finder.scene.n]
+    if len(disks) == 2 and float(touch.dx) * gx + float(touch.dy) * gy < 0:
+        upper, lower = lower, upper
+    return f"{upper} rolls over {lower}", disks
+
+
+def joined(scene: Scene, contacts: Sequence[Contact]) -> list[list[int]]:
+    """The groups of moving disks that these contacts connect, static ones aside."""
+    groups: list[set[int]] = []
+    for contact in contacts:
+        members = {i for i in contact.disks if i < scene.n and not scene.static[i]}
+        linked = [group for group in groups if group & members]
+        groups = [group for group in groups if group not in linked]
+        groups.append(members.union(*linked))
+    return [sorted(group) for group in groups]
+
+
+def move_as_one(
+    finder: ContactFinder, members: list[int], contacts: Sequence[Contact], v: Velocities
+) -> Group:
+    """The group of these disks on these contacts: all walls and static disks together leave it one
+    direction or none, and its mean acceleration in that."""
+    bodies, k, nought = finder.bodies, finder.k, finder.bodies.nought
+    ours = [c for c in contacts if c.disks & {*members}]
+    walls = list({c.j: c for c in ours if c.kind == "wall"}.values())
+    fixed = any(not c.disks <= {*members} for c in ours if c.kind == "body")
+    spans = [finder.scene.walls[c.j] for c in walls]
+    if fixed or any(not parallel(spans[0], span) for span in spans[1:]):
+        return Group(members, ours, (nought, nought), (STATIC, nought, nought))
+    mass = [1 / bodies.law.inverse_mass[i] for i in members]
+    ax, ay = (
+        sum(m * bodies.free[i][axis] for m, i in zip(mass, members)) / sum(mass) for axis in (1, 2)
+    )
+    first = next((c.i for c in walls), members[0])
+    vx, vy, _ = v[first]
+    if walls:
+        vx, vy = bodies.slide(walls[0], vx, vy)
+        level = all(bodies.free[i][0] == FALLING for i in members) and square_to(
+            spans[0], finder.scene.gravity
+        )
+        ax, ay = (nought, nought) if level else bodies.slide(walls[0], ax, ay)
+    still = not (k.sign(ax) or k.sign(ay))
+    kind = STATIC if still else 2 + finder.scene.n + members[0]
+    return Group(members, ours, (vx, vy), (STATIC, nought, nought) if still else (kind, ax, ay))
+
+
+def parallel(one: Array, other: Array) -> bool:
+    """Whether two walls (2, 2) have the same direction, in rationals."""
+    (px, py), (qx, qy) = rational(other[0]), rational(other[1])
+    (ax, ay), (bx, by) = rational(one[0]), rational(one[1])
+    return (qx - px) * (by - ay) == (qy - py) * (bx - ax)
 
 
 def lie_down(finder: ContactFinder) -> list[Contact]:
