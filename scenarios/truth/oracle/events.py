@@ -58,7 +58,7 @@ class Motion:
         self.finder = ContactFinder(self.bodies)
         self.records: list[Record | None] = [None] * scene.n
         self.due = np.full(scene.n, np.inf)
-        self.now = k.exact(0.0)
+        self.now = self.bodies.nought
         self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
         self.recent = RecentCollisions(scene)
         # From the last to the first, so that the next one can be popped.
@@ -418,18 +418,10 @@ class Motion:
             bodies.keep_in_step(contact)
         if rolls_on is not None:
             bodies.no_slip_on[rolls_on.i] = rolls_on
-        # A disk no longer rests on a disk that has collided.
-        dropped = {
-            i
-            for i, held in enumerate(bodies.held)
-            if i not in touched and any(c.disks & touched for c in held)
-        }
-        for i in sorted(dropped):
-            bodies.hold(i, self.now, (), bodies.velocity_at(i, self.now))
         stop = None
         if bounce is not None and 0 < self.scene.restitution < 1:
             stop = settle(self.finder, bounce, self.now, self.thrusts)
-        self.follow_up(touched | dropped | members)
+        self.follow_up(touched | members)
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 

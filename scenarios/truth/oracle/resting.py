@@ -448,29 +448,14 @@ def parallel(one: Array, other: Array) -> bool:
 
 
 def lie_down(finder: ContactFinder) -> list[Contact]:
-    """Let disks that touch a wall rest on it from the start, and disks at rest straight above such
-    a disk on that; the contacts."""
-    bodies, now = finder.bodies, finder.bodies.k.exact(0.0)
-    found = start(finder)
+    """Let disks that touch a wall rest on it from the start; the contacts."""
+    bodies, now = finder.bodies, finder.bodies.nought
     lying = [
-        c for c, approach in found if c.kind == "wall" and approach == 0 and _pressed(bodies, c)
+        c
+        for c, approach in start(finder)
+        if c.kind == "wall" and approach == 0 and _pressed(bodies, c)
     ]
-    rested = [c for c in lying if press(finder, c, now)]
-    pairs = [
-        Contact("body", *ends)
-        for c, _ in found
-        if c.kind == "body"
-        for ends in ((c.i, c.j), (c.j, c.i))
-    ]
-    still = [not row.any() for row in bodies.table[:, 2:4]]
-    if bodies.law.friction is not None:
-        pairs = []  # with friction only one lasting contact per disk is supported
-    while upper := next(
-        (c for c in pairs if still[c.i] and not bodies.held[c.i] and _carries(bodies, c)), None
-    ):
-        bodies.hold(upper.i, now, (upper,), bodies.velocity_at(upper.i, now))
-        rested.append(upper)
-    return rested
+    return [c for c in lying if press(finder, c, now)]
 
 
 def next_in_line(finder: ContactFinder, contact: Contact, side: int) -> Contact | None:
@@ -527,20 +512,6 @@ def _pressed(bodies: Bodies, contact: Contact) -> bool:
     """Whether the acceleration of free flight presses the disk of a contact onto the wall."""
     _, ax, ay = bodies.free[contact.i]
     return bodies.k.sign(bodies.outward(contact, ax, ay)) < 0
-
-
-def _carries(bodies: Bodies, contact: Contact) -> bool:
-    """Whether contact.j is at rest exactly below contact.i, so that gravity alone keeps them in
-    contact."""
-    scene, i, j = bodies.scene, contact.i, contact.j
-    if bodies.free[i][0] != FALLING or scene.static[i]:
-        return False
-    firm = bool(bodies.held[j]) and bodies.kind[j] == STATIC and not bodies.table[j, 2:4].any()
-    if not (firm or j >= scene.n or scene.static[j]) or (firm and bodies.free[j][0] != FALLING):
-        return False
-    (x, y), (px, py) = rational(bodies.table[i, :2]), rational(bodies.table[j, :2])
-    gx, gy = rational(scene.gravity)
-    return (px - x) * gy == (py - y) * gx and (px - x) * gx + (py - y) * gy > 0
 
 
 def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
