@@ -78,7 +78,10 @@ class CollisionOrder:
         self.scene, self.path, self.tangents = scenario.scene, path, tangents
         self.end = min(path.end, scenario.duration)
         rows = [
-            [*map(float, (leg.t, i, *leg[1:7]))] for i, legs in enumerate(path.legs) for leg in legs
+            # A thrust that turns with its disk ends before the disk touches anything.
+            [*map(float, (leg.t, i, *((np.nan,) * 6 if leg.jet else leg[1:7])))]
+            for i, legs in enumerate(path.legs)
+            for leg in legs
         ]
         self.legs = np.array(sorted(rows, key=lambda row: row[0]))
         self.begun, self.now = 0, np.zeros((self.scene.n, 8))

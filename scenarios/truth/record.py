@@ -12,6 +12,7 @@ from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
 from scenarios.truth.horizon import DIVERGED
 from scenarios.truth.oracle.bodies import nearest
+from scenarios.truth.oracle.jets import count_pieces, push
 from scenarios.truth.oracle.path import Event, Path
 from scenarios.truth.order import float64_horizon
 
@@ -78,6 +79,15 @@ class TruthRecord:
             legs = self.legs[self.legs[:, DISK] == i]
             leg = legs[np.maximum(np.searchsorted(legs[:, T], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
+            jets = [p for p in thrusts if p.disk == i and p.frame == "body" and p.force.any()]
+            for jet, begun in (
+                (p, row) for p in jets for row in {row[T]: row for row in legs}.values()
+            ):
+                if jet.start <= begun[T] < jet.stop:
+                    on = (t >= begun[T]) & (leg[:, T] == begun[T])
+                    pushed = push_float64(jet.force / scene.mass[i], begun[TURN], t[on] - begun[T])
+                    position[on, i] += pushed[0]
+                    velocity[on, i] += pushed[1]
             if scene.friction:
                 angle[:, i], spin[:, i] = flight(t - leg[:, T], *leg[:, TURN].T)
         return (position, velocity), (angle, spin)
@@ -137,6 +147,16 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
     return position, velocity
 
 
+def push_float64(force: Array, turn: Array, s: Array) -> tuple[Array, Array]:
+    """Displacement m and gain of velocity m/s, (k, 2) each, after s (k,) s of a thrust (2,) m/s2
+    that turns with its disk, from its angle, spin and rate of spin (3,) on."""
+    angle, spin, rate = turn
+    pieces = count_pieces(spin, rate, float(s.max(initial=0.0)))
+    gain = push((force[0], force[1]), angle, spin, rate, s, pieces, 60)
+    moved, faster = (np.stack(part, axis=-1) for part in gain)
+    return moved, faster
+
+
 def powers(e: float, k: Array | int) -> Array:
     """1 + e + ... + e^(k - 1) = (1 - e^k) / (1 - e), also where e is so close to 1 that 1 - e^k has
     lost its digits."""
@@ -167,7 +187,8 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),
         # The state at the end itself is not known: the horizon is the float64 before it.
         horizon=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
-        error_bound=error + ROUNDINGS * reach(legs, min(end, scenario.duration)),
+        error_bound=error
+        + ROUNDINGS * (reach(legs, min(end, scenario.duration)) + reach_of_jets(scenario, legs)),
         bits=bits,
         method=method,
         reason=path.reason,
@@ -237,6 +258,17 @@ def reach(legs: Array, until: float) -> float:
     far = np.maximum(np.abs(x), np.abs(x + (v + a * s / 2) * s)) + np.abs(a) * s**2 / 8
     speed = np.maximum(np.abs(v), np.abs(v + a * s)) + legs[:, SPEED, None]
     return float(far[begun].max() + until * speed[begun].max())
+
+
+def reach_of_jets(scenario: Scenario, legs: Array) -> float:
+    """m, likewise by thrusts that turn with their disk: f T^2, times the rounding of the angle."""
+    begun, total = np.abs(legs[:, TURN]), 0.0
+    for p in (p for p in scenario.thrusts if p.frame == "body" and p.force.any()):
+        angle, spin, rate = begun[legs[:, DISK] == p.disk].max(axis=0)
+        acts, mass = p.stop - p.start, scenario.scene.mass[p.disk]
+        turned = 1 + angle + (spin + rate * acts) * acts
+        total += float(np.hypot(*p.force) / mass * acts * scenario.duration * turned)
+    return total
 
 
 def _row(event: Event) -> list[float]:

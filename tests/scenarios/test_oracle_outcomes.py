@@ -11,7 +11,7 @@ import pytest
 
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario, Scene, Thrust
+from scenarios.model import Scenario, Scene
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed, with_oracle
 from scenarios.truth.oracle import contact_finder
@@ -115,7 +115,6 @@ def test_the_truth_ends_where_there_is_no_more_of_it(
     assert states(one, record).reason == record.reason
 
 
-BODY = [Thrust(0, 0.0, 1.0, [1.0, 0.0], frame="body")]
 CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201, 2)), radius=[0.1] * 201, mass=[1] * 201, restitution=1)  # fmt: skip # noqa: E501
 
 
@@ -134,7 +133,6 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
             asked(replace(ROW, position=ROW.position * [1 - 2**-47, 1])),
             r"overlap by \d\.?\d*e-15 m at the start",
         ),
-        (asked(ROW, thrusts=BODY), "a thrust that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
         (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
         (

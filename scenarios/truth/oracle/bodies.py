@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.model import Array, Scene, Thrust
 from scenarios.truth.oracle.friction import Friction, limited
+from scenarios.truth.oracle.jets import count_pieces, push
 from scenarios.truth.oracle.numbers import Number, Numbers
 from scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
 
@@ -43,7 +44,8 @@ class Turn(NamedTuple):
 
 class Leg(NamedTuple):
     """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2 (with a `hop`, only the motion along
-    the wall); the contacts on which the disk rests; and its rotation, where there is friction."""
+    the wall); the contacts on which the disk rests; its rotation, where it matters; and the
+    acceleration, m/s2 in the axes of the disk, by a thrust that turns with it."""
 
     t: Number
     x: Number
@@ -55,6 +57,7 @@ class Leg(NamedTuple):
     hop: Hop | None = None
     held: tuple[Contact, ...] = ()
     turn: Turn | None = None
+    jet: tuple[Number, Number] | None = None
 
 
 class Frame(NamedTuple):
@@ -92,7 +95,7 @@ class Bodies:
             of centre and wall, where they touch at the start but for a rounding.
     """
 
-    def __init__(self, scene: Scene, k: Numbers) -> None:
+    def __init__(self, scene: Scene, k: Numbers, turning: bool = False) -> None:
         self.k, self.scene, exact = k, scene, k.exact
         ends = np.unique(scene.walls.reshape(-1, 2), axis=0)
         # The wall that a collision with an end point is listed under: the first with this end.
@@ -106,7 +109,8 @@ class Bodies:
             for row in np.hstack([positions, velocities, accelerations]).tolist()
         ]
         self.legs = [Leg(*row) for row in rows]
-        if scene.friction:
+        self.turning = turning or scene.friction > 0
+        if self.turning:
             turns = np.zeros((len(ends) + scene.n, 3))
             turns[: scene.n, :2] = np.stack([scene.angle, scene.angular_velocity], axis=-1)
             self.legs = [
@@ -137,6 +141,7 @@ class Bodies:
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
         self.nought, self.rates = nought, [nought for _ in self.legs]
+        self.jet: list[tuple[Number, Number] | None] = [None for _ in self.legs]
         self.no_slip_on: list[Contact | None] = [None for _ in self.legs]
         self.sliding = [0 for _ in self.legs]
         self.snug: dict[tuple[int, ...], Number] = {}
@@ -172,6 +177,8 @@ class Bodies:
     def state_at(self, i: int, now: Number) -> tuple[Number, Number, Number, Number]:
         """x, y m and vx, vy m/s of body i: x + v t + a t^2 / 2, v + a t."""
         leg = self.legs[i]
+        if leg.jet is not None and leg.t is not now:
+            return self.pushed(leg, now)
         if leg.t is now or self.shape[i] == STILL:
             return leg.x, leg.y, leg.vx, leg.vy
         s = now - leg.t
@@ -184,6 +191,20 @@ class Bodies:
             leg.vx + ux,
             leg.vy + uy,
         )
+
+    def pushed(self, leg: Leg, now: Number) -> tuple[Number, Number, Number, Number]:
+        """x, y m and vx, vy m/s on a leg with a thrust that turns with the disk."""
+        s, k, turn = now - leg.t, self.k, leg.turn
+        assert turn is not None
+        assert leg.jet is not None
+        pieces = count_pieces(float(turn.spin), float(turn.rate), float(s))
+        gain = push(leg.jet, turn.angle, turn.spin, turn.rate, s, pieces, k.bits)
+        # The series are cut at 2^-bits of the size of their sum.
+        cut = 2.0 ** -min(k.bits, 1000) * pieces * sum(abs(float(f)) for f in leg.jet)
+        (dx, dy), (du, dv) = [[x + k.between(-cut, cut) for x in part] for part in gain]
+        vx, vy = leg.vx + leg.ax * s, leg.vy + leg.ay * s
+        x, y = leg.x + (leg.vx + vx) * s / 2 + dx, leg.y + (leg.vy + vy) * s / 2 + dy
+        return x, y, vx + du, vy + dv
 
     def velocity_at(self, i: int, now: Number) -> Velocity:
         """vx, vy m/s, and rad/s where there is friction."""
@@ -212,8 +233,8 @@ class Bodies:
     def leg(self, i: int, now: Number, x: Number, y: Number, v: Velocity) -> Leg:
         """A leg of body i from (x, y) m with velocity v, on the contacts it rests on."""
         (vx, vy, spin), (ax, ay, rate) = v, self.acceleration(i)
-        turn = None if self.law.friction is None else Turn(self.turn_at(i, now).angle, spin, rate)
-        return Leg(now, x, y, vx, vy, ax, ay, turn=turn)
+        turn = Turn(self.turn_at(i, now).angle, spin, rate) if self.turning else None
+        return Leg(now, x, y, vx, vy, ax, ay, turn=turn, jet=self.jet[i])
 
     def across(self, edge: Contact, now: Number) -> None:
         """Move a disk that has reached an edge of the wrap to the opposite edge."""
@@ -229,21 +250,29 @@ class Bodies:
         """Body i is accelerated by all of `thrusts` from now on."""
         exact, inverse = self.k.exact, self.law.inverse_mass[i]
         a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
+        jet = [self.nought, self.nought]
         for thrust in thrusts:
-            a = [each + exact(float(force)) * inverse for each, force in zip(a, thrust.force)]
+            force = [exact(float(each)) * inverse for each in thrust.force]
+            if thrust.frame == "body":
+                jet = [each + more for each, more in zip(jet, force)]
+            else:
+                a = [each + more for each, more in zip(a, force)]
         kind = 2 + i if thrusts else (FALLING if self.scene.gravity.any() else STATIC)
         self.free[i] = kind, a[0], a[1]
-        if self.law.friction is not None:
+        if self.turning:
             torque = exact(float(sum(thrust.torque for thrust in thrusts)))
-            turns = self.law.friction.inverse_inertia[i]
-            self.rates[i] = torque * turns if any(p.torque for p in thrusts) else self.nought
+            inertia = exact(float(self.scene.inertia[i]))
+            self.rates[i] = torque / inertia if any(p.torque for p in thrusts) else self.nought
+        v, rolls = self.velocity_at(i, now), bool(self.held[i]) and not self.sliding[i]
+        turns = any(p.frame == "body" and p.force.any() for p in thrusts)
+        self.jet[i] = (jet[0], jet[1]) if turns else None
         held = tuple(
             c
             for c in self.held[i]
             if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0
         )
-        rolls = bool(self.held[i]) and not self.sliding[i]
-        self.hold(i, now, held, self.velocity_at(i, now), rolls)
+        self.hold(i, now, held, v, rolls)
+        self.asleep[i] = turns  # contacts of such a disk are found by `probe`
         # The walls on which it rested still touch it.
         self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
 
@@ -304,7 +333,7 @@ class Bodies:
         """ax, ay m/s2 and rad/s2 of body i on the contacts it rests on; also sets its kind."""
         if (common := self.common[i]) is not None:
             self.kind[i] = common[0]
-            return common[1], common[2], self.nought
+            return common[1], common[2], self.rates[i]
         kind, ax, ay = self.free[i]
         rate = self.rates[i]
         walls = [c for c in self.held[i] if c.kind == "wall"]

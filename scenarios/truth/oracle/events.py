@@ -30,6 +30,7 @@ from scenarios.truth.oracle.resting import (
     nearly_in_line,
     next_in_line,
     press,
+    probe,
     settle,
 )
 from scenarios.truth.oracle.ties import (
@@ -54,7 +55,7 @@ class Motion:
         self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: WorkLimit
     ) -> None:
         self.k, self.until, self.scene, self.work = k, until, scene, work
-        self.bodies = Bodies(scene, k)
+        self.bodies = Bodies(scene, k, turns_with_disk(thrusts))
         self.finder = ContactFinder(self.bodies)
         self.records: list[Record | None] = [None] * scene.n
         self.due = np.full(scene.n, np.inf)
@@ -73,6 +74,7 @@ class Motion:
             "end": self.leave,
             "rest": self.stop,
             "slip end": self.roll,
+            "probe": self.probe,
         }
 
     def run(self) -> Path:
@@ -179,6 +181,8 @@ class Motion:
     def predict(self, i: int) -> None:
         """Find the next contact of disk i."""
         k = self.k
+        if self.bodies.jet[i] is not None:
+            return self.probe(Contact("probe", i, i))
         now = float(self.now)
         left = self.until - now
         best: list[tuple[Number, Contact]] = []
@@ -516,6 +520,11 @@ class Motion:
                 raise MotionEnds(float(self.now), reason, sorted(other.disks))
         self.follow_up({i})
 
+    def probe(self, contact: Contact) -> None:
+        """Find how long a disk under a thrust that turns with it certainly touches nothing."""
+        after = probe(self.finder, contact.i, self.now)
+        self.expect(contact.i, self.now + self.k.exact(after), (contact,))
+
     def set_thrusts(self, disk: int) -> set[int]:
         """Begin or end a thrust; the disks whose motion that changes."""
         members = self.ungroup({disk})
@@ -528,9 +537,16 @@ class Motion:
         moving = sorted(i for i in disks if i < self.scene.n and not self.scene.static[i])
         for i in moving:
             self.path.legs[i].append(self.bodies.legs[i])
-        for i in moving:
-            if not self.bodies.asleep[i]:
+        # Others may have become faster than a disk under a thrust that turns with it was told.
+        jets = [i for i, jet in enumerate(self.bodies.jet) if jet is not None and i not in moving]
+        for i in moving + jets:
+            if not self.bodies.asleep[i] or self.bodies.jet[i] is not None:
                 self.predict(i)
+
+
+def turns_with_disk(thrusts: Sequence[Thrust]) -> bool:
+    """Whether one of these thrusts turns with its disk."""
+    return any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts)
 
 
 def trace(

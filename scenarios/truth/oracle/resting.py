@@ -38,6 +38,7 @@ SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disk
 # A series that takes more bounces than this to lose all but `SMALL` of its speed is followed bounce
 # by bounce, within the limits of work: it would be a list of any length.
 SMALL, MOST_BOUNCES = 1e-9, 100_000
+CLOSE = 1e-9  # radii; a disk that comes so near under a thrust that turns with it touches
 FAR = 1e-12  # relative to the largest coordinate, added to those lengths
 # relative to the largest coordinate: how far the four ends of two walls in line are off the line by
 # their own rounding and that of the check, a few units in the last place
@@ -66,7 +67,7 @@ def settle(
     fall = -bodies.outward(contact, leg.ax, leg.ay)
     if k.sign(fall) <= 0 or not slip_stays(finder, contact, thrusts):
         return None
-    if log(SMALL) / log(finder.scene.restitution) > MOST_BOUNCES:
+    if log(SMALL) / log(finder.scene.restitution) > MOST_BOUNCES or any(bodies.jet):
         return None
     speed = bodies.outward(contact, leg.vx, leg.vy)
     stop = now + 2 * speed / (fall * (1 - bodies.law.restitution))
@@ -140,6 +141,34 @@ def untouched(
     rest = [k for k in range(len(scene.walls)) if k not in known]
     _, distance = nearest(np.array([[x, y]]), scene.walls[rest])
     return bool((distance - bodies.radii[i] > own * SAFE + slack).all())
+
+
+def probe(finder: ContactFinder, i: int, now: Number) -> float:
+    """s for which disk i touches nothing under a thrust that turns with it, if the others do not
+    collide; raises `MotionEnds` where it may touch something."""
+    bodies, scene, t = finder.bodies, finder.scene, float(now)
+    rows = np.array([moved(row, t) for row in bodies.table])
+    for j in [j for j, leg in enumerate(bodies.legs) if leg.jet is not None]:
+        rows[j, :4] = [float(value) for value in bodies.state_at(j, now)]
+    thrust = np.array([sum(abs(float(f)) for f in jet or ()) for jet in bodies.jet])
+    fall = np.array([float(leg.hop.fall) if leg.hop else 0.0 for leg in bodies.legs])
+    fast = np.hypot(*rows[:, 2:4].T) + [float(g.hop.speed) if g.hop else 0.0 for g in bodies.legs]
+    pull = np.hypot(*rows[:, 4:6].T) + thrust + fall
+    heights = np.array([hop_height(leg) for leg in bodies.legs])
+    gap = np.hypot(*(rows[:, :2] - rows[i, :2]).T) - bodies.radii - bodies.radii[i] - heights
+    gap[i] = 1e9  # m
+    _, walls = nearest(rows[i : i + 1, :2], scene.walls)
+    edges = [] if scene.wrap is None else np.abs(scene.wrap - rows[i, :2]).ravel()
+    still = np.zeros(len(scene.walls) + len(edges))
+    gaps = np.concatenate([gap, walls[0] - bodies.radii[i], edges])
+    speed, more = fast[i] + np.append(fast, still), pull[i] + np.append(pull, still)
+    first = int(np.argmin(gaps))
+    if gaps[first] <= CLOSE * bodies.radii[i]:
+        names = [bodies.name(Contact("body", i, j)) for j in range(len(fast))]
+        names += [f"wall {w}" for w in range(len(scene.walls))] + ["the edge of the wrap"] * 4
+        reason = f"disk {i} touches {names[first]} while a thrust that turns with it acts"
+        raise MotionEnds(t, f"{reason}, and has no exact contact time then,")
+    return float((2 * gaps / (speed + np.sqrt(speed**2 + 2 * more * gaps))).min()) / SAFE
 
 
 def room(finder: ContactFinder, contact: Contact, leg: Leg) -> float:

@@ -34,7 +34,7 @@ class Contact(NamedTuple):
 
     kind: "body", disk j or an end point (j from n on); "wall", a side of wall j; "edge", of the
     wrap across axis j; "end", of wall j on which it rests; "rest", its bounces on a side of wall j
-    have died out; "slip end", its slip on wall j ends.
+    have died out; "slip end", its slip on wall j ends; "probe", until then it touches nothing.
     """
 
     kind: str
