@@ -20,9 +20,11 @@ from scenarios.truth.oracle.contacts import Pressed
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import Event, MotionEnds, Path, RecentCollisions, Record, ambiguous
 from scenarios.truth.oracle.resting import (
+    NO_GAP,
     NO_MATTER,
     NoLimit,
     below,
+    gap_of,
     in_step_after,
     lasting,
     lie_down,
@@ -323,6 +325,8 @@ class Motion:
                 end.few_bits = fault.few_bits
                 raise end from None
             return
+        if limit is None and len(touches) > 1 and gap_of(self.finder, touches, self.now) <= NO_GAP:
+            limit = bodies.law.closed(touches, v, frozenset())
         if limit is None:
             return
         contacts = [contact for contact in contacts if contact in limit.still]
@@ -335,6 +339,7 @@ class Motion:
             for event in self.path.events
             if float(event.t) <= since or not pairs & {(event.i, event.j), (event.j, event.i)}
         ]
+        self.log_all(limit.collisions, [])
         recent.close(contacts, now)
         first = contacts[0]
         rolls = len(contacts) == 1 and bodies.no_slip_on[first.i] == first

@@ -50,6 +50,8 @@ TOUCHING = 4
 # factor bounds the limit by the impulses that are left. Gaps are then some 1e-50 m, which takes so
 # many bits where small numbers count as zero.
 LEFT_OVER, SPARE_LIMIT, FOR_SERIES = 1e-10, 1e3, 512
+# In radii: where a disk is squeezed between others the gaps end before the speeds do.
+NO_GAP = 1e-26
 NO_MATTER = 1e-4  # share of a rounding below which it does not matter how disks collide
 APART = 1e6  # of two speeds that belong to different series
 
@@ -325,7 +327,7 @@ def limit_of_series(
     least = share * np.finfo(float).eps * scene.radius.min() / (rest + 1)
     # A disk may bounce to its rest on one wall between two bounces on another one.
     slow = [speed for speed in fast if speed <= least]
-    if slow and all(speed > APART * max(slow) for speed in fast if speed > least):
+    if share == LEFT_OVER and slow and all(speed > APART * max(slow) for speed in fast if speed > least):
         touches = [touch for touch, speed in zip(touches, fast) if speed <= least]
     matrix, speeds = delassus(law, touches), [law.approach(touch, v) for touch in touches]
     ends = any(t.contact.kind == "body" and t.contact.j >= scene.n for t in touches)
@@ -344,6 +346,17 @@ def limit_of_series(
     return TieOutcome(
         apply(law, touches, forces, v), [], frozenset(touch.contact for touch in touches)
     )
+
+
+def gap_of(finder: ContactFinder, touches: Sequence[Touch], now: Number) -> float:
+    """The largest gap of these contacts over the radius of its disk."""
+    bodies, gaps = finder.bodies, list[float]()
+    for contact, dx, dy in touches:
+        x, y, _, _ = bodies.state_at(contact.i, now)
+        wall = contact.kind == "wall"
+        distance = bodies.height(contact, x, y) if wall else finder.k.sqrt(dx * dx + dy * dy)
+        gaps.append(float((distance - bodies.reach(contact)) / bodies.radius[contact.i]))
+    return max(gaps)
 
 
 def closed(finder: ContactFinder, touch: Touch, now: Number) -> bool:
