@@ -25,6 +25,7 @@ coordinates of the partners and walls of a disk.
 
 from __future__ import annotations
 
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -293,11 +294,8 @@ class TangentVectors:
             self.carry(i, t)
         legs, k = self.path.legs[i], self.leg[i]
         x, v = along(legs[k], t)
-        following = legs[k]  # the last one from this instant on: a disk that lands may roll at once
-        for leg in legs[k + 1 :]:
-            if float(leg.t) != t:
-                break
-            following = leg
+        # The last one from this instant on: a disk that lands may roll at once.
+        following = [legs[k], *takewhile(lambda leg: float(leg.t) == t, legs[k + 1 :])][-1]
         after = acceleration(following)
         collided = self.collided_at[i] == t
         before, v = (after, self.v[i]) if collided else (acceleration(legs[k]), v)

@@ -476,8 +476,9 @@ class Motion:
         )
         following = next_in_line(self.finder, held[0], contact.side)
         if bodies.group[i]:
-            self.leave_as_one(contact, following)
-        elif following is None:
+            reason = f"disk {i} reaches the end of wall {contact.j} while it touches another"
+            raise MotionEnds(float(self.now), reason, [i])
+        if following is None:
             _, ax, ay = bodies.free[i]
             slow = v[0] * v[0] + v[1] * v[1] + bodies.radius[i] * bodies.outward(held[0], ax, ay)
             if k.sign(slow) <= 0 or len(bodies.held[i]) > 1:
@@ -497,17 +498,6 @@ class Motion:
         else:
             bodies.hold(i, self.now, (following,), v, not bodies.sliding[i])
         self.follow_up({i})
-
-    def leave_as_one(self, contact: Contact, following: Contact | None) -> None:
-        """Move a disk of a group onto the next wall in line."""
-        bodies, i = self.bodies, contact.i
-        if following is None:
-            reason = f"disk {i} slides off the end of wall {contact.j} while it touches another"
-            raise MotionEnds(float(self.now), reason, [i])
-        held = tuple(
-            following if c.kind == "wall" and c.j == contact.j else c for c in bodies.held[i]
-        )
-        bodies.hold(i, self.now, held, bodies.velocity_at(i, self.now), True, bodies.common[i])
 
     def wrap(self, contact: Contact) -> None:
         """Move a disk to the opposite edge of the wrap; if it overlaps another one there, there is

@@ -226,27 +226,13 @@ def hop_height(leg: Leg) -> float:
 
 def press(finder: ContactFinder, contact: Contact, now: Number) -> bool:
     """Let a disk rest on a wall that it touches without normal speed and is accelerated towards;
-    False if it cannot.
-
-    It can rest on a second wall that is perpendicular to the first one, or if it is at rest between
-    the two.
-    """
+    False if it rests on something already: then the forces decide, see `lasting`."""
     bodies, i = finder.bodies, contact.i
-    if contact.kind != "wall":
+    if contact.kind != "wall" or bodies.held[i]:
         return False
-    held, v = bodies.held[i], bodies.velocity_at(i, now)
-    if held:
-        still = not bodies.table[i, 2:4].any()
-        _, ax, ay = bodies.free[i]
-        if len(held) > 1 or held[0].kind != "wall" or bodies.law.friction is not None:
-            return False
-        wedged = (
-            still and bodies.k.sign(bodies.outward(held[0], *bodies.slide(contact, ax, ay))) < 0
-        )
-        if not wedged and not bodies.stays_still(held[0], contact):
-            return False
+    v = bodies.velocity_at(i, now)
     rolls = bodies.no_slip_on[i] == contact and bodies.legs[i].t is now
-    bodies.hold(i, now, (*held, contact), (*along(bodies, contact, *v[:2]), v[2]), rolls)
+    bodies.hold(i, now, (contact,), (*bodies.slide(contact, *v[:2]), v[2]), rolls)
     return True
 
 
@@ -288,7 +274,10 @@ def lasting(finder: ContactFinder, contact: Contact, now: Number) -> list[Group]
     ):
         return []  # friction acts
     for touch in pressed:
-        if touch.contact.kind == "body" and rolls_over(finder, touch, v, after):
+        at_rest = in_step(finder, touch.contact)
+        if touch.contact.kind == "body" and (
+            slides(k, touch, after) or (not at_rest and slides(k, touch, v))
+        ):
             raise MotionEnds(float(now), *upper_and_lower(finder, touch))
     contacts = [touch.contact for touch in pressed]
     groups = [
@@ -327,7 +316,11 @@ def limit_of_series(
     least = share * np.finfo(float).eps * scene.radius.min() / (rest + 1)
     # A disk may bounce to its rest on one wall between two bounces on another one.
     slow = [speed for speed in fast if speed <= least]
-    if share == LEFT_OVER and slow and all(speed > APART * max(slow) for speed in fast if speed > least):
+    if (
+        share == LEFT_OVER
+        and slow
+        and all(speed > APART * max(slow) for speed in fast if speed > least)
+    ):
         touches = [touch for touch, speed in zip(touches, fast) if speed <= least]
     matrix, speeds = delassus(law, touches), [law.approach(touch, v) for touch in touches]
     ends = any(t.contact.kind == "body" and t.contact.j >= scene.n for t in touches)
@@ -362,10 +355,7 @@ def gap_of(finder: ContactFinder, touches: Sequence[Touch], now: Number) -> floa
 def closed(finder: ContactFinder, touch: Touch, now: Number) -> bool:
     """Whether a contact that touches has no speed along its normal."""
     bodies, contact = finder.bodies, touch.contact
-    pair = tuple(sorted((contact.i, contact.j)))
-    if contact.kind == "body" and finder.touches_now(contact, now) and pair in bodies.in_step:
-        return True
-    if any(key(contact) == key(c) for c in bodies.held[contact.i]):
+    if in_step(finder, contact) or key(contact) in map(key, bodies.held[contact.i]):
         return True
     v = {i: bodies.velocity_at(i, now) for i in contact.disks}
     return bodies.k.sign(bodies.law.approach(touch, v)) == 0
@@ -376,7 +366,7 @@ def turning(finder: ContactFinder, touch: Touch, v: Velocities) -> Number:
     step."""
     contact = touch.contact
     if contact.kind != "body" or in_step(finder, contact):
-        return finder.k.exact(0.0)
+        return finder.bodies.nought
     (ux, uy, _), (px, py, _) = v[contact.i], v[contact.j]
     return (px - ux) * (px - ux) + (py - uy) * (py - uy)
 
@@ -385,19 +375,13 @@ def in_step(finder: ContactFinder, contact: Contact) -> bool:
     """Whether two bodies are known to have the same velocity: since they met, or as one group."""
     bodies, (i, j) = finder.bodies, sorted((contact.i, contact.j))
     counts = bodies.count[i], bodies.count[j]
-    return j in bodies.group[i] or bodies.in_step.get((i, j)) == counts
+    return contact.kind == "body" and (j in bodies.group[i] or bodies.in_step.get((i, j)) == counts)
 
 
-def rolls_over(finder: ContactFinder, touch: Touch, v: Velocities, after: Velocities) -> bool:
-    """Whether one of two disks that are pressed together moves or is accelerated along the
-    other."""
-    contact, sign = touch.contact, finder.k.sign
-    parts = [after] if in_step(finder, contact) else [v, after]
-    for part in parts:
-        (ux, uy, _), (px, py, _) = part[contact.i], part[contact.j]
-        if sign(touch.dx * (py - uy) - touch.dy * (px - ux)):
-            return True
-    return False
+def slides(k: Numbers, touch: Touch, v: Velocities) -> bool:
+    """Whether one of two disks moves, or is accelerated, along the other."""
+    (ux, uy, _), (px, py, _) = v[touch.contact.i], v[touch.contact.j]
+    return k.sign(touch.dx * (py - uy) - touch.dy * (px - ux)) != 0
 
 
 def in_step_after(
@@ -413,7 +397,7 @@ def in_step_after(
         for touch in touches
         if touch.contact.kind == "body"
         and key(touch.contact) in {key(c) for c in outcome.still}
-        and not may_slip(k, touch, velocities)
+        and not may_slide(k, touch, velocities)
     ]
     contacts = [*pairs, *walls]
     for members in joined(finder.scene, contacts):
@@ -423,11 +407,10 @@ def in_step_after(
     return velocities, pairs
 
 
-def may_slip(k: Numbers, touch: Touch, v: Velocities) -> bool:
+def may_slide(k: Numbers, touch: Touch, v: Velocities) -> bool:
     """Whether two disks move along each other, or it is not decided that they do not."""
-    (ux, uy, _), (px, py, _) = v[touch.contact.i], v[touch.contact.j]
     try:
-        return k.sign(touch.dx * (py - uy) - touch.dy * (px - ux)) != 0
+        return slides(k, touch, v)
     except Undecided:
         return True
 
