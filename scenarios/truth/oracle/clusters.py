@@ -10,35 +10,18 @@ solution l >= 0, w >= 0, l w = 0 (Cottle, Pang & Stone, The Linear Complementari
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from scenarios.model import Array
 from scenarios.truth.oracle.numbers import Number, Numbers
 
-if TYPE_CHECKING:
-    from scenarios.truth.oracle.ties import CollisionLaw, Touch
-
 MOST_PIVOTS = 300
 # Orders of collisions at one instant with 0 < e < 1: states whose ratios agree within this are one
 ALIKE = 0.01
 MOST_STATES = 40_000
 MARGIN = 1.5  # every order stays by this factor below the ratio at which collisions could end
-
-
-def delassus(law: CollisionLaw, touches: Sequence[Touch]) -> list[list[Number]]:
-    """(K, K) the change of dr.dv of each contact by 1 impulse, times dr, at each."""
-    return [[_coupling(law, one, other) for other in touches] for one in touches]
-
-
-def _coupling(law: CollisionLaw, one: Touch, other: Touch) -> Number:
-    a, b, total = one.contact, other.contact, law.numbers.exact(0.0)
-    for body in a.disks & b.disks:
-        product = law.inverse_mass[body] * (one.dx * other.dx + one.dy * other.dy)
-        total = total + product if (body == a.i) == (body == b.i) else total - product
-    return total
 
 
 def is_m_matrix(k: Numbers, matrix: Sequence[Sequence[Number]]) -> bool:
@@ -111,6 +94,8 @@ def collapse(matrix: Array, impulses: Array, restitution: float) -> bool:
     orders are followed until their ratios repeat. That is no proof, as states within `ALIKE` are
     taken for one; `MARGIN` is what this may be wrong by.
     """
+    if not impulses.min() > 0:  # or below what float64 can tell from 0
+        return False
     coupling = np.abs(matrix) / np.diag(matrix)[:, None]
     np.fill_diagonal(coupling, 0.0)
     begin = impulses / impulses.max()
@@ -132,20 +117,3 @@ def collapse(matrix: Array, impulses: Array, restitution: float) -> bool:
         if len(known) > MOST_STATES:
             return False
     return True
-
-
-def apply(
-    law: CollisionLaw, touches: Sequence[Touch], forces: Mapping[int, Number], v: dict[int, Vector]
-) -> dict[int, Vector]:
-    """The vectors v (x, y, spin) of bodies after these impulses, or under these forces."""
-    after = dict(v)
-    for a, force in forces.items():
-        contact, dx, dy = touches[a]
-        for body, way in ((contact.i, -1), (contact.j, 1))[: len(contact.disks)]:
-            x, y, spin = after[body]
-            kick = way * force * law.inverse_mass[body]
-            after[body] = x + kick * dx, y + kick * dy, spin
-    return after
-
-
-Vector = tuple[Number, Number, Number]

@@ -27,12 +27,12 @@ from scenarios.truth.oracle.bodies import (
     rational,
     square_to,
 )
-from scenarios.truth.oracle.clusters import apply, complementary, delassus, solve
+from scenarios.truth.oracle.clusters import complementary, solve
 from scenarios.truth.oracle.contact_finder import ContactFinder, line_span
 from scenarios.truth.oracle.filter import moved
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import MotionEnds
-from scenarios.truth.oracle.ties import Contact, TieOutcome, Touch, Velocities, key
+from scenarios.truth.oracle.ties import Contact, TieOutcome, Touch, Velocities, apply, delassus, key
 
 SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disks cannot meet
 # A series that takes more bounces than this to lose all but `SMALL` of its speed is followed bounce

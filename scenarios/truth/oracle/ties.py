@@ -11,13 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenarios.truth.oracle.clusters import (
-    apply,
-    collapse,
-    complementary,
-    delassus,
-    is_m_matrix,
-)
+from scenarios.truth.oracle.clusters import collapse, complementary, is_m_matrix
 from scenarios.truth.oracle.friction import Friction, limited
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
@@ -346,3 +340,30 @@ class CollisionLaw:
 
     def _same(self, one: Mapping[int, Velocity], other: Mapping[int, Velocity]) -> bool:
         return all(self.numbers.sign(a - b) == 0 for i in one for a, b in zip(one[i], other[i]))
+
+
+def delassus(law: CollisionLaw, touches: Sequence[Touch]) -> list[list[Number]]:
+    """(K, K) the change of dr.dv of each contact by 1 impulse, times dr, at each."""
+    return [[_coupling(law, one, other) for other in touches] for one in touches]
+
+
+def _coupling(law: CollisionLaw, one: Touch, other: Touch) -> Number:
+    a, b, total = one.contact, other.contact, law.numbers.exact(0.0)
+    for body in a.disks & b.disks:
+        product = law.inverse_mass[body] * (one.dx * other.dx + one.dy * other.dy)
+        total = total + product if (body == a.i) == (body == b.i) else total - product
+    return total
+
+
+def apply(
+    law: CollisionLaw, touches: Sequence[Touch], forces: Mapping[int, Number], v: Velocities
+) -> Velocities:
+    """The vectors v (x, y, spin) of bodies after these impulses, or under these forces."""
+    after = dict(v)
+    for a, force in forces.items():
+        contact, dx, dy = touches[a]
+        for body, way in ((contact.i, -1), (contact.j, 1))[: len(contact.disks)]:
+            x, y, spin = after[body]
+            kick = way * force * law.inverse_mass[body]
+            after[body] = x + kick * dx, y + kick * dy, spin
+    return after
