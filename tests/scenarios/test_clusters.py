@@ -151,3 +151,26 @@ def test_impulses_of_a_bent_chain_are_the_limit_of_many_small_ones():
             )
         assert exact is not None
         np.testing.assert_allclose([float(exact.get(a, 0)) for a in range(n)], force, atol=1e-9)
+
+
+def test_a_disk_does_not_stay_in_the_air_when_the_one_below_is_pushed_away():
+    """It would roll over it from 0.5 s on; it stood still there until a collision."""
+    pile = column([1, 1], [0.0, 0.0], 0.5)
+    record = computed(asked(pile, 2.0, thrusts=[Thrust(0, 0.5, 1.0, [3.0, 0.0])]))
+    assert record.reason == "disk 1 rolls over disk 0 at t = 0.5 s"
+
+
+def test_a_disk_that_lies_on_a_static_one_between_others_stays():
+    """It touches a static disk at its side, too, without a force."""
+    scene = lay_out(
+        position=[[0, 0.5], [0, 1.5], [1, 1.5]],
+        velocity=np.zeros((3, 2)),
+        radius=[0.5] * 3,
+        mass=[np.inf, 1, np.inf],
+        gravity=[0, -8],
+        restitution=0.02,
+    )
+    one = asked(scene, 2.0)
+    record = computed(one)
+    assert record.reason == ""
+    assert (states(one, record).position == scene.position).all()

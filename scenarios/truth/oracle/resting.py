@@ -283,7 +283,8 @@ def lasting(finder: ContactFinder, contact: Contact, now: Number) -> list[Group]
     groups = [
         move_as_one(finder, members, contacts, v) for members in joined(finder.scene, contacts)
     ]
-    return [group for group in groups if len(group.contacts) > 1]  # `press` does the others
+    # `press` does a disk on one wall alone.
+    return [g for g in groups if len(g.contacts) > 1 or g.contacts[0].kind == "body"]
 
 
 class NoLimit(ArithmeticError):
