@@ -212,7 +212,7 @@ TWO_CONTACTS = {
     ],
 )
 def test_two_contacts_that_last_are_refused_by_name(name: str, reason: str):
-    """The engine refuses rather than go on; so does the oracle, unless friction does not act. Without
+    """The engine refuses rather than go on; so does the oracle, where friction acts. Without
     friction, or without the second contact, both have an answer."""
     scene = TWO_CONTACTS[name]
     assert reason in computed(asked(scene)).reason
