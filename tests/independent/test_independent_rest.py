@@ -101,7 +101,7 @@ def test_balls_on_slopes_in_small_steps_are_as_near_as_their_step(count: int):
         assert abs(spin[0, 0] - w) * scene.radius[0] < c * STEP * 4 + 12 * g * STEP, seed
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(150, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [20])
 def test_columns_come_to_rest_as_in_the_plain_motion(count: int):
     """Heights to 1e-11 m up to the horizon. An answer ends only where the order of collisions may
     decide, or is not known not to; four of five last to the end."""
