@@ -231,6 +231,10 @@ def truth(
         bool,
         typer.Option("--events", help="Print all collisions, not only the first and last ten."),
     ] = False,
+    at: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Print where each disk is then, and how it moves."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
@@ -238,11 +242,12 @@ def truth(
     """Print the exact answer to a scene.
 
     Shows its collisions, its horizon (the time up to which it holds, and what ends it), and its
-    error bound.
+    error bound. With --at, shows position, velocity, angle and spin of each disk at that time; at
+    the instant of a collision, those after it.
     """
     from reports.commands.truth import show_truth
 
-    show_truth(scene, seed, events, as_json, timeout)
+    show_truth(scene, seed, events, at, as_json, timeout)
 
 
 @app.command()
