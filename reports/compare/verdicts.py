@@ -29,6 +29,7 @@ from adapters.engine_row import FLOAT64
 from adapters.run import Run
 from reports.compare import laws, scales, violations
 from reports.compare.against import ITSELF
+from reports.compare.restitution import TINY
 from reports.compare.view import View, rounding_of
 from scenarios.model import Array, Scenario, Trajectory
 
@@ -294,10 +295,12 @@ class Judge:
                     yield float(t[k + 1]), disk, other
 
     def overlap(self, pair: Pair) -> Verdict:
-        """The overlap of a disk with the others that is farthest above its bound: 0.1 R and the
-        approach in two steps; or 0.1 R alone, if it stays for three samples.
+        """The overlap of a disk with the others that is farthest above its bound: 0.1 R and what
+        the fastest disk moves in two steps; or, if it stays for three samples, what these two do at
+        the slowest of them.
 
-        A right engine that detects collisions at the end of a step overlaps by the approach in it.
+        A right engine that detects collisions at the end of a step overlaps by the approach in it:
+        a fast disk in a narrow gap at every sample.
         """
         depth, number = pair.overlap / pair.smaller, np.arange(len(self.played))[:, None]
         seen = np.flatnonzero((depth > 0).any(axis=0))
@@ -305,12 +308,14 @@ class Judge:
             return Verdict("overlap", 0.0, MOST_OVERLAP)
         depth, allowed = depth[:, seen], MOST_OVERLAP + np.zeros((len(depth), len(seen)))
         allowed += 2 * self.dt * self.speed[:, None] / pair.smaller[seen]
+        v, way = self.played.velocity, pair.way[:, seen]
+        v = (v[:, pair.others[seen]] if pair.others[0] >= 0 else 0.0) - v[:, [pair.disk]]
+        nears = np.abs((v * way).sum(axis=2)) / np.maximum(laws.lengths(way), TINY)
+        bound = MOST_OVERLAP + 2 * self.dt * least_of_three(nears) / pair.smaller[seen]
         stays = least_of_three(depth)
-        stays = np.where(depth[2:] >= STAYS * depth[:-2], stays, 0.0)
-        lasting = np.zeros(depth.shape, bool)
-        lasting[2:] = stays > MOST_OVERLAP
-        allowed[lasting] = MOST_OVERLAP
-        depth = np.where(lasting, np.concatenate([depth[:2], stays]), depth)
+        lasting = (depth[2:] >= STAYS * depth[:-2]) & (stays > bound)
+        allowed[2:] = np.where(lasting, bound, allowed[2:])
+        depth[2:] = np.where(lasting, stays, depth[2:])
         if self.jumps.any():
             # not one that they are set into: they were apart after the last jump of either
             ends = np.where(pair.others >= 0, pair.others, pair.disk)[seen]

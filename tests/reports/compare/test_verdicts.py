@@ -115,6 +115,14 @@ def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step
     assert judging.laws.penetration(played.trajectory, one.scene).max() > judging.MOST_OVERLAP
 
 
+def test_a_right_engine_may_overlap_at_each_sample_where_a_fast_disk_has_a_narrow_gap():
+    """25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due."""
+    one, truth = truth_of("galperin_314")
+    played = play(ENGINES["reference:coulomb"].make(), "reference:coulomb", one, one.dt(1))
+    assert played.trajectory is not None
+    assert not [v for v in verdicts(one, played.trajectory, played.dt, truth=truth) if v.failed]
+
+
 # Negative controls.
 
 
@@ -138,6 +146,13 @@ def test_an_engine_that_sinks_slowly_fails():
     assert found["overlap"].disks == (0, -1)
     assert found["sinks"].value == pytest.approx(0.27, rel=0.02)
     assert failed(one, moved(truth, down / 10), truth) == {}
+
+
+def test_a_ball_that_rolls_inside_the_floor_fails_at_any_speed():
+    one, truth = truth_of("rest_on_floor")
+    sunk = moved(truth, np.full(truth.position[:, 0].shape, [0.0, -0.2 * one.scene.radius[0]]))
+    rolling = replace(sunk, velocity=sunk.velocity + [100.0, 0.0])
+    assert failed(one, rolling)["overlap"].value == pytest.approx(0.2, rel=0.02)
 
 
 def test_an_engine_that_lets_a_supported_disk_creep_away_fails():
