@@ -81,6 +81,31 @@ def test_a_disk_that_wraps_past_a_wall_does_not_tunnel():
         assert failed_by("wrap_wall", engine, 4) == {}, engine
 
 
+def test_a_sample_on_the_edge_of_a_torus_is_no_way_across_the_box():
+    one, _ = case("wrap_wall")
+    fast = replace(one, scene=replace(one.scene, velocity=[[0.5 / one.sample_interval, 0.0]]))
+    played = play(row_of("event_driven:float64").make(), "event_driven:float64", fast, fast.dt(1))
+    assert played.trajectory is not None
+    assert -2.0 in played.trajectory.position[:, 0, 0].round(12)
+    assert failed(fast, played.trajectory) == {}
+
+
+@pytest.mark.parametrize("offset", [-0.5, 0.5])
+def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offset: float):
+    """A fall of a tenth of a second at 1/60 s: half a step is an eighth of its energy."""
+    one, _ = truth_of("bouncing_ball_e1")
+    dt = 1 / 60
+    t = np.arange(9) * dt
+    fall = t[:, None, None] * one.scene.gravity
+    v, still = fall + offset * dt * one.scene.gravity * (t > 0)[:, None, None], np.zeros((9, 1))
+    played = Trajectory(t, one.scene.position + fall * t[:, None, None] / 2, v, still, still)
+    ground = [[[-5.0, -0.1], [5.0, -0.1]]] + one.scene.position[0] - [0.0, one.scene.radius[0]]
+    short = replace(one, scene=replace(one.scene, walls=ground), truth=None, duration=t[-1])
+    found = {verdict.id: verdict for verdict in verdicts(short, played, dt)}
+    assert not found["energy_gained"].failed
+    assert not found["energy_lost"].failed
+
+
 def test_a_disk_that_rolls_over_the_pieces_of_a_floor_does_not_tunnel():
     one, truth = truth_of("friction_bounce_e0_mu05")
     pieces = [[[x, 0.0], [x + 0.1, 0.0]] for x in np.arange(-80, 80) / 10]
