@@ -307,8 +307,8 @@ class Judge:
         k, m = np.unravel_index(int(np.argmax(depth - allowed)), depth.shape)
         above = ~(depth[:, m] <= allowed[:, m])
         at = self.played.t[np.argmax(above) if above.any() else k]
-        who = pair.disk, int(pair.others[seen[m]])
-        return Verdict("overlap", float(depth[k, m]), float(allowed[k, m]), float(at), who)
+        who, value = (pair.disk, int(pair.others[seen[m]])), max(float(depth[k, m]), 0.0)
+        return Verdict("overlap", value, float(allowed[k, m]), float(at), who)
 
     # Energy and momentum.
 
@@ -354,8 +354,10 @@ class Judge:
         scenario, t = self.scenario, self.played.t
         off = violations.momentum(View(scenario, self.dt, self.played))
         if off is not None:
-            # each step rounds each velocity once
-            bound = max(MOST_MOMENTUM, self.rounding * float(t[-1]) / self.dt)
+            # each step rounds each velocity once; free fall adds to the momentum at hand
+            momenta = laws.lengths(laws.momenta(self.played, scenario.scene)).sum(axis=1).max()
+            share = max(1.0, float(momenta) / (scales.momentum(scenario) or 1.0))
+            bound = max(MOST_MOMENTUM, self.rounding * share * float(t[-1]) / self.dt)
             yield worst_of("momentum", t, off, bound)
         if not self.g or scenario.thrusts:
             return

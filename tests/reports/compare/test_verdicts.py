@@ -106,6 +106,16 @@ def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offse
     assert not found["energy_lost"].failed
 
 
+def test_the_rounding_of_a_long_fall_is_no_momentum():
+    """At the end the momentum is twenty times that of the start, to which errors are relative."""
+    one, _ = truth_of("head_on_equal_e1")
+    fall = replace(one.scene, gravity=[0.0, -10.0], velocity=[[-1.0, 0.0], [0.0, 1.0]])
+    one = replace(one, scene=fall, truth=None, duration=3.0, sample_interval=0.02)
+    name = "box2d_v3:matched"
+    played = play(row_of(name).make(), name, one, 0.005)
+    assert judging.first_failed(played, one, None) is None
+
+
 def test_a_disk_that_rolls_over_the_pieces_of_a_floor_does_not_tunnel():
     one, truth = truth_of("friction_bounce_e0_mu05")
     pieces = [[[x, 0.0], [x + 0.1, 0.0]] for x in np.arange(-80, 80) / 10]
