@@ -71,6 +71,17 @@ def test_a_disk_that_lands_and_lies_has_no_restitution(engine: str, rung: int):
     assert read("restitution_error", "sinks_in", engine, rung).value < 1e-15
 
 
+@pytest.mark.parametrize("engine", ["event_driven:float64", "reference:ordered", "pymunk:matched"])
+def test_a_disk_that_lands_just_before_the_end_has_no_restitution(engine: str):
+    """It lands at 1.01 of 1.05 s; nothing after the last sample tells that it lies."""
+    higher = replace(case("sinks_in").scene, position=[[0.0, 0.5 + 5.1005]])
+    early = replace(case("sinks_in"), scene=higher, truth=None, duration=1.05, substeps=(4,))
+    run = play(ENGINES[engine].make(), engine, early, early.dt(4))
+    value = METRICS["restitution"].of(beside(early, run, None, None))
+    assert value is not None
+    assert value.value == pytest.approx(0, abs=1e-15)
+
+
 def test_a_disk_that_bounces_as_low_is_told_from_one_that_lies():
     """The control: e = 0.15 where 0 is stated, in the same scene."""
     scenario = case("sinks_in")
