@@ -130,12 +130,12 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_tunnelled(view: View) -> Value | None:
-    """Number of disks whose centre has crossed a wall between two samples (tunnelling). A wrap
-    crosses nothing."""
+    """Number of disks whose centre has crossed a wall between two samples, and had no time to go
+    round its end (tunnelling). A wrap crosses nothing."""
     if not len(view.scenario.scene.walls):
         return None
-    through = np.flatnonzero(laws.tunnelled(view.played, view.scenario.scene))
-    return Value(len(through), int(through[0]) if len(through) else -1)
+    disks = {disk for _, disk, _ in laws.wall_crossings(view.played, view.scenario.scene)}
+    return Value(len(disks), min(disks, default=-1))
 
 
 def position_rms(view: View) -> Value | None:

@@ -64,7 +64,8 @@ def effective_restitution(
     speed v by g dt and the separating speed by as much, so that e is known to (1 + e) g dt / v
     only. Of these values the one nearest to what the scene states is taken: an engine that is exact
     reads as exact, whenever in a step its disk meets the floor. A disk that lies on something
-    before or after the collision does not fall there: its own acceleration counts.
+    before or after the collision does not fall there: its own acceleration counts, and at the last
+    sample, where it is not known, both are possible.
 
     An engine with soft contacts takes several steps for a collision: it is read at the first sample
     at which the two no longer approach. If the bodies still approach after the impulse, they pass
@@ -112,9 +113,12 @@ def effective_restitution(
     late = (closing > slowest) & ~fast & ~grazes
     lies = closing <= slowest / 5  # the weight of a disk that lies
     below, unfinished = int(noise.sum() + grazes.sum()), int((~over).sum() + late.sum())
-    first = separating[fast] / closing[fast]
+    still = velocities(trajectory, read, after, 0 * falls[1])
+    lying = np.vecdot(still[:, 0] - still[:, 1], normal)
+    lying = np.where((after == len(t) - 1) & (held == 0), lying, separating)
+    first, third = separating[fast] / closing[fast], lying[fast] / closing[fast]
     second = (separating + lost)[fast] / (closing - gained)[fast]
-    least, most = np.minimum(first, second), np.maximum(first, second)
+    least, most = (of([first, second, third], axis=0) for of in (np.min, np.max))
     return Restitutions(
         values=np.clip(scene.restitution, least, most),
         spread=most - least,

@@ -71,16 +71,13 @@ def energy_gained(view: View) -> Array | None:
 
 
 def energy_rise(view: View) -> Array | None:
-    """E(t) minus the smallest E before t, over the energy at hand: only thrust can add energy.
-
-    The velocities of an engine may be those of half a step before or after its positions. So each E
-    is known to sum of m |g.v| dt / 2, and that much is no rise.
-    """
+    """E(t) minus the smallest E before t, over the energy at hand, beyond `laws.half_step`: only
+    thrust can add energy."""
     scene = view.scenario.scene
     if view.scenario.thrusts or lifts(view.scenario):
         return None
     actual = laws.energy(view.played, scene)
-    slack = np.abs(view.played.velocity @ scene.gravity) @ laws.moving_mass(scene) * view.dt / 2
+    slack = laws.half_step(view.played, scene, view.dt)
     rise = actual - slack - np.minimum.accumulate(actual + slack)
     return np.maximum(rise, 0.0) / (scales.energy(view.scenario) or 1.0)
 

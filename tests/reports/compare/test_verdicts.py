@@ -81,6 +81,41 @@ def test_a_disk_that_wraps_past_a_wall_does_not_tunnel():
         assert failed_by("wrap_wall", engine, 4) == {}, engine
 
 
+def test_a_sample_on_the_edge_of_a_torus_is_no_way_across_the_box():
+    one, _ = case("wrap_wall")
+    fast = replace(one, scene=replace(one.scene, velocity=[[0.5 / one.sample_interval, 0.0]]))
+    played = play(row_of("event_driven:float64").make(), "event_driven:float64", fast, fast.dt(1))
+    assert played.trajectory is not None
+    assert -2.0 in played.trajectory.position[:, 0, 0].round(12)
+    assert failed(fast, played.trajectory) == {}
+
+
+@pytest.mark.parametrize("offset", [-0.5, 0.5])
+def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offset: float):
+    """A fall of a tenth of a second at 1/60 s: half a step is an eighth of its energy."""
+    one, _ = truth_of("bouncing_ball_e1")
+    dt = 1 / 60
+    t = np.arange(9) * dt
+    fall = t[:, None, None] * one.scene.gravity
+    v, still = fall + offset * dt * one.scene.gravity * (t > 0)[:, None, None], np.zeros((9, 1))
+    played = Trajectory(t, one.scene.position + fall * t[:, None, None] / 2, v, still, still)
+    ground = [[[-5.0, -0.1], [5.0, -0.1]]] + one.scene.position[0] - [0.0, one.scene.radius[0]]
+    short = replace(one, scene=replace(one.scene, walls=ground), truth=None, duration=t[-1])
+    found = {verdict.id: verdict for verdict in verdicts(short, played, dt)}
+    assert not found["energy_gained"].failed
+    assert not found["energy_lost"].failed
+
+
+def test_the_rounding_of_a_long_fall_is_no_momentum():
+    """At the end the momentum is twenty times that of the start, to which errors are relative."""
+    one, _ = truth_of("head_on_equal_e1")
+    fall = replace(one.scene, gravity=[0.0, -10.0], velocity=[[-1.0, 0.0], [0.0, 1.0]])
+    one = replace(one, scene=fall, truth=None, duration=3.0, sample_interval=0.02)
+    name = "box2d_v3:matched"
+    played = play(row_of(name).make(), name, one, 0.005)
+    assert judging.first_failed(played, one, None) is None
+
+
 def test_a_disk_that_rolls_over_the_pieces_of_a_floor_does_not_tunnel():
     one, truth = truth_of("friction_bounce_e0_mu05")
     pieces = [[[x, 0.0], [x + 0.1, 0.0]] for x in np.arange(-80, 80) / 10]
@@ -115,6 +150,14 @@ def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step
     assert judging.laws.penetration(played.trajectory, one.scene).max() > judging.MOST_OVERLAP
 
 
+def test_a_right_engine_may_overlap_at_each_sample_where_a_fast_disk_has_a_narrow_gap():
+    """25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due."""
+    one, truth = truth_of("galperin_314")
+    played = play(ENGINES["reference:coulomb"].make(), "reference:coulomb", one, one.dt(1))
+    assert played.trajectory is not None
+    assert not [v for v in verdicts(one, played.trajectory, played.dt, truth=truth) if v.failed]
+
+
 # Negative controls.
 
 
@@ -138,6 +181,13 @@ def test_an_engine_that_sinks_slowly_fails():
     assert found["overlap"].disks == (0, -1)
     assert found["sinks"].value == pytest.approx(0.27, rel=0.02)
     assert failed(one, moved(truth, down / 10), truth) == {}
+
+
+def test_a_ball_that_rolls_inside_the_floor_fails_at_any_speed():
+    one, truth = truth_of("rest_on_floor")
+    sunk = moved(truth, np.full(truth.position[:, 0].shape, [0.0, -0.2 * one.scene.radius[0]]))
+    rolling = replace(sunk, velocity=sunk.velocity + [100.0, 0.0])
+    assert failed(one, rolling)["overlap"].value == pytest.approx(0.2, rel=0.02)
 
 
 def test_an_engine_that_lets_a_supported_disk_creep_away_fails():
