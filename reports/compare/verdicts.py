@@ -41,7 +41,7 @@ MOST_MOMENTUM = 1e-5  # of all momenta: a hundred roundings of float32
 MOST_LOST = 0.5  # of the acceleration of gravity, or of a distance in free flight
 MOST_SINKING = 0.1  # radii
 MOST_JITTER, MOST_RESIDUAL = 0.02, 0.05  # sqrt(g R): mean and largest speed of what is at rest
-SETTLED = 0.1  # of a run; in this time an engine corrects what it takes for an overlap
+EARLY = 0.1  # of a run: an engine that rests earlier than that stops what should still move
 LASTS = 3  # samples in a row
 
 
@@ -385,7 +385,8 @@ class Judge:
 
     def rest(self) -> Iterator[Verdict]:
         """Where the scene can come to rest: `jitters`, and beside an exact answer that is at rest
-        at its end the others.
+        at its end the others, from half of that rest on: until then an engine may bounce where
+        e = 0, and correct what it takes for an overlap.
 
         A step changes a speed by g dt, a bounce takes the part 1 - e of it: below g dt / (1 - e) a
         ball hops on in a right stepping engine, too, or stops up to 2 dt / (1 - e)^2 early.
@@ -409,14 +410,14 @@ class Judge:
         if rest > len(exact) - LASTS:  # a disk that turns round is at rest at one sample
             return
         first = settled_from(speed.max(axis=1), bound)
-        late = abs(first - settled_from(exact, bound)) / intervals
-        start = min(rest + int(np.ceil(SETTLED * intervals)), len(played) - LASTS)
+        late = (first - settled_from(exact, bound)) / intervals
+        start = min((rest + intervals) // 2, len(played) - LASTS)
         yield from self.moved(start, step)
         after = np.sqrt((speed[start:] ** 2).mean(axis=1))
         yield worst_of("not_at_rest", played.t[start:], after, bound)
-        early = 2 * self.dt / (1 - scene.restitution) ** 2 / float(played.t[-1])
-        at = float(played.t[min(first, intervals)])
-        yield Verdict("time_of_rest", late, SETTLED + early, at)
+        allowed = 2 * self.dt / (1 - scene.restitution) ** 2 / float(played.t[-1])
+        allowed += EARLY if late < 0 else (start - rest) / intervals
+        yield Verdict("time_of_rest", abs(late), allowed, float(played.t[min(first, intervals)]))
 
     def jitter(self, speed: Array, bound: float) -> Iterator[Verdict]:
         """`jitters`: the root mean square speed, in the last quarter, of a disk that stays within
