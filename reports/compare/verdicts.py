@@ -41,7 +41,7 @@ MOST_MOMENTUM = 1e-5  # of all momenta: a hundred roundings of float32
 MOST_LOST = 0.5  # of the acceleration of gravity, or of a distance in free flight
 MOST_SINKING = 0.1  # radii
 MOST_JITTER, MOST_RESIDUAL = 0.02, 0.05  # sqrt(g R): mean and largest speed of what is at rest
-EARLY = 0.1  # of a run: an engine that rests earlier than that stops what should still move
+SETTLED = 0.1  # of a run: rest that is early by more stops what should still move
 LASTS = 3  # samples in a row
 
 
@@ -416,7 +416,7 @@ class Judge:
         after = np.sqrt((speed[start:] ** 2).mean(axis=1))
         yield worst_of("not_at_rest", played.t[start:], after, bound)
         allowed = 2 * self.dt / (1 - scene.restitution) ** 2 / float(played.t[-1])
-        allowed += EARLY if late < 0 else (start - rest) / intervals
+        allowed += SETTLED if late < 0 else (start - rest) / intervals
         yield Verdict("time_of_rest", abs(late), allowed, float(played.t[min(first, intervals)]))
 
     def jitter(self, speed: Array, bound: float) -> Iterator[Verdict]:

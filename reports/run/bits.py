@@ -133,7 +133,7 @@ def write_bits(folder: Path) -> None:
 def kept_bits(folder: Path) -> bool:
     """Print in how many scenes the bits of a run equal the kept ones; whether all that can be
     compared do, and there is something to compare."""
-    kept, here = KEPT.read_text("utf-8"), (folder / BITS).read_text("utf-8")
+    kept, here = (path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS))
     table, made_by = read(here), about_of(here)
     changed, both = differences(read(kept), table)
     console = Console()

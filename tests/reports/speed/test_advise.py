@@ -272,7 +272,7 @@ def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Pa
 
 @pytest.mark.parametrize("name", ["heavy_on_light", "swapped"])
 def test_an_engine_whose_disk_is_through_the_floor_is_not_advised(name: str):
-    """The exact answer ends at 0.319 of 3 s, and up to there all keep the error."""
+    """Up to 0.319 s, where it lands, all keep the error."""
     scene = str(Path(__file__).parents[3] / "tests" / "data" / "scenes" / f"{name}.toml")
     names = ("reference:exercise", "reference:coulomb", "box2d_v3:matched")
     dt = open_scene(scene, 0).dt

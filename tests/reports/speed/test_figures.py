@@ -254,9 +254,9 @@ def test_the_readme_says_how_much_each_form_measures():
 @pytest.mark.parametrize(
     ("name", "fails"), [("reference:exercise", True), ("box2d:matched", False)]
 )
-def test_what_fails_a_verdict_after_the_exact_answer_is_infinitely_far_off(name: str, fails: bool):
-    """A disk of 100 kg falls through one of 1 kg and the floor, after 0.319 s."""
+def test_what_fails_a_verdict_is_infinitely_far_off(name: str, fails: bool):
+    """A disk of 100 kg falls through one of 1 kg and the floor."""
     scene = str(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "heavy_on_light.toml")
     (row,) = ladder.errors_of(scene, 0, name, ENGINES[name].make, [4])
     assert (row["status"], np.isinf(row["error_radii"])) == ("fails" if fails else "ok", fails)
-    assert row["until_s"] == pytest.approx(0.317, abs=0.001)
+    assert row["until_s"] == 3
