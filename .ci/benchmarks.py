@@ -43,7 +43,7 @@ def check() -> list[str]:
     )
     # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
     engines = {name: row.make for name, row in ENGINES.items() if not row.adds_friction}
-    samples, _ = sizes.costs(engines, figures.GATED, ROUNDS, BUDGET, PATIENCE, seed=0)
+    samples, _, _ = sizes.costs(engines, figures.GATED, ROUNDS, BUDGET, PATIENCE, seed=0)
     rows = [
         dict(
             zip(("engine", "profile"), sample.key[0].split(":")),

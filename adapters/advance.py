@@ -109,6 +109,11 @@ def world_force(thrust: Thrust, engine: Engine) -> Array:
     return turned(thrust.force, engine.read().angle[thrust.disk])
 
 
+def onto_torus(x: float, low: float, high: float) -> float:
+    """A coordinate; if it has left the box from `low` to `high`, on from the opposite edge."""
+    return x if low <= x <= high else x - (x - low) // (high - low) * (high - low)
+
+
 def turned(force: Array, angle: float) -> Array:
     """(2,) N, turned by `angle` rad."""
     x, y = force

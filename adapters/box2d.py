@@ -9,6 +9,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
+from adapters.advance import onto_torus
 from adapters.engine import KEPT, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from adapters.friction import of_shapes
@@ -146,11 +147,11 @@ class Box2DEngine:
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
         chosen = self.chosen
         # s per engine unit of time, engine units of length per m
-        self.time, self.length = 1.0, 1.0
-        if self.matched:
-            self.time = chosen["time_unit"]
+        self.time, self.length = chosen.get("time_unit", 1.0), 1.0
+        if "length_unit" in chosen:
             least = chosen["length_unit"] * scene.radius.min()
-            self.length = float(1.0 / max(least, chosen["step_unit"] * fastest(scene) * dt))
+            step = chosen.get("step_unit", 0.0) * fastest(scene) * dt
+            self.length = float(1.0 / max(least, step))
         self.speed = self.time * self.length
         must_fit(scene, self.length, self.time)
         self.speed_cap = Box2D.b2_maxTranslation / self.length / dt
@@ -218,8 +219,7 @@ class Box2DEngine:
         self.bodies[disk].ApplyTorque(float(torque * self.length**2 * per_time2), True)
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `Step`; if the scene wraps, disks that leave are set onto the opposite
-        edge."""
+        """`count` calls of `Step`; Box2D has no torus: disks that leave are shifted."""
         dt = self.dt / self.time
         for _ in range(count):
             self.world.Step(dt, self.velocity_iterations, self.position_iterations)
@@ -235,11 +235,7 @@ class Box2DEngine:
         for body in self.bodies:
             x, y = body.position
             if not (x0 <= x <= x1 and y0 <= y <= y1):
-                over = (
-                    x1 if x < x0 else x0 if x > x1 else x,
-                    y1 if y < y0 else y0 if y > y1 else y,
-                )
-                body.transform = (over, body.angle)
+                body.transform = ((onto_torus(x, x0, x1), onto_torus(y, y0, y1)), body.angle)
 
     def read(self) -> State:
         """Attribute by attribute: box2d-py has no bulk read."""
@@ -252,9 +248,11 @@ class Box2DEngine:
         angular_velocity = np.array([b.angularVelocity for b in bodies], float) / self.time
         if self.matched:
             speed = np.hypot(velocity[:, 0], velocity[:, 1])
-            unit = f": {Box2D.b2_maxTranslation:g} of its length units of {1 / self.length:.3g} m"
+            unit = f"{Box2D.b2_maxTranslation:g} of its length units of {1 / self.length:.3g} m"
+            unit += " (b2_maxTranslation, compiled into 2.3)"
             must_not_be_cut("speed", speed, self.speed_cap, "m/s", unit)
-            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
+            turn = "a quarter of a turn (b2_maxRotation, compiled into 2.3)"
+            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s", turn)
         return State(position, velocity, angle, angular_velocity)
 
     def collisions(self) -> list[ContactImpulse]:

@@ -3,7 +3,7 @@ sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from math import atan2, cos, pi, sin
 from threading import Lock
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
+from adapters.advance import onto_torus
 from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
 from adapters.float32 import must_fit, must_not_be_cut, rounding
 from adapters.friction import of_shapes
@@ -76,8 +77,10 @@ SEARCHED = Searched(
     {
         "restitution_threshold": "0: as the scene states",
         "maximum_linear_speed": "1e9 m/s: no speed is cut",
-        "warm starting, speculative contacts": "not in the binding",
-        "linear slop, speculative margin": "compiled in; moved by the length unit alone",
+        "allowFastRotation, warm starting, speculative contacts": (
+            "in the header of Box2D 3.1; pyb2d3 does not hand them on"
+        ),
+        "linear slop, speculative margin": "compiled into Box2D; moved by the length unit alone",
         "joint tuning": "no joints here",
         "walls of chains or boxes": "a chain is one-sided, a segment of the scene is not",
         "friction": "as the scene states: that of a pair is the root of the product",
@@ -86,6 +89,10 @@ SEARCHED = Searched(
     },
 )
 
+SPIN_CAP = (
+    "an eighth of a turn, without b2BodyDef::allowFastRotation of Box2D 3.1, which pyb2d3 does not"
+    " hand on"
+)
 # it is global to the process: threads take turns, so that each world gets its own unit
 LENGTH_UNIT = Lock()
 
@@ -109,8 +116,8 @@ class Box2DV3:
     length unit is half of the smallest radius: slop and speculative margin are fractions of it. A
     larger margin predicts more collisions, but this is the largest without a spurious collision if
     two disks pass at 1 % of a radius. Contacts have the largest stiffness that the engine allows,
-    an eighth of the substep rate. The values are `MATCHED`, by `crosscheck tune`. The cap on spins
-    cannot be lifted: a scene that reaches it is refused.
+    an eighth of the substep rate. The values are `MATCHED`, by `crosscheck tune`. A scene that
+    reaches the cap on spins, which pyb2d3 cannot lift, is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -142,7 +149,9 @@ class Box2DV3:
         self.scene, self.dt, self.steps = scene, dt, 0
         self.friction = of_shapes(scene, self.matched, self.asked_friction)
         self.log: list[ContactImpulse] = []
-        self.unit = float(self.chosen["length_unit"] * scene.radius.min()) if self.matched else 1.0
+        self.unit = 1.0
+        if "length_unit" in self.chosen:
+            self.unit = float(self.chosen["length_unit"] * scene.radius.min())
         pyb2d3.set_length_units_per_meter(self.unit)
         # The binding has no way to ask for the unit, but the default of this limit is 400 of it.
         self.unit_found = pyb2d3.WorldDef().maximum_linear_speed / 400
@@ -151,7 +160,7 @@ class Box2DV3:
         self.world = pyb2d3.World(gravity=vector(scene.gravity), **self.options)
         self.world.continuous_enabled = self.chosen["continuous"]
         self.world.sleeping_enabled = self.sleeping
-        if self.matched:
+        if self.matched or self._tuning() != tuned(SHIPPED):
             self.world.set_contact_tuning(*self._tuning())
         self.world.hit_event_threshold = 0.0  # listening only: report every collision
         self.bodies = [self._disk(i) for i in range(scene.n)]
@@ -167,13 +176,20 @@ class Box2DV3:
         )
 
     def _tuning(self) -> tuple[float, float, float]:
-        return self.chosen["hertz"], self.chosen["damping_ratio"], self.chosen["push_speed"]
+        return tuned(self.chosen)
 
     def _options(self) -> dict[str, float]:
-        options = {
-            name: self.chosen[name] for name in ("restitution_threshold",) if name in self.chosen
+        given: dict[str, float] = {}
+        if self.matched:
+            given = {"maximum_linear_speed": 1e9}
+        elif "length_unit" in self.chosen:  # which would scale these, too
+            given = {"maximum_linear_speed": 400.0, "restitution_threshold": 1.0}
+        given = given | self.chosen
+        return {
+            name: given[name]
+            for name in ("restitution_threshold", "maximum_linear_speed")
+            if name in given
         }
-        return options | ({"maximum_linear_speed": 1e9} if self.matched else {})
 
     def _shape(self) -> Any:
         friction = {} if self.friction is None else {"friction": self.friction}
@@ -244,8 +260,8 @@ class Box2DV3:
         low, high = self.scene.wrap
         at = self.every.get_positions(np.empty((self.scene.n, 2), np.float32))
         for i in np.flatnonzero(((at < low) | (at > high)).any(axis=1)):
-            over = np.where(at[i] < low, high, np.where(at[i] > high, low, at[i]))
-            self.bodies[i].set_transform(vector(over), self.bodies[i].rotation)
+            x, y = map(onto_torus, at[i].tolist(), low.tolist(), high.tolist())
+            self.bodies[i].set_transform(vector(np.array([x, y])), self.bodies[i].rotation)
 
     def read(self) -> State:
         """All bodies at once, as float32. The engine keeps (cos, sin), so the angle is unwound from
@@ -255,7 +271,7 @@ class Box2DV3:
         velocity = every.get_linear_velocities(np.empty((n, 2), np.float32)).astype(float)
         angular_velocity = every.get_angular_velocities(np.empty(n, np.float32)).astype(float)
         if self.matched:
-            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s")
+            must_not_be_cut("spin", angular_velocity, self.spin_cap, "rad/s", SPIN_CAP)
         return State(position, velocity, self._unwound(angular_velocity), angular_velocity)
 
     def _unwound(self, spin: Array) -> Array:
@@ -311,6 +327,11 @@ class Box2DV3:
         """Bodies before the world: using one afterwards is a segmentation fault."""
         self.bodies, self.every = [], None
         self.world = None
+
+
+def tuned(chosen: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Hertz, damping ratio and push speed in m/s, as `set_contact_tuning` takes them."""
+    return chosen["hertz"], chosen["damping_ratio"], chosen["push_speed"]
 
 
 def vector(array: Array) -> tuple[float, float]:

@@ -84,8 +84,8 @@ class EngineRow:
             a cause.
         searched: returns the settings that `crosscheck tune` searches; None: there are none.
         bits_of: another engine whose numbers it reproduces to the last bit, at another cost, in
-            every scene without friction; if only the numbers count, it plays beside that engine
-            only on request. "": there is none.
+            every scene without friction (`coulomb`: and without a torus); if only the numbers
+            count, it plays beside that engine only on request. "": there is none.
         adds_friction: it plays scenes with friction, which that engine refuses; without friction it
             never plays beside it.
         orders_collisions: it uses time-of-impact ordering instead of end-of-step detection; it is

@@ -34,14 +34,14 @@ def must_fit(scene: Scene, length: float = 1.0, time: float = 1.0) -> None:
             raise Unsupported(f"{name} {bad:g} does not fit into float32")
 
 
-def must_not_be_cut(what: str, values: Array, cap: float, unit: str, because: str = "") -> None:
+def must_not_be_cut(what: str, values: Array, cap: float, unit: str, by: str) -> None:
     """Raise `Unsupported` if the engine has reduced `values` to its cap: an engine plays a scene as
-    stated or refuses it. `because`: where the cap comes from, the end of the sentence."""
+    stated or refuses it. `by`: what sets the cap, the end of the sentence."""
     # in float32 a cut value is a little below the cap
     if np.abs(values).max() > cap * (1 - 1e-5):
         raise Unsupported(
-            f"a disk reaches a {what} of {cap:.4g} {unit}, the most that Box2D allows at this"
-            f" dt{because}"
+            f"a disk reaches a {what} of {cap:.4g} {unit}, the most that Box2D allows at this dt:"
+            f" {by}"
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
+from adapters.advance import onto_torus
 from adapters.engine import ContactImpulse
 from adapters.matched import GEOMETRY, Searched
 from scenarios.model import Array, Scene, State
@@ -179,8 +180,7 @@ class Pymunk:
             body.torque += torque
 
     def step(self, count: int = 1) -> None:
-        """`count` calls of `space.step`; if the scene wraps, disks that leave are set onto the
-        opposite edge."""
+        """`count` calls of `space.step`; pymunk has no torus: disks that leave are shifted."""
         for _ in range(count):
             self.space.step(self.dt)
             self.steps += 1
@@ -194,10 +194,8 @@ class Pymunk:
         low, high = self.scene.wrap
         position = self._rows()[:, :2]
         for row in np.flatnonzero(((position < low) | (position > high)).any(axis=1)):
-            x = np.where(
-                position[row] < low, high, np.where(position[row] > high, low, position[row])
-            )
-            self.bodies[self.moving[row]].position = tuple(x)
+            place = map(onto_torus, position[row].tolist(), low.tolist(), high.tolist())
+            self.bodies[self.moving[row]].position = tuple(place)
 
     def _rows(self) -> Array:
         """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer

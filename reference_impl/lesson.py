@@ -118,10 +118,9 @@ def move(rows, i: int, nx: float, ny: float, by: float) -> None:  # type: ignore
 
 @compiled
 def wrap(x, world: World) -> None:  # type: ignore[no-untyped-def]
-    """A centre beyond an edge of the box is set onto the opposite edge; its velocity stays."""
+    """A centre beyond an edge of the box goes on from the opposite edge; its velocity stays."""
     for i in range(len(x)):
         for axis in range(2):
-            if x[i, axis] < world.low[axis]:
-                x[i, axis] = world.high[axis]
-            elif x[i, axis] > world.high[axis]:
-                x[i, axis] = world.low[axis]
+            low, high = world.low[axis], world.high[axis]
+            if x[i, axis] < low or x[i, axis] > high:
+                x[i, axis] -= (x[i, axis] - low) // (high - low) * (high - low)

@@ -37,7 +37,7 @@ class World(NamedTuple):
     gravity: np.ndarray = np.zeros(2)  # (2,) m/s2
     walls: np.ndarray = np.zeros((0, 2, 2))  # (w, 2, 2) m: each a segment, start and end
     low: np.ndarray = np.full(2, -np.inf)  # (2,) m: a centre that leaves the box [low, high]
-    high: np.ndarray = np.full(2, np.inf)  # is set onto the opposite edge
+    high: np.ndarray = np.full(2, np.inf)  # enters it again at the opposite edge
     split: int = BY_INVERSE_MASS
     # False: an impulse on separating pairs too, as the formula is printed
     approaching_only: bool = True

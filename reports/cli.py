@@ -162,6 +162,14 @@ def run(
     memory: Memory = 0,
     scheduler: Scheduler = "",
     resume: Resume = None,
+    bits: Annotated[
+        bool,
+        typer.Option(
+            "--bits",
+            help="Write hashes of all results at the middle step size to bits.csv, and compare them"
+            " with those kept in reports/bits.csv. Exit status 1: an engine has other bits.",
+        ),
+    ] = False,
 ) -> None:
     """Play scenes through engines, and write the report."""
     from reports.commands import run as run_command
@@ -170,9 +178,12 @@ def run(
     what = scenes or [], engine or [], dt or [], full, seed
     if resume is not None:
         run_command.resume(
-            resume, means, alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT)
+            resume,
+            means,
+            bits,
+            alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT),
         )
-    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, as_typed())
+    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, as_typed(), bits)
 
 
 @app.command()
@@ -199,45 +210,6 @@ def report(
 
 
 @app.command()
-def replay(
-    cell: Annotated[
-        str,
-        typer.Argument(
-            metavar="CELL",
-            help="From the column cell of runs.csv; its first characters are enough.",
-        ),
-    ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder of the run.")] = DEFAULT_OUT,
-    timeout: Timeout = 60.0,
-) -> None:
-    """Play one cell of a run again, step by step.
-
-    A cell that failed begins at its last good state, any other cell at the start. The output of
-    the engine is shown.
-    """
-    from reports.commands import replay as replay_command
-
-    replay_command.replay(cell, out, timeout)
-
-
-@app.command()
-def bits(
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Where to write the table of this machine, a CSV."),
-    ] = None,
-) -> None:
-    """Compare the bits of all engines here with those kept in reports/bits.csv.
-
-    Every scene is played through every engine at its middle step size. The exit status is 1 if an
-    engine has other bits.
-    """
-    from reports.commands.bits import compare_bits
-
-    compare_bits(out)
-
-
-@app.command()
 def diff(
     before: Annotated[Path, typer.Argument(metavar="OUT_A", help="The folder of a run.")],
     after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
@@ -259,6 +231,10 @@ def truth(
         bool,
         typer.Option("--events", help="Print all collisions, not only the first and last ten."),
     ] = False,
+    at: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Print where each disk is then, and how it moves."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
@@ -266,11 +242,12 @@ def truth(
     """Print the exact answer to a scene.
 
     Shows its collisions, its horizon (the time up to which it holds, and what ends it), and its
-    error bound.
+    error bound. With --at, shows position, velocity, angle and spin of each disk at that time; at
+    the instant of a collision, those after it.
     """
     from reports.commands.truth import show_truth
 
-    show_truth(scene, seed, events, as_json, timeout)
+    show_truth(scene, seed, events, at, as_json, timeout)
 
 
 @app.command()
@@ -309,8 +286,8 @@ def check(
             "--format",
             metavar="NAME",
             help=(
-                "Write the marks as table, json, junit, gradescope, prairielearn, classroom or csv."
-                " Repeatable, each with its --out."
+                "Write the marks as table, json, junit, gradescope or csv. Repeatable, each with"
+                " its --out."
             ),
         ),
     ] = None,
@@ -351,7 +328,7 @@ def check(
     scaffold: Annotated[
         str,
         typer.Option(
-            metavar="gradescope|classroom|prairielearn",
+            metavar="gradescope",
             help="Write an autograder to DIR, and check nothing.",
         ),
     ] = "",
@@ -574,10 +551,10 @@ def new_engine(
 def list_(
     what: Annotated[
         str,
-        typer.Argument(metavar="engines|scenarios|metrics", help="Default: all three."),
+        typer.Argument(metavar="engines|scenarios|metrics|verdicts", help="Default: all."),
     ] = "",
 ) -> None:
-    """List engines, scenarios and metrics, and say what each is."""
+    """List engines, scenarios, metrics and verdicts, and say what each is."""
     from reports.commands.listing import explain
 
     explain(what)

@@ -43,8 +43,8 @@ class Scene:
     inertia: Array = DEFAULT  # (n,) kg m2, default m r2 / 2 of a solid disk
     walls: Array = DEFAULT  # (w, 2, 2) m, default none; segments [:, 0] to [:, 1], with two sides
     gravity: Array = DEFAULT  # (2,) m/s2, default none; acts on every disk that is not static
-    # None, or (2, 2) m, low and high corner of the exercise's box: a disk whose centre is beyond an
-    # edge is set onto the opposite edge; disks do not see each other across it.
+    # None, or (2, 2) m, low and high corner of a box: a disk whose centre reaches an edge flies on
+    # from the opposite edge; disks do not see each other across it.
     wrap: Array | None = None
 
     def __post_init__(self) -> None:

@@ -28,7 +28,6 @@ LOADED = [
     "reports.run.arguments",
     "reports.commands.truth",
     "reports.commands.diff",
-    "reports.commands.replay",
     "reports.check.command",
     "reports.speed.command",
     "reports.stability.command",

@@ -3,7 +3,7 @@ strict both ways."""
 
 from __future__ import annotations
 
-from math import atan, pi
+from math import atan, cos, hypot, pi, sin
 from typing import NamedTuple
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
@@ -51,6 +51,17 @@ NORMALISED_EULER = (
     "(cos, sin) += w h (-sin, cos) and then normalised turns by atan(w h) a substep h = dt / 4"
 )
 
+STUCK = (
+    "the default friction of a shape stops the sliding in the collision: it takes a third of the"
+    " tangential velocity, as a disk turns, where (1 + e) of the normal one is taken"
+)
+
+
+def share_that_sticks(normal: float, tangential: float) -> float:
+    """Tangential share of the impulse of a collision with e = 0.9 that ends without sliding."""
+    return tangential / 3 / hypot(tangential / 3, 1.9 * normal)
+
+
 MUNK_ARBITER = "Munk2D src/cpArbiter.c, cpArbiterUpdate: arb->e = a->e * b->e"
 BOX2D_SETTINGS = "Box2D 2.3 Common/b2Settings.h: "
 TURN = (
@@ -72,6 +83,22 @@ DEPARTURES = [
             "restitution_10",
             "restitution_100",
             "restitution_wall",
+        )
+    ),
+    *(
+        Departure("pymunk:shipped", probe, 0.81, 8 * FLOAT64, PRODUCT, MUNK_ARBITER)
+        for probe in ("pair_keeps_e", "wall_keeps_e")
+    ),
+    # The point that touches is off by up to v dt = 0.004 radii of a pair.
+    *(
+        Departure(engine, probe, share, 0.004, STUCK, source)
+        for engine, source in (
+            ("box2d:shipped", "Box2D 2.3 Dynamics/b2Fixture.h: b2FixtureDef, friction = 0.2f"),
+            ("box2d_v3:shipped", BOX2D_TYPES + "b2DefaultSurfaceMaterial, friction = 0.6f"),
+        )
+        for probe, share in (
+            ("off_centre_is_normal", share_that_sticks(2 * cos(pi / 6), 2 * sin(pi / 6))),
+            ("wall_is_normal", share_that_sticks(10.0, 6.0)),
         )
     ),
     # What stops does so exactly: the two velocities of an inelastic collision agree to rounding in

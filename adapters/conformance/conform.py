@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from adapters.conformance.contract import CONTRACT
+from adapters.conformance.laws import LAWS
 from adapters.conformance.physics import PHYSICS
 from adapters.conformance.probe import Probe, ProbeReading
 from adapters.engine import NotLoaded, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.own_solver.process import processes_reused
 
-PROBES: dict[str, Probe] = CONTRACT | PHYSICS
+PROBES: dict[str, Probe] = CONTRACT | PHYSICS | LAWS
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Finding:
             "departs": it follows the protocol, but its physics differs from the scene; "breaks": no
             number of this engine may be trusted.
         note: the exception or refusal, or what limits the reading.
+        departure: the law that is broken, of `Departure`, if the probe tells; else "".
     """
 
     engine: str
@@ -41,6 +43,7 @@ class Finding:
     bound: float
     verdict: str
     note: str = ""
+    departure: str = ""
 
 
 def conform(name: str, row: EngineRow) -> list[Finding]:
@@ -106,6 +109,8 @@ def ask(engine: str, profile: str, name: str, row: EngineRow) -> Finding:
         reading.bound,
         verdict,
         reading.note,
+        # `crosscheck check` says what a solver of the exercise breaks, whose e may be its own
+        "" if verdict == "keeps" or row.exercise else reading.departure or "",
     )
 
 

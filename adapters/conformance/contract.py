@@ -9,18 +9,21 @@ numbers that are none is a faulty solver.
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from adapters.conformance.probe import (
     DT,
+    Departure,
     Probe,
     ProbeReading,
     act_on,
     first_difference,
     head_on,
     history,
+    is_silent,
     largest,
     load_first,
     loaded,
@@ -32,7 +35,7 @@ from adapters.conformance.probe import (
     simplified,
 )
 from adapters.engine import Unsupported
-from adapters.engine_row import EngineRow
+from adapters.engine_row import FLOAT32, EngineRow
 from adapters.runaway import fault_of
 
 NONE = np.zeros(2)
@@ -52,6 +55,7 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
         mass=[1.0, np.inf, 5.0],
     )
     faults = []
+    rounding = FLOAT32 if row.source else row.rounding  # a file may calculate in either
     with closing(row.make()) as engine:
         played = load_first(engine, simplified(scene), DT)
         state = engine.read()
@@ -59,7 +63,7 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
         array = getattr(state, name)
         if array.dtype != np.float64 or array.shape != wanted.shape:
             faults.append(f"{name} is {array.dtype} {array.shape}")
-        elif (off := np.abs(array - wanted)).max() > 4 * row.rounding * largest(wanted):
+        elif (off := np.abs(array - wanted)).max() > 4 * rounding * largest(wanted):
             faults.append(
                 f"{name} of disk {int(np.argwhere(off == off.max())[0][0])} is off by"
                 f" {off.max():.3g}"
@@ -91,20 +95,24 @@ def load_forgets(row: EngineRow) -> ProbeReading:
     """After `load`, an engine that has played a collision and has a pending force behaves like a
     fresh one."""
     scenes = simplified(plain())
-    with loaded(row, *simplified(head_on(2.0))) as used:
+    with loaded(row, *simplified(replace(head_on(2.0), restitution=1.0))) as used:
         last = len(used.read().angle) - 1
         for _ in range(12):
             act_on(used, last, (1.0, 2.0), 3.0)
             used.step()
         act_on(used, last // 2, (5.0, 5.0), 5.0)
-        load_first(used, scenes, DT / 2)
-        left = len(used.collisions())
-        seen = history(used)
+        try:
+            load_first(used, scenes, DT / 2)
+            left = len(used.collisions())
+            seen = history(used)
+        except Unsupported:
+            raise
+        except Exception as raised:  # only after a scene, if a fresh engine does not raise
+            left, seen = 0, [(f"it fails: {raised}", b"")]
     with loaded(row, *scenes, dt=DT / 2) as fresh:
         wanted = history(fresh)
-    return ProbeReading(
-        "collisions at the start" if left else first_difference(seen, wanted), "nowhere"
-    )
+    difference = "collisions at the start" if left else first_difference(seen, wanted)
+    return ProbeReading(difference, "nowhere", departure=Departure.MEMORY)
 
 
 def worlds_are_separate(row: EngineRow) -> ProbeReading:
@@ -265,7 +273,8 @@ def impulse_is_reported(row: EngineRow) -> ProbeReading:
 
 
 def static_stays(row: EngineRow) -> ProbeReading:
-    """A static disk keeps its state to the bit under a collision and a force."""
+    """A static disk keeps its state to the bit under a collision and a force. The collision is
+    asked for if the engine reports any."""
     scene = scene_of(
         position=[[-1.02, 0.1], [0.0, 0.0]],
         velocity=[[2.0, 0.0], [0.0, 0.0]],
@@ -278,13 +287,16 @@ def static_stays(row: EngineRow) -> ProbeReading:
         for _ in range(12):
             act_on(engine, 1, (5.0, 5.0), 5.0)
             engine.step()
-        after, collisions = engine.read(), reported(engine)
+        after, stays = engine.read(), "stays"
+        if not is_silent(engine):
+            stays = f"stays, reported {reported(engine)}"
     moved = [
         name for name, array in vars(after).items() if (array[1] != getattr(before, name)[1]).any()
     ]
     return ProbeReading(
-        "; ".join(f"{name} changed" for name in moved) or f"stays, reported {collisions}",
-        "stays, reported disk 0 and disk 1",
+        "; ".join(f"{name} changed" for name in moved) or stays,
+        "stays" if stays == "stays" else "stays, reported disk 0 and disk 1",
+        departure=Departure.STATIC if moved else None,
     )
 
 

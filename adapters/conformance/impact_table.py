@@ -1,9 +1,10 @@
-"""What each engine does with e, as measured by the probes: a row for each engine, kept in
-impact_table.csv.
+"""What each engine does with e and friction: for each engine and step size the median and the range
+of 32 readings, which differ in the phase of the collision within its step and the angles of the
+disks, or in the height of a fall.
 
 `uv run --extra js python -m adapters.conformance.impact_table` asks all engines again, and writes
-the file, the table of adapters/README.md and the short one of README.md; it takes half a minute.
-With names of engines behind it, it asks only those, and keeps the rows of all others.
+impact_table.csv and the table of adapters/README.md; it takes half a minute. With names of engines
+behind it, it asks only those, and keeps the rows of all others.
 """
 
 from __future__ import annotations
@@ -16,153 +17,251 @@ from datetime import date
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from adapters.conformance import physics
-from adapters.conformance.probe import DT, collided, head_on, loaded, scene_of
-from adapters.engine import Unsupported
+from adapters.conformance.physics import FRICTION
+from adapters.conformance.probe import DT, scene_of
+from adapters.engine import Engine, Unsupported
 from adapters.engine_row import FLOAT32, EngineRow
 from adapters.engines import ENGINES, FETCHED
 from adapters.friction import Frictionless
+from scenarios.model import Array, Scene
 
 KEPT = Path(__file__).with_name("impact_table.csv")
 README = Path(__file__).parents[1] / "README.md"
 BEGIN, END = "<!-- impact table -->\n", "<!-- end of impact table -->"
-FRONT = Path(__file__).parents[2] / "README.md"  # README of the repository, with the short form
-SHORT_BEGIN, SHORT_END = "<!-- short form -->\n\n", "\n\n"
-SLOWEST, FASTEST = 1e-3, 100.0  # m/s, range in which a threshold is searched
+STEP_SIZES = (DT, 1 / 60)  # s
+COUNT = 32  # readings of a cell
+PHASES = (np.arange(COUNT) + 0.5) / COUNT  # of a step, at which the bodies touch
+ANGLES = 2 * np.pi * ((np.arange(COUNT) * 0.618) % 1)  # rad: the golden section spreads them evenly
+ROWS_APART = 2.0 * np.arange(COUNT) - COUNT + 1  # m, y of the collisions: they do not meet
+FREE = [0.0, COUNT + 4.0]  # m, of a disk that meets nothing
+SLOWEST, FASTEST = 1e-3, 20.0  # m/s, range in which a threshold is searched; 2/3 radii in 1/60 s
 NEAR = 0.05  # of e: a smaller difference from e at `FASTEST` counts as equal
 BOUNCES = 5
+HEIGHTS = np.linspace(1.9, 2.1, COUNT)  # m
 
 
-def threshold(row: EngineRow) -> float:
+def pairs(speed: float | Array, dt: float, spin: float = 0.0, scale: float = 1.0) -> Scene:
+    """`COUNT` pairs of equal disks that meet along x at `speed` m/s after 4 steps and their phase,
+    with all lengths `scale` times as long, and a free disk; e = 0.5."""
+    gap, still = speed * dt * (4 + PHASES), 0 * PHASES
+    position = np.stack([-0.5 - gap / 2, ROWS_APART, 0.5 + gap / 2, ROWS_APART], axis=1)
+    velocity = np.stack([still + speed / 2, still, still - speed / 2, still], axis=1)
+    return scene_of(
+        position=scale * np.vstack([position.reshape(-1, 2), FREE]),
+        velocity=scale * np.vstack([velocity.reshape(-1, 2), [2.0, 0.0]]),
+        angle=np.append(np.repeat(ANGLES, 2), 0.0),
+        angular_velocity=np.full(2 * COUNT + 1, spin),
+        radius=np.full(2 * COUNT + 1, 0.5 * scale),
+        mass=np.ones(2 * COUNT + 1),
+        inertia=np.full(2 * COUNT + 1, 0.125 * scale**2),
+    )
+
+
+def collide(engine: Engine, scene: Scene, dt: float) -> tuple[Array, Array]:
+    """(n, 3) x, y, spin: the velocities of all disks but the last before and after the collisions.
+
+    The last one is free: what the air of an engine takes from its speed is taken from those before,
+    too. The polygons of matter meet later than disks do: all that have met nothing go on.
+    """
+    engine.load(scene, dt)
+    start = velocities(engine)
+    for _ in range(8):
+        engine.step(24)
+        after = velocities(engine)
+        before = start * (after[-1, 0] / start[-1, 0])
+        change = np.abs(after - before)[:-1, 0]
+        if (change > 1e-3 * np.abs(before[:-1, 0])).all():
+            break
+    return before[:-1], after[:-1]
+
+
+def velocities(engine: Engine) -> Array:
+    """(n, 3) x, y, spin."""
+    state = engine.read()
+    return np.column_stack([state.velocity, state.angular_velocity])
+
+
+def restitution(engine: Engine, dt: float, speed: float | Array = 2.0, scale: float = 1.0) -> Array:
+    """Separation over approach speed of each pair; NaN if they have not met."""
+    states = collide(engine, pairs(speed, dt, scale=scale), dt)
+    before, after = (state[1::2, 0] - state[::2, 0] for state in states)
+    return np.where(after > 0.999 * before, -after / before, np.nan)
+
+
+def threshold(engine: Engine, dt: float) -> Array:
     """m/s: the closing speed from which on a pair bounces as it does at `FASTEST`, to 1 %; 0 if it
     already does at `SLOWEST`."""
-
-    def restitution(closing: float) -> float:
-        return float(physics.restitution(row, closing).got)
-
-    usual, low, high = restitution(FASTEST), SLOWEST, FASTEST
-    if abs(restitution(low) - usual) < NEAR:
-        return 0.0
-    while high > 1.01 * low:
-        middle = (low * high) ** 0.5
-        low, high = (low, middle) if abs(restitution(middle) - usual) < NEAR else (middle, high)
-    return high
+    usual = restitution(engine, dt, FASTEST)
+    low, high = np.full(COUNT, SLOWEST), np.full(COUNT, FASTEST)
+    always = np.abs(restitution(engine, dt, low) - usual) < NEAR
+    while not always.all() and (high > 1.01 * low).any():
+        middle = np.sqrt(low * high)
+        bounces = np.abs(restitution(engine, dt, middle) - usual) < NEAR
+        low, high = np.where(bounces, low, middle), np.where(bounces, middle, high)
+    return np.where(always, 0.0, high)
 
 
-def elastic_energy(row: EngineRow) -> float:
-    """%, of the height that a disk dropped by 2 m with e = 1 gains in `BOUNCES` bounces, in steps
-    of 1/256 s; 0 is exact."""
-    gravity, drop = 10.0, 2.0
-    fall = (2 * drop / gravity) ** 0.5
+def wall_restitution(engine: Engine, dt: float) -> Array:
+    """Speed after over speed before a collision of 2 m/s on a wall."""
+    at = np.stack([-2.0 * dt * (4 + PHASES), ROWS_APART], axis=1)
+    scene = scene_of(
+        position=np.vstack([at, FREE]),
+        velocity=np.tile([2.0, 0.0], (COUNT + 1, 1)),
+        angle=np.append(ANGLES, 0.0),
+        radius=np.full(COUNT + 1, 0.5),
+        mass=np.full(COUNT + 1, 7.3),
+        walls=[[[0.5, -COUNT - 1], [0.5, COUNT + 1]]],
+    )
+    before, after = collide(engine, scene, dt)
+    return -after[:, 0] / before[:, 0]
+
+
+def height_gained(engine: Engine, dt: float) -> Array:
+    """%, of the height that a disk dropped with e = 1 gains in `BOUNCES` bounces, between this and
+    the next one; 0 is exact, -100 that it lies on the floor."""
+    gravity, radius = 10.0, 0.25
     scene = scene_of(
         restitution=1.0,
-        position=[[0.0, 0.25 + drop]],
-        velocity=[[0.0, 0.0]],
-        radius=[0.25],
-        mass=[1.0],
+        position=np.stack([ROWS_APART / 2, radius + HEIGHTS], axis=1),
+        velocity=np.zeros((COUNT, 2)),
+        angle=ANGLES,
+        radius=np.full(COUNT, radius),
+        mass=np.ones(COUNT),
         gravity=[0.0, -gravity],
-        walls=[[[-8.0, 0.0], [8.0, 0.0]]],
+        walls=[[[-COUNT, 0.0], [COUNT, 0.0]]],
     )
-    with loaded(row, scene) as engine:
-        engine.step(round((2 * BOUNCES - 0.5) * fall / DT))
-        heights = []
-        for _ in range(round(fall / DT)):
-            engine.step()
-            heights.append(float(engine.read().position[0, 1]))
-    return 100 * ((max(heights) - 0.25) / drop - 1)
-
-
-def lever(row: EngineRow) -> float:
-    """The lever arm by which friction turns a disk in a bounce, in radii."""
-    scene = replace(head_on(2.0, spin=40.0), friction=physics.FRICTION)
-    before, after = collided(row, scene)
-    taken = scene.mass[1] * float((after.velocity - before.velocity)[1, 1])
-    turned = scene.inertia[1] * float((after.angular_velocity - before.angular_velocity)[1])
-    return abs(turned / taken) / float(scene.radius[1]) if taken else float("nan")
-
-
-def scaled(row: EngineRow, scale: float) -> float:
-    """e of two equal disks of 0.5 m that close at 2 m/s, where 0.5 is stated, with all lengths
-    `scale` times as long."""
-    scene = head_on(2.0)
-    small = replace(
-        scene,
-        position=scale * scene.position,
-        velocity=scale * scene.velocity,
-        radius=scale * scene.radius,
-        inertia=scale**2 * scene.inertia,
+    engine.load(scene, dt)
+    # The top is due after 10 times the time of a fall; a fifth later, as the height may grow.
+    steps, every = round(12 * (2 * HEIGHTS.max() / gravity) ** 0.5 / dt), round(1 / 32 / dt)
+    if expect := getattr(engine, "expect", None):
+        expect(every, steps // every)
+    height, speed = np.empty((2, steps // every, COUNT))
+    for k in range(steps // every):
+        engine.step(every)
+        state = engine.read()
+        height[k], speed[k] = state.position[:, 1] - radius, state.velocity[:, 1]
+    count = np.cumsum((speed[:-1] < 0) & (speed[1:] > 0), axis=0)
+    last = np.minimum(count[-1], BOUNCES)  # of a disk that has come to rest, the last one
+    top = np.argmax(np.where(count == last, height[1:], 0.0), axis=0) + 1
+    # The flight is a parabola in the number of the sample: its top from the three highest ones.
+    low, middle, high = (
+        height[np.clip(top + side, 0, len(height) - 1), range(COUNT)] for side in (-1, 0, 1)
     )
-    return physics.pair_restitution(row, small)
+    apex = middle + divide((high - low) ** 2, 8 * (2 * middle - low - high))
+    gained: Array = 100 * (np.where(np.isnan(apex), middle, apex) / HEIGHTS - 1)
+    return gained
 
 
-def reading(probe: str) -> Callable[[EngineRow], float]:
-    """A function that returns the number read by a probe of the physics."""
+def impulses(
+    engine: Engine, dt: float, restitution: float, friction: float
+) -> tuple[Array, Array, Array]:
+    """Of a disk of each pair, where both spin so fast that they slide all through the collision:
+    the normal and the sideways change of its velocity, and that of its spin."""
+    scene = replace(pairs(2.0, dt, spin=40.0), restitution=restitution, friction=friction)
+    before, after = collide(engine, scene, dt)
+    normal, sideways, turned = (after - before)[::2].T
+    return normal, sideways, turned
 
-    def read(row: EngineRow) -> float:
-        got = physics.PHYSICS[probe].read(row).got
-        return float("nan") if isinstance(got, str) else got
 
-    return read
+def effective_friction(
+    engine: Engine, dt: float, restitution: float = 0.5, friction: float = FRICTION
+) -> Array:
+    """Sideways over normal momentum of a disk; NaN if it met nothing."""
+    normal, sideways, _ = impulses(engine, dt, restitution, friction)
+    return np.abs(divide(sideways, normal))
+
+
+def lever(engine: Engine, dt: float) -> Array:
+    """The lever arm by which friction turns a disk in a bounce, in radii; NaN without friction."""
+    normal, sideways, spin = impulses(engine, dt, 0.5, FRICTION)
+    sideways = np.where(np.abs(sideways) > 1e-3 * np.abs(normal), sideways, 0.0)
+    return np.abs(divide(0.125 * spin, sideways)) / 0.5
+
+
+def divide(a: Array, b: Array) -> Array:
+    """a / b, and NaN where b is 0."""
+    quotient: Array = np.divide(a, b, out=np.full(len(b), np.nan), where=b != 0)
+    return quotient
+
+
+def fast_spin(engine: Engine, dt: float) -> Array:
+    """rad/s, of free disks that start with 300 rad/s, after 4 steps."""
+    scene = scene_of(
+        position=np.stack([0 * ROWS_APART, ROWS_APART], axis=1),
+        velocity=np.zeros((COUNT, 2)),
+        angle=ANGLES,
+        angular_velocity=np.full(COUNT, 300.0),
+        radius=np.full(COUNT, 0.5),
+        mass=np.ones(COUNT),
+    )
+    engine.load(scene, dt)
+    engine.step(4)
+    return engine.read().angular_velocity
 
 
 class ImpactColumn(NamedTuple):
-    """A column of the table: its heading in README, and how it is read; NaN if an engine refuses
-    the scene."""
+    """A column of the table: its heading in README, and the function of engine and dt that takes
+    its `COUNT` readings."""
 
     heading: str
-    read: Callable[[EngineRow], float]
+    read: Callable[[Engine, float], Array]
 
 
 COLUMNS: dict[str, ImpactColumn] = {
     "threshold": ImpactColumn("bounces from m/s", threshold),
-    "e_slow": ImpactColumn("e at 0.1 m/s", reading("restitution_0.1")),
-    "e_2": ImpactColumn("e at 2 m/s", reading("restitution_2")),
-    "e_wall": ImpactColumn("e on a wall", reading("restitution_wall")),
-    "e_small": ImpactColumn("e of 5 mm disks", partial(scaled, scale=0.01)),
-    "energy": ImpactColumn(f"height gained in {BOUNCES} bounces, e = 1", elastic_energy),
-    "friction_unasked": ImpactColumn("friction, none stated", reading("friction")),
-    "friction_0": ImpactColumn("friction at e = 0", reading("friction_0")),
-    "friction_1": ImpactColumn("friction at e = 1", reading("friction_1")),
+    "e_slow": ImpactColumn("e at 0.1 m/s", partial(restitution, speed=0.1)),
+    "e_2": ImpactColumn("e at 2 m/s", restitution),
+    "e_wall": ImpactColumn("e on a wall", wall_restitution),
+    "e_small": ImpactColumn("e of 5 mm disks", partial(restitution, scale=0.01)),
+    "energy": ImpactColumn(f"height gained in {BOUNCES} bounces, e = 1, %", height_gained),
+    "friction_unasked": ImpactColumn(
+        "friction, none stated", partial(effective_friction, friction=0.0)
+    ),
+    "friction_0": ImpactColumn("friction at e = 0", partial(effective_friction, restitution=0.0)),
+    "friction_1": ImpactColumn("friction at e = 1", partial(effective_friction, restitution=1.0)),
     "lever": ImpactColumn("lever arm of friction", lever),
-    "spin": ImpactColumn("300 rad/s after 4 steps", reading("fast_spin")),
+    "spin": ImpactColumn("300 rad/s after 4 steps", fast_spin),
 }
-
-SHORT = ("threshold", "energy", "friction_unasked", "friction_1", "spin", "e_small")
+RANGE = ("", "_low", "_high")  # of a column of the file: the median, the least, the most
 ROWS = ENGINES | FETCHED
-# the engines from outside this project
-OUTSIDE = list(dict.fromkeys(name.partition(":")[0] for name, row in ROWS.items() if row.outside))
 
 
-def row_of_table(name: str, row: EngineRow) -> dict[str, float | str]:
-    """The row of one engine, with the date and its versions."""
+def rows_of_table(name: str, row: EngineRow) -> list[dict[str, float | str]]:
+    """The rows of one engine, one for each step size, with the date and its versions."""
+    rows = list[dict[str, float | str]]()
     with closing(row.make()) as engine:
-        engine.load(head_on(2.0), DT)
-        versions = ", ".join(f"{library} {number}" for library, number in engine.versions().items())
-    known: dict[str, float | str] = {
-        "engine": name,
-        "numbers": "float32" if row.rounding == FLOAT32 else "float64",
-        "date": date.today().isoformat(),
-        "versions": versions,
-    }
-    return known | {key: asked(column.read, row) for key, column in COLUMNS.items()}
+        for dt in STEP_SIZES:
+            cells: dict[str, float | str] = {"engine": name, "dt": f"1/{round(1 / dt)} s"}
+            for key, column in COLUMNS.items():
+                numbers = read(column, engine, dt)
+                spread = (np.median(numbers), numbers.min(), numbers.max())
+                cells |= {f"{key}{end}": float(at) for end, at in zip(RANGE, spread)}
+            versions = engine.versions().items()
+            cells["numbers"] = "float32" if row.rounding == FLOAT32 else "float64"
+            cells["date"] = date.today().isoformat()
+            cells["versions"] = ", ".join(f"{library} {number}" for library, number in versions)
+            rows.append(cells)
+    return rows
 
 
-def asked(read: Callable[[EngineRow], float], row: EngineRow) -> float:
-    """The result of `read`; NaN if the engine refuses the scene."""
+def read(column: ImpactColumn, engine: Engine, dt: float) -> Array:
+    """The readings of a column that are numbers; NaN if the engine refuses the scene."""
     try:
-        return read(row)
+        numbers = column.read(engine, dt)
     except (Unsupported, Frictionless):
-        return float("nan")
+        return np.array([np.nan])
+    met = numbers[~np.isnan(numbers)]
+    return met if len(met) else np.array([np.nan])
 
 
 def table_of(rows: Mapping[str, EngineRow]) -> pd.DataFrame:
-    """A row for each engine: engine, numbers, date, versions, then `COLUMNS`."""
-    return pd.DataFrame([row_of_table(name, row) for name, row in rows.items()])
+    """A row for each engine and step size: engine, dt, `COLUMNS`, numbers, date, versions."""
+    return pd.DataFrame([cells for name, row in rows.items() for cells in rows_of_table(name, row)])
 
 
 def kept() -> pd.DataFrame:
@@ -172,65 +271,32 @@ def kept() -> pd.DataFrame:
 
 def in_markdown(table: pd.DataFrame) -> str:
     """The table in the form of README, followed by its date and versions."""
-    headings = ["engine", *(column.heading for column in COLUMNS.values()), "numbers"]
+    headings = ["engine", "dt", *(column.heading for column in COLUMNS.values()), "numbers"]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
     for row in table.to_dict("records"):
-        cells = [f"`{row['engine']}`", *(cell(key, row[key]) for key in COLUMNS), row["numbers"]]
-        lines.append(f"| {' | '.join(cells)} |")
+        cells = [cell(key, *(row[f"{key}{end}"] for end in RANGE)) for key in COLUMNS]
+        lines.append(f"| `{row['engine']}` | {' | '.join([row['dt'], *cells, row['numbers']])} |")
     versions = dict.fromkeys(", ".join(table.versions).split(", "))
-    read = f"Read on {days(table)} with {', '.join(versions)}."
-    return "\n".join([*lines, "", *wrap(read, 120)]) + "\n"
+    days = " to ".join(dict.fromkeys((table.date.min(), table.date.max())))
+    text = f"Read on {days} with {', '.join(versions)}."
+    return "\n".join([*lines, "", *wrap(text, 120)]) + "\n"
 
 
-def short_form(table: pd.DataFrame) -> str:
-    """A row for each outside engine with the columns of `SHORT`: a number for each of its profiles,
-    with an arrow between those that differ."""
-    headings = [f"read on {days(table)}", *(COLUMNS[key].heading for key in SHORT), "numbers"]
-    lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
-    for engine, rows in table.groupby(table.engine.str.partition(":")[0], sort=False):
-        if engine in OUTSIDE:
-            lines.append(short_row(str(engine), rows.to_dict("records")))
-    return "\n".join(lines)
-
-
-def short_row(engine: str, profiles: list[dict[Any, Any]]) -> str:
-    """The row of an engine in the short form, from those of its profiles."""
-    cells = [f"`{engine}` ({profiles[0]['versions'].partition(',')[0]})"]
-    for key in SHORT:
-        numbers = [cell(key, row[key]) for row in profiles]
-        cells.append(" → ".join(numbers) if len({*numbers}) > 1 else numbers[0])
-    return f"| {' | '.join([*cells, profiles[0]['numbers']])} |"
-
-
-def days(table: pd.DataFrame) -> str:
-    """The day on which the rows were read, or the first and the last one."""
-    return " to ".join(dict.fromkeys((table.date.min(), table.date.max())))
-
-
-def cell(column: str, value: float) -> str:
-    """A number to three digits; "-" for none."""
-    if np.isnan(value):
+def cell(column: str, *spread: float) -> str:
+    """The median in the digits of its column, and the range if that has others; "-" for none."""
+    if np.isnan(spread[0]):
         return "-"
-    if column == "energy":
-        return f"{round(value, 1) + 0.0:+.1f} %"  # avoids -0.0
-    return f"{round(value, 6):.3g}"
+    form = {"energy": "{:+.1f}", "threshold": "{:.2g}"}.get(column, "{:.3g}")
+    places = 1 if column == "energy" else 5  # + 0.0 avoids -0.0
+    middle, least, most = (form.format(round(number, places) + 0.0) for number in spread)
+    return middle if least == most else f"{middle} ({least} to {most})"
 
 
 def with_table(text: str, table: pd.DataFrame) -> str:
     """The text of adapters/README.md with this table."""
-    return placed(text, BEGIN, in_markdown(table), END)
-
-
-def with_short_form(text: str, table: pd.DataFrame) -> str:
-    """The text of the repository's README with the short form of this table."""
-    return placed(text, SHORT_BEGIN, short_form(table), SHORT_END)
-
-
-def placed(text: str, begin: str, what: str, end: str) -> str:
-    """The text with `what` between the first `begin` and the `end` that follows it."""
-    before, _, rest = text.partition(begin)
-    _, _, after = rest.partition(end)
-    return before + begin + what + end + after
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return before + BEGIN + in_markdown(table) + END + after
 
 
 def with_anew(engines: Sequence[str]) -> pd.DataFrame:
@@ -242,13 +308,12 @@ def with_anew(engines: Sequence[str]) -> pd.DataFrame:
 
 
 def main(*engines: str) -> None:
-    """Probe these engines, or all if none is named, and write the file and both tables."""
+    """Probe these engines, or all if none is named, and write the file and the table."""
     if unknown := {*engines} - {name.partition(":")[0] for name in ROWS}:
         sys.exit(f"no engine is called {', '.join(sorted(unknown))}")
     table = with_anew(engines) if engines else table_of(ROWS)
     table.to_csv(KEPT, index=False, float_format="%.10g")
-    for path, filled in ((README, with_table), (FRONT, with_short_form)):
-        path.write_text(filled(path.read_text(encoding="utf-8"), kept()), encoding="utf-8")
+    README.write_text(with_table(README.read_text(encoding="utf-8"), kept()), encoding="utf-8")
 
 
 if __name__ == "__main__":

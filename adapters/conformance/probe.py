@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -20,14 +21,24 @@ EXERCISE = 0.9  # the restitution that the exercise states
 DT = 1 / 256  # s; a power of two, so that multiples of it are exact
 
 
+# The laws that an engine breaks, where a probe tells which.
+Departure = StrEnum(
+    "Departure",
+    "MEMORY DT_IGNORED PATH SPEED GRAVITY_UNSTATED GRAVITY_ABSENT GRAVITY_UPWARD GRAVITY STATIC"
+    " MASSES MOMENTUM PASSES STICKS RESTITUTION BY_MASS TANGENTIAL WALL_PASSES WALL_STICKS"
+    " WALL_RESTITUTION WALL_TANGENTIAL",
+)
+
+
 class ProbeReading(NamedTuple):
     """The reading of a probe: a number that must be within `bound` of `expected`, or words that
-    must equal it."""
+    must equal it; and if it is not, the law that is broken."""
 
     got: float | str
     expected: float | str
     bound: float = 0.0
     note: str = ""
+    departure: Departure | None = None
 
     @property
     def kept(self) -> bool:
@@ -170,8 +181,13 @@ def reported(engine: Engine, dt: float = DT) -> str:
 
 def must_report(engine: Engine) -> None:
     """Raise `Unsupported` for an engine whose settings say that it reports no collisions."""
-    if engine.settings().get("collisions", (None, None))[1] == SILENT:
+    if is_silent(engine):
         raise Unsupported("it reports no collisions")
+
+
+def is_silent(engine: Engine) -> bool:
+    """Whether the engine's settings say that it reports no collisions."""
+    return bool(engine.settings().get("collisions", (None, None))[1] == SILENT)
 
 
 def act_on(engine: Engine, disk: int, force: tuple[float, float], torque: float) -> bool:

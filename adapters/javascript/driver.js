@@ -119,13 +119,15 @@ const crosscheck = (() => {
     return { readings: readings.length };
   }
 
-  // As the exercise's projectObjects: beyond an edge of the box, onto the opposite one.
+  // A coordinate that has left the box goes on from the opposite edge.
+  const ontoTorus = (x, low, high) => x >= low && x <= high ? x : x - Math.floor((x - low) / (high - low)) * (high - low);
+
   function wrap() {
     const [[left, bottom], [right, top]] = scene.wrap;
     for (let i = 0; i < scene.n; i++) {
       const [x, y] = world.read(i);
       if (x >= left && x <= right && y >= bottom && y <= top) continue;
-      world.place(i, x < left ? right : x > right ? left : x, y < bottom ? top : y > top ? bottom : y);
+      world.place(i, ontoTorus(x, left, right), ontoTorus(y, bottom, top));
     }
   }
 

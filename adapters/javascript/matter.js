@@ -5,9 +5,11 @@
 {
   const Matter = module.exports;
   const BASE = 1000 / 60;  // ms, in which matter's speeds are
+  const RESTING = Matter.Resolver._restingThresh;  // of the library, not of a world: every world sets it
   const THIN = 1e-3;  // pixels, of a wall: it has no segments
   const common = {
     friction: null, turning: true, position_iterations: 6, velocity_iterations: 4, sleeping: false,
+    slop: null, resting: RESTING,
   };
   // A hundred pixels in a metre, as in a page; its own friction of the air, static friction and number of sides.
   const shipped = { ...common, matched: false, pixels: 100, friction_air: null, friction_static: null, sides: 25 };
@@ -20,6 +22,7 @@
     const { dt, restitution } = scene;
     const scale = chosen.matched ? chosen.pixels_in_radius / Math.min(...scene.radius) : chosen.pixels;
     const speed = scale * BASE / 1000, spin = BASE / 1000, force = scale * 1e-6;
+    Matter.Resolver._restingThresh = chosen.resting;
     const engine = Matter.Engine.create({
       positionIterations: chosen.position_iterations, velocityIterations: chosen.velocity_iterations,
       enableSleeping: chosen.sleeping,
@@ -27,7 +30,9 @@
     });
     const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
     const friction = chosen.friction === null ? stated : chosen.friction;
-    const set = { friction, frictionAir: chosen.friction_air, frictionStatic: chosen.friction_static };
+    const set = {
+      friction, frictionAir: chosen.friction_air, frictionStatic: chosen.friction_static, slop: chosen.slop,
+    };
     const surface = () => ({
       restitution, ...Object.fromEntries(Object.entries(set).filter(([, value]) => value !== null)),
     });

@@ -36,6 +36,7 @@
       settings.velocityThreshold = unit / chosen.time_unit;
       settings.maxTranslation = settings.maxRotation = 1e9;
     }
+    for (const name of Object.keys(DEFAULTS)) if (name in chosen) settings[name] = chosen[name];
     Object.assign(planck.Settings, settings);
   }
 

@@ -17,7 +17,7 @@
     const { dt, restitution } = scene;
     const space = new RAPIER.World(vector(scene.gravity));
     space.timestep = dt;
-    if (chosen.matched) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
+    if (chosen.length_unit) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
     if (chosen.iterations !== null) space.numSolverIterations = chosen.iterations;
     const parameters = space.integrationParameters;
     if (chosen.continuous_steps !== null) parameters.maxCcdSubsteps = chosen.continuous_steps;
@@ -50,11 +50,12 @@
       add(RAPIER.ColliderDesc.segment(vector(start), vector(end)), body, -1 - w);
     });
     const queue = hear ? new RAPIER.EventQueue(true) : undefined;
-    // What it cuts speeds and spins at, found by the probes: 400 length units a second, an eighth of a turn a step.
+    // What it cuts speeds and spins at: 400 length units a second, an eighth of a turn a step.
     const caps = { speed: 400 * space.lengthUnit, spin: Math.PI / 4 / dt };
     const why = {
-      speed: `at which Rapier cuts speeds: 400 of its length units of ${+space.lengthUnit.toPrecision(4)} m a second`,
-      spin: "the most that Rapier allows at this dt",
+      speed: `at which Rapier cuts speeds: 400 of its length units of ${+space.lengthUnit.toPrecision(4)} m a second`
+        + " (normalized_max_linear_velocity of the crate, which the npm package does not hand on)",
+      spin: "the most that Rapier allows at this dt: an eighth of a turn",
     };
     function mustNotBeCut(what, value, unit) {
       // float32 leaves what was cut a little below the cap

@@ -28,7 +28,7 @@ from adapters.mechanisms.contacts import (
 )
 from adapters.mechanisms.recycling import detect_again
 from reference_impl.compiled import compiled, internal, pasted
-from reference_impl.coulomb import collide, collide_wall
+from reference_impl.coulomb import carry_over, collide, collide_wall
 from reference_impl.exercise import touching, touching_wall, wrap
 from reference_impl.state import Disks, World
 
@@ -83,6 +83,7 @@ class Parameters(NamedTuple):
     project_walls: bool = True  # of `walls`
     iterations: int = 8  # of `bounce`
     lever: float = 0.0  # of the gap, added to the lever arm of friction, the radius
+    onto_edge: bool = True  # a disk that leaves the box is set onto the edge: its flight is cut off
     rub_first: bool = False  # of `bounce`: friction before the normal impulse of the same pass
     rub_restituted: bool = True  # of `restitute`: its impulses allow more friction
     rub_biased: bool = True  # of `soften`: friction in its first pass, too
@@ -120,7 +121,10 @@ def advance(
         for c in range(kept.found[0]):
             if kept.rows[c].impulse > 0.0:
                 collisions.append((k, kept.rows[c].i, kept.rows[c].j, kept.rows[c].impulse))
-        wrap(disks.position, world)
+        if on.onto_edge:
+            wrap(disks.position, world)
+        else:
+            carry_over(disks.position, world)
     return collisions
 
 

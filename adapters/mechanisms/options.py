@@ -47,8 +47,9 @@ OPTIONS: tuple[Option, ...] = tuple(
         ),
     )
 )
-"""What an engine cannot be changed in is not here: pymunk has no CCD and always starts warm, Box2D
-3.1 hides its warm start, and no outside engine lets its broad phase be disabled."""
+"""What cannot be changed is not here: Munk2D has no CCD and always starts warm; Box2D 3.1 has
+b2World_EnableWarmStarting, which pyb2d3 does not hand on; no library can disable its broad phase.
+"""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ NAMES = (
     "restitution",
     "impulse",
     "contact recycling",
+    "edges of the box",
     "friction",
     "wall skin",
     "position correction",
@@ -38,6 +39,7 @@ NAMES = (
     RESTITUTION,
     IMPULSE,
     RECYCLING,
+    EDGES,
     FRICTION,
     SKIN,
     POSITION_CORRECTION,
@@ -54,6 +56,7 @@ END_OF_STEP: dict[str, Any] = {
     "alpha": 0.5,
     "project": False,
     "project_walls": False,
+    "onto_edge": False,
 }
 
 
@@ -107,8 +110,12 @@ def with_mechanisms(mechanisms: Sequence[Mechanism]) -> AblatedReference:
     return AblatedReference(**parameters)
 
 
-def _exercise(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:
-    return [Mechanism(POSITION_CORRECTION, {"project": True, "project_walls": True})]
+def _exercise(_reported: Mapping[str, Any], scene: Scene, _dt: float) -> list[Mechanism]:
+    # projectObjects sets a disk that leaves onto the edge, wherever the step ends.
+    return [
+        *([] if scene.wrap is None else [Mechanism(EDGES, {"onto_edge": True})]),
+        Mechanism(POSITION_CORRECTION, {"project": True, "project_walls": True}),
+    ]
 
 
 def _lesson(_reported: Mapping[str, Any], _scene: Scene, _dt: float) -> list[Mechanism]:

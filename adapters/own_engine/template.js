@@ -27,9 +27,10 @@ function step(world, dt, forces) {
   }
   for (const a of disks) for (const b of disks) if (a.i < b.i) collide(world, a, b, b.i);
   for (const a of disks) walls.forEach((wall, w) => collide(world, a, nearest(wall, a), -1 - w));
-  if (wrap) for (const d of disks) {  // beyond an edge, onto the opposite one
-    d.x = d.x < wrap[0][0] ? wrap[1][0] : d.x > wrap[1][0] ? wrap[0][0] : d.x;
-    d.y = d.y < wrap[0][1] ? wrap[1][1] : d.y > wrap[1][1] ? wrap[0][1] : d.y;
+  if (wrap) for (const d of disks) {  // beyond an edge: on from the opposite one
+    const width = wrap[1][0] - wrap[0][0], height = wrap[1][1] - wrap[0][1];
+    d.x += d.x < wrap[0][0] ? width : d.x > wrap[1][0] ? -width : 0;
+    d.y += d.y < wrap[0][1] ? height : d.y > wrap[1][1] ? -height : 0;
   }
 }
 

@@ -58,9 +58,10 @@ def step(world, dt, forces):
 
 
 def wrap(d, low, high):
-    """Beyond an edge, onto the opposite one."""
-    d.x = high[0] if d.x < low[0] else low[0] if d.x > high[0] else d.x
-    d.y = high[1] if d.y < low[1] else low[1] if d.y > high[1] else d.y
+    """Beyond an edge: on from the opposite one."""
+    width, height = high[0] - low[0], high[1] - low[1]
+    d.x += width if d.x < low[0] else -width if d.x > high[0] else 0
+    d.y += height if d.y < low[1] else -height if d.y > high[1] else 0
 
 
 def nearest(wall, d):

@@ -123,9 +123,10 @@ def read_solver(path: Path) -> SolverText:
     text = decoded(path, data)
     if not text.strip():
         raise NotASolver(f"{path}: is empty; save your solver into it")
-    if is_python_in_javascript(kind, text):
+    javascript, python = FUNCTION.search(text), DEF.search(text)
+    if kind == "javascript" and python and not re.search("function|=>", text):
         raise NotASolver(f"{path}: is written in Python; give it a name that ends in .py")
-    if is_javascript_in_python(kind, text):
+    if kind == "python" and javascript and not python:
         raise NotASolver(f"{path}: is written in JavaScript; give it a name that ends in .js")
     imported = read_imported(path, text) if kind == "python" else read_library(path, text)
     return SolverText(
@@ -133,23 +134,16 @@ def read_solver(path: Path) -> SolverText:
     )
 
 
-def is_python_in_javascript(kind: str, text: str) -> bool:
-    """Whether a .js file has a function of Python, and nothing that begins one of JavaScript."""
-    return kind == "javascript" and bool(DEF.search(text)) and not re.search("function|=>", text)
-
-
-def is_javascript_in_python(kind: str, text: str) -> bool:
-    """Whether a .py file has a function of JavaScript and none of Python."""
-    return kind == "python" and bool(FUNCTION.search(text)) and not DEF.search(text)
-
-
 def read_imported(path: Path, text: str) -> dict[str, str]:
     """The texts of the modules that a solver of that `text` imports from its own folder; raises
     `NotASolver`."""
     itself, imported = path.resolve(), dict[str, str]()
-    for file, module in modules_beside(
-        itself.parent, text, lambda one: text if one == itself else read_module(one)
-    ):
+
+    def text_of(one: Path) -> str:
+        wanted = "a module that a solver imports is a file"
+        return text if one == itself else decoded(one, read_bytes(one, wanted))
+
+    for file, module in modules_beside(itself.parent, text, text_of):
         imported[file] = module
         if sum(map(len, imported.values())) > LARGEST:
             raise NotASolver(
@@ -166,11 +160,6 @@ def read_library(path: Path, text: str) -> dict[str, str]:
 
     found = gl_matrix_of(path, text)
     return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], where_to()))}
-
-
-def read_module(path: Path) -> str:
-    """The text of a module beside a solver; raises `NotASolver`."""
-    return decoded(path, read_bytes(path, "a module that a solver imports is a file"))
 
 
 def read_bytes(path: Path, wanted: str) -> bytes:

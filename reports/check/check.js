@@ -3,7 +3,8 @@
 
 const looks = JSON.parse(document.getElementById("looks").textContent);
 const darkness = matchMedia("(prefers-color-scheme: dark)");
-const darkPage = () => darkness.matches;
+let onPaper = false;
+const darkPage = () => darkness.matches && !onPaper;
 
 async function openReplay(section) {
   const number = section.dataset.scene;
@@ -17,4 +18,12 @@ async function openReplay(section) {
   darkness.addEventListener("change", () => player.draw());
 }
 
+// On paper: the paths, and the spheres at their ends.
+function drawPaper(paper) {
+  onPaper = paper;
+  Object.values(players).forEach((player) => player.seek(paper ? player.until : player.time));
+}
+
+addEventListener("beforeprint", () => drawPaper(true));
+addEventListener("afterprint", () => drawPaper(false));
 document.querySelectorAll("[data-scene]").forEach(openReplay);

@@ -47,7 +47,7 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
         tasks={task: TASKS[task] for task in TASKS if any(task in one.worth for one in marked)},
         results=results(checks),
         waits=sum(bool(one.not_judged) for one in marked),
-        twice=shared_ids(marked),
+        twice=[name for name, rows in Counter(one.id for one in marked).items() if rows > 1],
         points=bars(distribution(marked)),
         causes=bars(causes(marked)),
         copies=same_code(root, checks),
@@ -57,11 +57,6 @@ def write_class_page(path: Path, marked: Sequence[Marked]) -> None:
         version=version("crosscheck2d"),
     )
     put_text(path, sealed(html))
-
-
-def shared_ids(marked: Sequence[Marked]) -> list[str]:
-    """The ids that several rows have."""
-    return [name for name, rows in Counter(one.id for one in marked).items() if rows > 1]
 
 
 def distribution(marked: Sequence[Marked]) -> dict[str, int]:

@@ -1,5 +1,5 @@
-"""`crosscheck check`: checks a file or a folder of them, and writes a table, a page, or a format of
-formats/."""
+"""`crosscheck check`: checks a file or a folder of them, and writes a table, a page, or one of the
+formats."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from adapters.own_solver.file import (
 )
 from adapters.own_solver.gl_matrix import HANDED_OUT
 from adapters.own_solver.process import SolverProcess, keep_processes
-from reports.check.formats.formats import FORMATS
-from reports.check.formats.table import show
+from reports.check.formats import FORMATS, show
 from reports.check.functions import keeps_state
 from reports.check.marks import Marked, id_of, matched, place_of
 from reports.check.points import DEFAULT, BadPoints, Points, read_points
@@ -96,8 +95,7 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     beside = {file: passed_over(file, home) for file, home in homes.items()}
     places = [f"{homes[file].name}/{one}" for file, others in beside.items() for one in others]
     not_read = [*others_in(path, files), *places] if several else []
-    wanted = [FORMATS[one.format].scenes for one in outputs] + [page is not None and not several]
-    scenes = scenes_of(checks[0]) if any(wanted) else []
+    scenes = scenes_of(checks[0]) if page is not None and not several else []
     marked = marks_of(path, checks, grading, not_read, beside, scenes)
     printed = next((one.format for one in outputs if one.path is None), "")
     if printed:
@@ -274,7 +272,8 @@ def solvers_below(folder: Path) -> list[Path]:
         if not any(part.startswith(NOBODYS) for part in file.relative_to(folder).parts)
         and file.suffix.lower() in KINDS
         and (file.is_file() or dangling(file))
-        and not is_handed_out(file)
+        # what the exercise's page loads beside a student's file
+        and not (file.match(HANDED_OUT) or file.name == "mainScript.js")
     )
 
 
@@ -336,11 +335,6 @@ def place_for(option: str, path: Path, mark: bytes, what: str, seals: bool = Tru
         refuse([str(fault)])
     except OSError as fault:
         refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
-
-
-def is_handed_out(file: Path) -> bool:
-    """Whether the exercise's page loads it beside a student's file."""
-    return file.match(HANDED_OUT) or file.name == "mainScript.js"
 
 
 def checked(files: Sequence[Path]) -> list[FileCheck]:

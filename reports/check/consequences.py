@@ -115,7 +115,7 @@ def spoilers(rows: Iterable[CheckRow]) -> dict[str, str]:
     """Task -> why a fault that nothing explains may follow from an explained one."""
     rows = list(rows)
     spoilt: dict[str, str] = {}
-    if displaced_velocities(rows):
+    if any((row.task, row.name, row.verdict) == ("2b", "velocities", "fault") for row in rows):
         spoilt |= dict.fromkeys(
             ("2c", "2d"), "it may follow from the fault in 2b, which changes the velocities, too"
         )
@@ -126,8 +126,3 @@ def spoilers(rows: Iterable[CheckRow]) -> dict[str, str]:
             parts = ("1",) if row.task == "1" else ("2a", "2b", "2c", "2d")
             spoilt |= dict.fromkeys(parts, KEPT)
     return spoilt
-
-
-def displaced_velocities(rows: Iterable[CheckRow]) -> bool:
-    """Whether a row says that the displacement of (b) changes velocities."""
-    return any((row.task, row.name, row.verdict) == ("2b", "velocities", "fault") for row in rows)

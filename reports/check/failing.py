@@ -48,7 +48,8 @@ def rows_until_failure(
         limit = SOON if was_stopped(answers) else LIMIT
         # the first must not be stopped before it has begun, as it may be on a busy machine
         left = left_by(process, [FAR], LIMIT) | left_by(process, [SHOWN["2"]], limit)
-        if fails_at_once(left):
+        # for distant spheres as for those that overlap: it fails before it compares distances
+        if all(left[name].failed and not moved(left, name) for name in (FAR, SHOWN["2"])):
             part = "2a"
         else:
             left |= left_by(process, needed(answers), limit)
@@ -95,12 +96,6 @@ def needed(answers: dict[str, SolverAnswer]) -> list[str]:
         *projection.DISPLACED,
         *pairs[:: 4 if was_stopped(answers) else 1],
     ]
-
-
-def fails_at_once(left: dict[str, SolverAnswer]) -> bool:
-    """Whether the call fails for two distant spheres just as for two that overlap, before it moves
-    any: it fails before it compares distances."""
-    return all(bool(left[name].failed) and not moved(left, name) for name in (FAR, SHOWN["2"]))
 
 
 def doubtful(left: dict[str, SolverAnswer]) -> list[str]:

@@ -126,11 +126,12 @@ def impulse_rows(
     apart = separating(answers, case)
     # the part whose mistake makes energy and restitution wrong
     spoilt = "2d" if case.right_c else "2c"
+    speeds = restitution.speeds(case.mistake)
     return [
         normal_impulse(case),
         tangential_impulse(case),
         *([] if spoilt == "2d" else energy_rows(case, restitution, spoilt)),
-        in_task(restitution.speeds(case.mistake), spoilt),
+        replace(speeds, task=spoilt) if speeds.verdict == "fault" else speeds,
         *([] if apart.task == "2d" else [apart]),
         new_velocity(case, 0),
         new_velocity(case, 1),
@@ -179,11 +180,6 @@ def no_velocities(cause: str) -> CheckRow:
 def unseen(task: str, why: str) -> list[CheckRow]:
     """The rows of (c) or (d) if it cannot be judged."""
     return [not_asked({"2c": "impulse", "2d": "velocity of A"}[task], task, why)]
-
-
-def in_task(row: CheckRow, task: str) -> CheckRow:
-    """A row, with its fault, if it is one, in this task."""
-    return replace(row, task=task) if row.verdict == "fault" else row
 
 
 def rows_before_failure(answers: dict[str, SolverAnswer]) -> list[CheckRow]:

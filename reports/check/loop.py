@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -278,7 +277,8 @@ def against_itself(question: Question, answers: dict[str, SolverAnswer]) -> Chec
 
     No two spheres are near each other here, so a sphere that changes has collided with itself.
     """
-    alone = [call[1] for call in answers["watched"].calls if is_with_itself(call)]
+    calls = [call for call in answers["watched"].calls if call[0] == "collide"]
+    alone = [call[1] for call in calls if call[1] == call[2] >= 0]
     if not alone:
         return None
     who = name_of(alone[0])
@@ -296,11 +296,6 @@ def against_itself(question: Question, answers: dict[str, SolverAnswer]) -> Chec
         cause = f"{who} is also tested against itself, which changes nothing"
         return CheckRow("itself", "loop", asked, got, "any", "free choice", cause)
     return judged("itself", "loop", asked, got, expected, False, cause)
-
-
-def is_with_itself(call: tuple[Any, ...]) -> bool:
-    """Whether a call passes one of the file's spheres twice to the collision function."""
-    return bool(call[0] == "collide" and call[1] == call[2] >= 0)
 
 
 def pairs_again(watched: SolverAnswer) -> set[frozenset[int]]:

@@ -18,24 +18,22 @@ class Outcome(NamedTuple):
         points: the effect on the points of a question: "not judged" points are not given.
         junit: the element that a JUnit test case holds; "" for none.
         gradescope: the status of a test of Gradescope.
-        classroom: the status of a test of GitHub Classroom.
     """
 
     short: str
     points: Literal["given", "lost", "not judged"]
     junit: str
     gradescope: str
-    classroom: str
 
 
 OUTCOMES: dict[Status, Outcome] = {
-    "right": Outcome("ok", "given", "", "passed", "pass"),
-    "free choice": Outcome("ok", "given", "", "passed", "pass"),
+    "right": Outcome("ok", "given", "", "passed"),
+    "free choice": Outcome("ok", "given", "", "passed"),
     # wrong because of a fault in another task, which costs its points there
-    "follows": Outcome("<-", "given", "skipped", "passed", "pass"),
-    "fault": Outcome("FAULT", "lost", "failure", "failed", "fail"),
+    "follows": Outcome("<-", "given", "skipped", "passed"),
+    "fault": Outcome("FAULT", "lost", "failure", "failed"),
     # nothing is known: a person may look
-    "not asked": Outcome("-", "not judged", "skipped", "failed", "error"),
+    "not asked": Outcome("-", "not judged", "skipped", "failed"),
     # no solver at all
-    "refused": Outcome("-", "not judged", "error", "failed", "error"),
+    "refused": Outcome("-", "not judged", "error", "failed"),
 }

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from adapters.run import Run
 from reports.check.marks import Marked
-from reports.check.picture import data_url, legend
 from reports.check.rows import TASKS, Verdict, shown
 from reports.check.scene_words import faults_of, scene_lines, together
 from reports.check.smallest_scene import DT, Smallest
@@ -50,8 +49,7 @@ WATCHED = 4.0  # s, long enough to see a collision
 
 
 class SceneShown(NamedTuple):
-    """A smallest scene on the page: in words, as a replay with its layers and its first speed, and
-    for paper as a picture with its caption."""
+    """A smallest scene on the page: in words, and as a replay with its layers and first speed."""
 
     smallest: Smallest
     title: str
@@ -60,8 +58,6 @@ class SceneShown(NamedTuple):
     replay: str
     ratio: float
     speed: float
-    picture: str
-    caption: str
 
 
 def write_page(path: Path, marked: Marked) -> None:
@@ -112,8 +108,6 @@ def scene_shown(name: str, smallest: Smallest) -> SceneShown:
         pack_layers(scenario, layers),
         ratio_of(scenario, layers),
         speed_of(scenario.duration),
-        data_url(smallest),
-        legend(smallest),
     )
 
 

@@ -86,13 +86,10 @@ def of_task(path: Path, task: str, given: Any) -> dict[str, float]:
         if name not in QUESTIONS[task]:
             known = ", ".join(QUESTIONS[task])
             why = f"{path}: task {task} has no question {name!r}; questions: {known}"
-            raise BadPoints(f"{why}{hint_for(name)}")
+            # the name of a task stands below the header of another
+            hint = f"; for the points of a task: {AS_A_WHOLE}" if name in QUESTIONS else ""
+            raise BadPoints(f"{why}{hint}")
     return {name: amount(path, f"{task}, {name}", value) for name, value in given.items()}
-
-
-def hint_for(question: str) -> str:
-    """What to do if the name of a question is that of a task: it stands below another's header."""
-    return f"; for the points of a task: {AS_A_WHOLE}" if question in QUESTIONS else ""
 
 
 def shares(task: str) -> dict[str, float]:

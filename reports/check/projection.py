@@ -136,17 +136,13 @@ def displaced(answer: SolverAnswer) -> bool:
         return True
     shift = shift_of(answer)
     moved = np.not_equal([b.x for b in answer.asked.balls], [b.x for b in answer.last])
-    return bool(moved.all()) or in_one_point(shift)
+    touch = near(shift.a + shift.b, shift.overlap, 0.1) and near(shift.across, 0.0, 0.1)
+    return bool(moved.all()) or touch
 
 
 def distance_of(balls: list[Ball]) -> float:
     """The distance of the centres of a pair, m."""
     return float(np.hypot(*np.subtract(balls[0].x, balls[1].x)))
-
-
-def in_one_point(shift: Shift) -> bool:
-    """Whether two overlapping spheres touch after their displacement along the normal."""
-    return near(shift.a + shift.b, shift.overlap, 0.1) and near(shift.across, 0.0, 0.1)
 
 
 def projection_rows(

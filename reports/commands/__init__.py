@@ -1,1 +1,1 @@
-"""The commands around a run: run, report, replay, diff, truth, list."""
+"""The commands around a run: run, report, diff, truth, list."""

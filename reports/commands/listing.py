@@ -1,11 +1,12 @@
-"""`crosscheck list`: a line for every engine, scenario and metric."""
+"""`crosscheck list`: a line for every engine, scenario, metric and verdict."""
 
 from __future__ import annotations
 
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED
 from adapters.npm_packages import missing
-from reports.compare.metrics import METRICS, Metric
+from reports.compare.metrics import METRICS, SCALES, Metric
+from reports.compare.verdicts import VERDICTS, Kind
 from reports.run.arguments import unknown
 from reports.terminal.console import Console
 from reports.terminal.exits import refuse
@@ -15,11 +16,12 @@ from scenarios.truth.exact import answered_by
 
 
 def explain(what: str) -> None:
-    """Print a line for every engine, scenario and metric, or for one of the three kinds."""
+    """Print a line for every engine, scenario, metric and verdict, or for one of these kinds."""
     kinds = {
         "engines": {name: _engine(row) for name, row in (ENGINES | FETCHED).items()},
         "scenarios": {name: _line(name) for name in SCENARIOS},
         "metrics": {_with_unit(name, row): row.summary for name, row in METRICS.items()},
+        "verdicts": {_with_unit(name, row): row.means for name, row in VERDICTS.items()},
     }
     if what and what not in kinds:
         refuse([unknown("list", what, kinds)])
@@ -28,6 +30,8 @@ def explain(what: str) -> None:
         if what in ("", kind):
             print_texts(console, lines, f"{len(lines)} {kind}")
             console.print()
+    if what in ("", "metrics"):
+        print_texts(console, SCALES, "Scales, by which errors are divided")
 
 
 def _engine(row: EngineRow) -> str:
@@ -35,7 +39,7 @@ def _engine(row: EngineRow) -> str:
     return f"{row.summary} ({reason})" if reason else row.summary
 
 
-def _with_unit(name: str, row: Metric) -> str:
+def _with_unit(name: str, row: Metric | Kind) -> str:
     return name if row.unit == "1" else f"{name}, {row.unit}"
 
 

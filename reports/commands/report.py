@@ -3,11 +3,13 @@ exit status."""
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import NoReturn
 
+from adapters.engines import OWN
 from adapters.friction import REFUSAL
 from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
@@ -28,8 +30,9 @@ from reports.terminal.progress import Progress
 from reports.terminal.tables import print_list, print_table
 
 
-def finish(report: Report, out: Path) -> NoReturn:
-    """Print the summary; exit 1 if an engine or a scene is not compared completely."""
+def finish(report: Report, out: Path, status: int = DONE) -> NoReturn:
+    """Print the summary; exit 1 if an engine or a scene is not compared completely, else
+    `status`."""
     print_summary(report, str((out / "report.html").resolve()))
     by_name = report.archive.header["engines"] != of_main_job()
     if lost := never_played(report.comparisons, by_name):
@@ -39,7 +42,7 @@ def finish(report: Report, out: Path) -> NoReturn:
         )
     for name, why in report.unjudged.items():
         say(f"{name} is not judged: {why}")
-    sys.exit(FAILED if lost or report.unjudged else DONE)
+    sys.exit(FAILED if lost or report.unjudged else status)
 
 
 def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
@@ -158,10 +161,15 @@ def statuses(report: Report) -> str:
 
 
 def failures(report: Report, out: Path) -> str:
-    """How to replay the first cell that failed; "" if none did."""
+    """How to play the first cell that failed again, beside the run in `out`; "" if none did."""
     runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
     if runs.empty:
         return ""
-    first = runs.iloc[0]
-    what = f"{first.scenario} on {first.engine}:{first.profile}"
-    return f"To play the failure of {what} again: crosscheck replay {first.cell} --out {out}"
+    first = next(line for line in report.archive.records if line["cell"] == runs.iloc[0].cell)
+    engine = f"{first['engine']}:{first['profile']}"
+    words = ["run", first["scene"], "--engine", engine.removesuffix(OWN)]
+    words += ["--dt", f"{first['dt_s']:.12g}"]  # as many digits as `with_steps` asks for
+    if first["seed"]:
+        words += ["--seed", str(first["seed"])]
+    again = shlex.join(["crosscheck", *words, "--out", f"{out}-again"])
+    return f"To play the failure of {first['scenario']} on {engine} again: {again}"

@@ -26,6 +26,7 @@ from reports.run.arguments import (
     opening,
     refusing,
 )
+from reports.run.bits import BITS, kept_bits, write_bits
 from reports.run.folders import (
     RUN,
     given_back,
@@ -42,7 +43,7 @@ from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
 from reports.run.suite import carry_out
 from reports.run.tasks import Means, RunPlan
 from reports.terminal.counts import counted
-from reports.terminal.exits import FAILED, broken_off, refuse, say
+from reports.terminal.exits import DONE, FAILED, broken_off, refuse, say
 from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 
@@ -60,9 +61,9 @@ class RunRequest:
     out: Path
 
 
-def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
+def run_plan(request: RunRequest, means: Means, command: str, bits: bool) -> NoReturn:
     """Play, compare, report into `request.out`; exits 0, 1 (an engine or a scene could not be
-    compared), 2, 130 or 143."""
+    compared, or with `bits` an engine has others than those kept), 2, 130 or 143."""
     with opening(request.out):
         out, folder = place_of(request.out), os.getcwd()
     scenes = request.scenes or list(SCENARIOS)
@@ -81,7 +82,7 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
     )
     with opening(out):
         journal = open_new(out)
-    carry_on(plan, means, journal, out)
+    carry_on(plan, means, journal, out, bits)
 
 
 def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:
@@ -106,10 +107,10 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
     return Means(workers, timeout, memory * 1_000_000 or share, scheduler)
 
 
-def resume(out: Path, means: Means, alone: bool) -> NoReturn:
+def resume(out: Path, means: Means, bits: bool, alone: bool) -> NoReturn:
     """Play what is missing or changed in the run of `out`, compare, report; exits as `run_plan`.
 
-    `alone`: whether no other options but those of `Means` are given.
+    `alone`: whether no other options but those of `Means` and `bits` are given.
     """
     if not alone:
         refuse(
@@ -124,7 +125,7 @@ def resume(out: Path, means: Means, alone: bool) -> NoReturn:
         with given_back(journal):
             plan = plan_of(journal.path.parent, part_of(out))
             reopened(journal, out)
-    carry_on(plan, means, journal, out)
+    carry_on(plan, means, journal, out, bits or (part_of(out) / BITS).exists())
 
 
 def plan_of(folder: Path, part: Path) -> RunPlan:
@@ -165,20 +166,22 @@ def file_of(scene: str, folder: Path, header: Mapping[str, Any]) -> Path:
     return copy if not path.exists() and copy.exists() else path
 
 
-def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path) -> NoReturn:
-    """Carry out the plan, report, and move the result to `out`; finished cells are kept, whatever
-    happens."""
+def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path, bits: bool) -> NoReturn:
+    """Carry out the plan, report, and move the result to `out`, with `bits` also their hashes;
+    finished cells are kept, whatever happens."""
     part = journal.path.parent
     try:
         with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
             carry_out(plan, means, journal, progress)
             report = make_report(part, progress.say, LESSONS)
+            if bits:
+                write_bits(part)
             journal.close()
             replace_folder(part, out, RUN)
     except (NoScheduler, OtherVersions) as fault:
         say(f"{fault}. {what_is_kept(out)}")
         sys.exit(FAILED)
-    finish(report, out)
+    finish(report, out, FAILED if bits and not kept_bits(out) else DONE)
 
 
 def what_is_kept(out: Path) -> str:

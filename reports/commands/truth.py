@@ -19,21 +19,28 @@ from reports.run.runner import run_all
 from reports.run.scenes import open_scene
 from reports.run.worker_process import Failure
 from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, say
+from reports.terminal.exits import DONE, FAILED, refuse, say
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table, print_texts
 from scenarios.model import Scenario
+from scenarios.truth.exact import CLOSED_FORM
 from scenarios.truth.record import TruthRecord
 
 SHOWN = 10  # collisions at the start and at the end
+STATE = ("disk", "position_m", "velocity_m_s", "angle_rad", "angular_velocity_rad_s")
+STATE_HEADINGS = ("disk", "x, m", "y, m", "vx, m/s", "vy, m/s", "angle, rad", "spin, rad/s")
 HEADINGS = ("t, s", "disk", "with", "impulse, N s", "cosine of\nimpact angle")
 
 
-def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float) -> NoReturn:
+def show_truth(
+    scene: str, seed: int, every: bool, at: float | None, as_json: bool, timeout: float
+) -> NoReturn:
     """Print the exact answer to a scene, as far as it is found in `timeout` s; exits 1 if there is
-    none, 2 if there is no such scene."""
+    none (at the time `at`, s), 2 if there is no such scene or time."""
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
+    if at is not None and not 0 <= at <= scenario.duration:
+        refuse([f"--at {at:g}: must be from 0 to {scenario.duration:g} s, the scene's duration"])
     # In a worker, which can always be stopped.
     task = partial(record_here, checked, seed, timeout)
     with Progress() as progress, closing(run_all({checked: task}, 1, timeout)) as results:
@@ -47,11 +54,48 @@ def show_truth(scene: str, seed: int, every: bool, as_json: bool, timeout: float
         )
         say(f"{scenario.name}: {why}")
         sys.exit(FAILED)
+    state = None if at is None else state_at(scenario, record, at)
+    if at is not None and state is None:
+        say(f"{scenario.name}: no exact answer at {at:g} s: {record.reason}")
+        sys.exit(FAILED)
     if as_json:
-        print(json.dumps(as_plain(scenario, record), indent=2, allow_nan=False))
+        written = as_plain(scenario, record) | ({"state": state} if state else {})
+        print(json.dumps(written, indent=2, allow_nan=False))
+    elif state is not None:
+        print_state(state)
     else:
         print_truth(scenario, record, every)
     sys.exit(DONE)
+
+
+def state_at(scenario: Scenario, record: TruthRecord, at: float) -> dict[str, Any] | None:
+    """Where each disk is at `at` s and how it moves; None beyond the horizon."""
+    t = np.array([at])
+    if at > record.horizon:
+        return None
+    if record.method == CLOSED_FORM:
+        assert scenario.truth is not None
+        answer = scenario.truth(t)
+        moved = answer.position, answer.velocity
+        turned = answer.angle, answer.angular_velocity
+    else:
+        moved, turned = record.motion(scenario.scene, scenario.thrusts, t)
+    disks = zip(*(part[0].tolist() for part in (*moved, *turned)))
+    return {
+        "t_s": at,
+        "disks": [dict(zip(STATE, (i, *disk))) for i, disk in enumerate(disks)],
+    }
+
+
+def print_state(state: dict[str, Any]) -> None:
+    """Print the state of each disk as a table."""
+    rows = [
+        [str(disk), *(f"{value:.15g}" for value in (*x, *v, angle, spin))]
+        for disk, x, v, angle, spin in (disk.values() for disk in state["disks"])
+    ]
+    console = Console()
+    console.print(f"at {state['t_s']:.15g} s")
+    print_table(console, STATE_HEADINGS, rows)
 
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:

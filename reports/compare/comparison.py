@@ -12,7 +12,8 @@ from adapters.run import Run
 from reports.compare.against import ENGINE, ITSELF, TRUTH
 from reports.compare.delays import jumps_of
 from reports.compare.metrics import METRICS
-from reports.compare.table import TableRow, deviation_row, status_row, table_of
+from reports.compare.table import TableRow, deviation_row, status_row, table_of, verdict_row
+from reports.compare.verdicts import verdicts_on
 from reports.compare.view import View, beside, not_judged
 from scenarios.model import Scenario, Trajectory
 from scenarios.no_truth import answered
@@ -39,7 +40,8 @@ class Comparison:
 
 
 def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
-    """Every metric of every run against the laws, the truth and every other engine at the same dt.
+    """Every metric of every run against the laws, the truth and every other engine at the same dt;
+    and its verdicts.
 
     A run that failed has one row with its status, and no score.
     """
@@ -53,6 +55,7 @@ def compare(scenario: Scenario, runs: Sequence[Run]) -> Comparison:
         for versus, other, silent in _opponents(run, runs, truth):
             view = beside(scenario, run, other, jumps if versus == TRUTH else None, silent)
             rows += _measure(run, view, versus)
+        rows += [verdict_row(run, verdict) for verdict in verdicts_on(run, scenario, truth)]
     return Comparison(scenario, truth, tuple(runs), table_of(rows))
 
 

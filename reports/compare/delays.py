@@ -19,7 +19,7 @@ from reports.compare.faces import SAME
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 WINDOW = 10**0.5
-"""dt by which a collision may be late or early: three steps. It is irrational because collisions
+"""dt by which a collision may be late or early: 3.2 steps. It is irrational because collisions
 and samples often lie on the grid of the steps: no multiple of dt, or of a fraction of it, falls on
 the edge, where rounding would decide."""
 # passes of `distance_to_range`; one is exact if all impulses lie along two axes, as in a box

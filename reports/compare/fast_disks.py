@@ -3,13 +3,14 @@ and whether an engine caps its speed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from adapters.run import Run
+from reports.compare import laws
 from reports.compare.comparison import Comparison
-from scenarios.model import Array, Scenario, Scene
+from scenarios.model import Array, Scene
 
 # of a speed: a smaller difference from a cap is rounding
 ROUNDED = 1 - 1e-6
@@ -19,22 +20,21 @@ SPEED_CAP = "speed cap in m/s"  # the setting of engines that have one and tell 
 def fast_note(comparison: Comparison) -> str:
     """A sentence on the step sizes at which a disk can pass through another, and on the engines
     that cap speeds below the scene's; "" if there is neither."""
-    fastest = fastest_two(comparison)
-    return " ".join(
-        [*passing(comparison.scenario, fastest), *capped(comparison.runs, float(fastest.max()))]
-    )
+    fastest = largest(comparison, lambda velocity: float(laws.lengths(velocity).max()))
+    return " ".join([*passing(comparison), *capped(comparison.runs, fastest)])
 
 
 def can_pass(comparison: Comparison) -> bool:
     """Whether in the coarsest step a disk can pass through another, or through a wall."""
-    return bool(passing(comparison.scenario, fastest_two(comparison)))
+    return bool(passing(comparison))
 
 
-def passing(scenario: Scenario, fastest: Array) -> list[str]:
+def passing(comparison: Comparison) -> list[str]:
     """At most one sentence: the coarsest step size at which a disk can pass through another or a
     wall, and one at which it cannot."""
+    scenario = comparison.scenario
     dt = scenario.dt(min(scenario.substeps))
-    ratio = step_displacement(scenario.scene, fastest, dt)
+    ratio = dt * largest(comparison, lambda velocity: approach(scenario.scene, velocity))
     if ratio <= 1.0:
         return []
     return [
@@ -62,44 +62,38 @@ def capped(runs: Sequence[Run], fastest: float) -> list[str]:
     ]
 
 
-def fastest_two(comparison: Comparison) -> Array:
-    """(samples, 2) m/s: the two greatest speeds in the exact answer up to its horizon, the greatest
-    last. Without an exact answer: those at the start, and in each run at the finest dt their
-    greatest, of which the median engine counts."""
+def largest(comparison: Comparison, of: Callable[[Array], float]) -> float:
+    """The value of velocities (samples, n, 2) m/s in the exact answer up to its horizon. Without an
+    exact answer: of those at the start, or of a run at the finest dt, of which the median engine
+    counts; the larger."""
     if comparison.truth is not None:
-        return two_greatest(comparison.truth.velocity)
+        return of(comparison.truth.velocity)
     scenario = comparison.scenario
     finest = scenario.dt(max(scenario.substeps))
-    ends = [
-        two_greatest(run.trajectory.velocity).max(axis=0)
+    runs = [
+        of(run.trajectory.velocity)
         for run in comparison.runs
         if run.status == "ok" and run.trajectory is not None and run.dt == finest
     ]
-    start = two_greatest(scenario.scene.velocity[None])
-    return np.vstack([start, np.median(ends, axis=0)]) if ends else start
+    return max(of(scenario.scene.velocity[None]), float(np.median(runs)) if runs else 0.0)
 
 
-def two_greatest(velocity: Array) -> Array:
-    """(samples, 2) m/s: the two greatest speeds of (samples, n, 2) m/s; 0 first of a lone disk."""
-    speed = np.linalg.norm(velocity, axis=-1)
-    return np.sort(np.pad(speed, ((0, 0), (1, 0))), axis=1)[:, -2:]
+def approach(scene: Scene, velocity: Array) -> float:
+    """1/s, at most: how fast two disks, or a disk and a wall, approach at velocities (samples, n,
+    2) m/s, over the distance of centre and centre, or wall, at which they touch. Times dt, above 1
+    a centre can be past the other's before an overlap is seen.
 
-
-def step_displacement(scene: Scene, fastest: Array, dt: float) -> float:
-    """By how much two disks, or a disk and a wall, can at most approach in a step of `dt` s, over
-    the distance of centre and centre, or wall, at which they touch; above 1 a centre can be past
-    the other's before an overlap is seen.
-
-    `fastest`: (samples, 2) m/s, as of `fastest_two`. An upper bound: the two fastest need not meet,
-    nor be the smallest.
+    An upper bound: the two fastest need not meet, nor be the smallest. Along a wall a disk does not
+    approach it.
     """
-    radii = np.sort(scene.radius)
-    approach = [0.0]
+    radii, speeds = np.sort(scene.radius), np.sort(laws.lengths(velocity), axis=1)
+    rates = [0.0]
     if scene.n > 1:
-        approach.append(float(fastest.sum(axis=1).max() * dt / radii[:2].sum()))
-    if len(scene.walls):
-        approach.append(float(fastest[:, -1].max() * dt / radii[0]))
-    return max(approach)
+        rates.append(float(speeds[:, -2:].sum(axis=1).max() / radii[:2].sum()))
+    for start, end in scene.walls:
+        across = np.abs(laws.cross(velocity, end - start)) / laws.lengths(end - start)
+        rates.append(float((across / scene.radius).max()))
+    return max(rates)
 
 
 def plain(value: float, digits: int = 3) -> str:

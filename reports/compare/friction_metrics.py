@@ -13,18 +13,17 @@ import numpy as np
 from reports.compare import laws, scales, violations
 from reports.compare.delays import WINDOW, collision_free
 from reports.compare.faces import SAME, interval
-from reports.compare.view import Value, View, not_judged
+from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array, Scenario, Scene, Trajectory
 
 ROLLS = 1e-9  # radii, and m/s over the largest speed: the bound of the exact answers
 # of the initial slip: less is rolling, even if the engine's lever arm is off by 2 %
 GONE = 0.05
-BETWEEN = "no two samples enclose a single collision of a disk, each more than three steps away"
 
 
 def tangential_velocity_error(view: View) -> Value | None:
     """Largest error of a disk's velocity along the surfaces, in the first sample after a collision
-    that is more than three steps from all collisions."""
+    that is more than 3.2 steps from all collisions."""
     scenario, truth = view.scenario, view.other
     if truth is None or not has_friction(view):
         return None
@@ -43,14 +42,12 @@ def tangential_velocity_error(view: View) -> Value | None:
             error = (view.played.velocity[k, disk] - truth.velocity[k, disk]) @ tangent
             if abs(error) > worst.value:
                 worst = Value(float(abs(error)), disk, float(truth.t[k]))
-    if not carried:
-        return not_judged("no sample is more than three steps from all collisions")
-    return worst._replace(note=f"{carried} times a disk has collided")
+    return over_collisions(worst, carried, view)
 
 
 def slip_at_rest(view: View) -> Value | None:
     """Largest speed at which a disk slides on a wall while, in the exact answer, it rolls or rests
-    there; counted from three steps after that begins."""
+    there; counted from 3.2 steps after that begins."""
     scenario, truth = view.scenario, view.other
     if not scenario.scene.friction or truth is None or view.jumps is None:
         return None
@@ -78,6 +75,19 @@ def has_friction(view: View) -> bool:
     return bool(view.other.collisions.impulse.any())
 
 
+def over_collisions(value: Value, carried: int, view: View) -> Value:
+    """The value with the number of times that a disk collides in the exact answer and can be read;
+    "not judged" where they are fewer than `LEAST_SHARE` of all."""
+    assert view.other is not None
+    met = view.other.collisions
+    sides = np.stack([met.i, met.j])[:, met.impulse > 0]
+    every = int((~view.scenario.scene.static[sides[sides >= 0]]).sum())
+    share = f"{carried} of {every} times a disk collides are far enough from all other collisions"
+    if carried < max(LEAST_SHARE * every, 1):
+        return not_judged(f"only {share}")
+    return value._replace(note=", ".join(filter(None, (value.note, share))))
+
+
 class Isolated(NamedTuple):
     """A collision of the truth between two samples, with no other collision of its disks between
     them.
@@ -85,7 +95,7 @@ class Isolated(NamedTuple):
     Attributes:
         disks: (d,) the moving disks of the pair.
         tangent: (2,) of length 1, along the surfaces.
-        before, after: the samples, each more than three steps from all collisions of these disks.
+        before, after: the samples, each more than 3.2 steps from all collisions of these disks.
     """
 
     disks: list[int]
@@ -150,9 +160,7 @@ def friction_impulse_error(view: View) -> Value | None:
             error = float(weight[disk] * abs(turned - ought))
             if error > worst.value:
                 worst = Value(error, disk, float(truth.t[after]))
-    if not judged:
-        return not_judged(BETWEEN)
-    return worst._replace(note=f"{judged} times a disk has collided")
+    return over_collisions(worst, judged, view)
 
 
 def friction_loss_error(view: View) -> Value | None:
@@ -183,12 +191,11 @@ def loss_error(view: View, of_friction: bool) -> Value | None:
             for each in isolated_collisions(truth, scenario, view.dt)
         ]
     ).reshape(-1, 2)
-    if not len(losses):
-        return not_judged(BETWEEN)
-    scale = scales.energy(scenario, truth) or 1.0
+    carried = sum(len(each.disks) for each in isolated_collisions(truth, scenario, view.dt))
+    scale = scales.energy(scenario) or 1.0
     off = (losses[:, 0] - losses[:, 1]).sum() / scale
     note = f"{losses[:, 1].sum() / scale:.2g} in {len(losses)} collisions of the exact answer"
-    return Value(float(off), note=note)
+    return over_collisions(Value(float(off), note=note), carried, view)
 
 
 def energy_lost(one: Trajectory, scene: Scene, each: Isolated, along: bool) -> float:
@@ -209,7 +216,7 @@ def energy_lost(one: Trajectory, scene: Scene, each: Isolated, along: bool) -> f
 
 def time_to_roll_error_s(view: View) -> Value | None:
     """Time at which a sliding disk begins to roll, minus that of the exact answer; the largest of
-    all disks."""
+    all disks. If it slips to the end, what is left until the end: a lower bound."""
     scenario, truth = view.scenario, view.other
     if not scenario.scene.friction or truth is None or view.jumps is None:
         return None
@@ -228,7 +235,7 @@ def time_to_roll_error_s(view: View) -> Value | None:
                     )
                     for one in (view.played, truth)
                 )
-                note = "" if np.isfinite(ours) else "it slips to the end"
+                note = "" if np.isfinite(ours) else "at least: it slips to the end"
                 off = Value(min(ours, truth.t[-1]) - ought, int(disk), float(ought), note)
                 worst = max(worst or off, off, key=lambda one: abs(one.value))
     return worst

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenarios.model import Array, Scene, Trajectory
+from scenarios.model import Array, Scene, Thrust, Trajectory
 
 Law = TypeVar("Law", bound=Callable[..., Any])
 
@@ -109,6 +109,12 @@ def energy(trajectory: Trajectory, scene: Scene) -> Array:
     )
 
 
+def half_step(trajectory: Trajectory, scene: Scene, dt: float) -> Array:
+    """(k,) J that gravity changes in half a step: to so much the energy is known, as the velocities
+    of an engine may be those of half a step before or after its positions."""
+    return np.abs(trajectory.velocity @ scene.gravity) @ moving_mass(scene) * dt / 2
+
+
 def penetration(trajectory: Trajectory, scene: Scene) -> Array:
     """(k,) largest overlap of two disks, or of a disk and a wall, in radii of the smaller disk; 0
     without overlap."""
@@ -134,20 +140,63 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
     return start + along[:, None] * (end - start)
 
 
-def tunnelled(trajectory: Trajectory, scene: Scene) -> np.ndarray:
-    """(n,) True for disks whose centre has crossed a wall between two samples, on a straight line.
-    If a sample lies on the wall itself, the side of the sample before it counts."""
-    through = np.zeros(scene.n, dtype=bool)
-    x, number = trajectory.position, np.arange(len(trajectory))[:, None]
-    for a, b in scene.walls:
-        side = cross(x - a, b - a)
-        tells = np.abs(side) > ON_THE_WALL * scene.radius * lengths(b - a)
+@cached
+def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, int, int]]:
+    """(s, disk, -1 - wall) where the centre of a disk crosses a wall between two samples, on a
+    straight line, and had no time to go round an end of the wall.
+
+    If a sample lies on the wall itself, the side of the sample before it counts. A disk that wraps
+    moves out of one edge and in at the other, and not across the box; one so fast that it may have
+    gone round either way is not judged.
+    """
+    x, t, number = trajectory.position, trajectory.t, np.arange(len(trajectory))[:, None]
+    speed = lengths(trajectory.velocity)
+    size = np.inf if scene.wrap is None else (scene.wrap[1] - scene.wrap[0]).min()
+    known = speed[1:] * np.diff(t)[:, None] < size / 2  # which way it takes round the torus
+    gained, found = lengths(scene.gravity) * np.diff(t[:2]).sum(), []
+    for w, (a, b) in enumerate(scene.walls):
+        side, length = cross(x - a, b - a), lengths(b - a)
+        tells = np.abs(side) > ON_THE_WALL * scene.radius * length
         last = np.maximum.accumulate(np.where(tells, number, 0), axis=0)[:-1]
         start, end = np.take_along_axis(x, last[..., None], axis=0), x[1:]
-        sides = np.take_along_axis(side, last, axis=0) * side[1:]
-        ends = cross(a - start, end - start) * cross(b - start, end - start)
-        through |= ((sides < 0) & tells[1:] & (ends <= 0)).any(axis=0)
-    return through
+        way = nearer_way(end - start, scene)
+        parts = [(start, end)]
+        if scene.wrap is not None:  # it leaves at one edge, and arrives from the other
+            parts = [(start, start + way), (end - way, end)]
+        for first, second in parts:
+            sides = cross(first - a, b - a) * cross(second - a, b - a)
+            ends = cross(a - first, way) * cross(b - first, way)
+            for k, i in np.argwhere((sides < 0) & tells[1:] & known & (ends <= 0)):
+                along = (b - a) / length * scene.radius[i]
+                most = (t[k + 1] - t[last[k, i]]) * (speed[k : k + 2, i].max() + gained)
+                span = first[k, i], second[k, i]
+                if min(detour(*span, a - along), detour(*span, b + along)) > most:
+                    found.append((float(t[k + 1]), int(i), -1 - w))
+    return found
+
+
+def detour(start: Array, end: Array, around: Array) -> float:
+    """m, the way from start to end by a third point."""
+    return float(lengths(around - start) + lengths(end - around))
+
+
+def apexes(height: Array) -> tuple[np.ndarray, Array]:
+    """(m,) the highest sample of each flight, and (m,) m, the vertex of the parabola through it and
+    the two beside it; of the first flight, which may begin with a drop, through its first three.
+
+    `height`: (k,) m of a disk. A flight with fewer samples is left out.
+    """
+    y = height
+    top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
+    top = np.concatenate([[1], top[top > 1]]) if len(y) > 2 else top
+    before, at, after = y[top - 1], y[top], y[top + 1]
+    bend = before - 2 * at + after
+    return top, at - (after - before) ** 2 / (8 * np.where(bend == 0.0, np.nan, bend))
+
+
+def time_on(thrust: Thrust, t: Array | float) -> Array:
+    """(k,) s for which the thrust has been on by `t`."""
+    return np.clip(t - thrust.start, 0.0, thrust.stop - thrust.start)
 
 
 def cross(u: Array, v: Array) -> Array:

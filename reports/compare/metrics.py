@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from inspect import getdoc
 
 import numpy as np
@@ -17,83 +17,90 @@ from reports.compare import collision_metrics as collisions
 from reports.compare import friction_metrics as friction
 from reports.compare import laws, scales, violations
 from reports.compare.against import ENGINE, ITSELF, TRUTH
+from reports.compare.apexes import bounce_changes
 from reports.compare.view import LEAST_SHARE, Value, View, not_judged
 from scenarios.model import Array
 
 Measure = Callable[[View], Value | None]
 
 
-def over_judged(measure: Measure) -> Measure:
-    """The metric with the number of judged samples in its note; "not judged" where they are fewer
-    than `LEAST_SHARE` (view.py)."""
+def over_judged(
+    measure: Measure, samples: Callable[[View], np.ndarray] = lambda view: view.judged
+) -> Measure:
+    """The metric with the number of judged `samples` (k, n) in its note; "not judged" where they
+    are fewer than `LEAST_SHARE` (view.py)."""
 
     @wraps(measure)
     def carried(view: View) -> Value | None:
         found = measure(view)
         if found is None or view.other is None:
             return found
-        if view.share < LEAST_SHARE:
-            return not_judged(f"only {view.carried}")
-        return found._replace(note=", ".join(filter(None, (view.carried, found.note))))
+        judged = samples(view)
+        if view.share(judged) < LEAST_SHARE:
+            return not_judged(f"only {view.carried(judged)}")
+        return found._replace(note=", ".join(filter(None, (view.carried(judged), found.note))))
 
     return carried
 
 
 def momentum_error(view: View) -> Value | None:
-    """Largest |P(t) - P(0) - outer impulse| where that impulse is known, over the largest sum of
-    m|v| that flight without collisions can reach."""
+    """Largest |P(t) - P(0) - outer impulse| where that impulse is known, over the momentum at
+    hand."""
     return _largest(violations.momentum(view), view)
 
 
 def angular_momentum_error(view: View) -> Value | None:
-    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over the sum
-    of m|x||v| + I|w|."""
+    """Largest |L(t) - L(0) - outer angular impulse|, about the scene's centre of mass, over the
+    angular momentum at hand."""
     return _largest(violations.angular_momentum(view), view)
 
 
 @over_judged
 def energy_error(view: View) -> Value | None:
-    """Largest |E(t) - E(0)| at e = 1, else distance from the truth's range within three steps; over
-    the energy at hand."""
-    return _largest(violations.energy(view), view)
+    """Largest |E(t) - E(0)| where nothing takes energy (e = 1, no friction, no thrust), else
+    distance from the truth's range within 3.2 steps; over the energy at hand. The note says whether
+    it is gained or lost."""
+    gained = violations.energy_gained(view)
+    found = None if gained is None else _largest(np.abs(gained), view)
+    if gained is None or found is None or not found.value > 0:
+        return found
+    up = gained[int(np.searchsorted(view.played.t, found.at))] > 0
+    return found._replace(note="gained" if up else "lost")
 
 
 def energy_created(view: View) -> Value | None:
-    """Largest rise of the energy above an earlier sample, over the energy at hand; no collision
-    creates energy."""
+    """Largest rise of the energy above an earlier sample, over the energy at hand, beyond what half
+    a step of gravity changes; no collision creates energy."""
     return _largest(violations.energy_rise(view), view)
 
 
 @over_judged
 def energy_deviation(view: View) -> Value | None:
-    """Root mean square distance of the energy from the truth's range within three steps, over the
+    """Root mean square distance of the energy from the truth's range within 3.2 steps, over the
     energy at hand.
 
     Beside an engine: difference of the energies of all disks that are away from their collisions in
     both (view.py).
     """
-    return Value(
-        _rms(view.energy_deviation[view.judged.any(axis=1)]) / (scales.energy(view.scenario) or 1.0)
-    )
+    off = view.energy_deviation[view.judged.any(axis=1)]
+    return Value(_rms(off) / (scales.energy(view.scenario) or 1.0))
 
 
 @over_judged
 def momentum_deviation(view: View) -> Value | None:
-    """Root mean square distance of the momentum from the truth's range within three steps, over the
-    sum of m|v|.
+    """Root mean square distance of the momentum from the truth's range within 3.2 steps, over the
+    momentum at hand.
 
     Beside an engine: distance of the momenta of all disks that are away from their collisions in
     both (view.py).
     """
-    return Value(
-        _rms(view.momentum_deviation[view.judged.any(axis=1)])
-        / (scales.momentum(view.scenario) or 1.0)
-    )
+    off = view.momentum_deviation[view.judged.any(axis=1)]
+    return Value(_rms(off) / (scales.momentum(view.scenario) or 1.0))
 
 
 @over_judged
 def energy_loss_error(view: View) -> Value | None:
-    """Energy lost by the last judged sample, minus what the truth loses within three steps of it;
+    """Energy lost by the last judged sample, minus what the truth loses within 3.2 steps of it;
     over the energy at hand."""
     scenario = view.scenario
     if violations.keeps_energy(scenario) or scenario.thrusts or violations.lifts(scenario):
@@ -103,7 +110,7 @@ def energy_loss_error(view: View) -> Value | None:
     if not view.judged.any():
         return Value(np.nan)
     last = int(np.flatnonzero(view.judged.any(axis=1))[-1])
-    scale = scales.energy(scenario, view.other) or 1.0
+    scale = scales.energy(scenario) or 1.0
     low, high = view.energy_range
     start = laws.energy(view.played, scenario.scene)[0] - laws.energy(view.other, scenario.scene)[0]
     excess = float(start - view.energy_deviation[last]) / scale
@@ -123,21 +130,23 @@ def penetration_radii(view: View) -> Value | None:
 
 
 def disks_tunnelled(view: View) -> Value | None:
-    """Number of disks whose centre has crossed a wall (tunnelling)."""
+    """Number of disks whose centre has crossed a wall between two samples, and had no time to go
+    round its end (tunnelling). A wrap crosses nothing."""
     if not len(view.scenario.scene.walls):
         return None
-    through = np.flatnonzero(laws.tunnelled(view.played, view.scenario.scene))
-    return Value(len(through), int(through[0]) if len(through) else -1)
+    disks = {disk for _, disk, _ in laws.wall_crossings(view.played, view.scenario.scene)}
+    return Value(len(disks), min(disks, default=-1))
 
 
 def position_rms(view: View) -> Value | None:
-    """Root mean square distance over disks and samples."""
-    return Value(_rms(view.deviation))
+    """Root mean square distance over the disks that can move, and samples."""
+    return _rms_of(view.deviation, ~view.scenario.scene.static)
 
 
 def position_rms_radii(view: View) -> Value | None:
-    """Root mean square distance over disks and samples, each in radii of its disk."""
-    return Value(_rms(view.deviation / view.scenario.scene.radius))
+    """Root mean square distance over the disks that can move, and samples, in radii of each
+    disk."""
+    return _rms_of(view.deviation / view.scenario.scene.radius, ~view.scenario.scene.static)
 
 
 def position_max(view: View) -> Value | None:
@@ -153,32 +162,32 @@ def position_max_radii(view: View) -> Value | None:
 
 @over_judged
 def velocity_rms(view: View) -> Value | None:
-    """Root mean square over disks and samples; `velocity_max` is the largest of the same
-    differences."""
+    """Root mean square over the disks that can move, and samples; `velocity_max` is the largest of
+    the same differences."""
     return Value(_rms(view.velocity_deviation[view.judged]))
 
 
 @over_judged
 def velocity_max(view: View) -> Value | None:
-    """Largest difference of a disk's velocity from the nearest that it has in the truth within
-    three steps.
+    """Largest difference of a disk's velocity from the nearest that it has in the truth within 3.2
+    steps.
 
-    Beside an engine: from the other's, where the disk has no collision within three steps in either
+    Beside an engine: from the other's, where the disk has no collision within 3.2 steps in either
     (view.py).
     """
     return _largest_of_disks(np.where(view.judged, view.velocity_deviation, 0.0), view)
 
 
-@over_judged
+@partial(over_judged, samples=lambda view: view.judged_spin)
 def angular_velocity_max(view: View) -> Value | None:
     """Largest difference of angular velocity of any disk, in the samples in which `velocity_max` is
-    judged."""
-    return _largest_of_disks(np.where(view.judged, view.angular_velocity_deviation, 0.0), view)
+    judged; with friction only where the disk has no collision within 3.2 steps."""
+    return _largest_of_disks(np.where(view.judged_spin, view.angular_velocity_deviation, 0.0), view)
 
 
 def angle_rms(view: View) -> Value | None:
-    """Root mean square difference of angle over disks and samples."""
-    return Value(_rms(view.angle_deviation))
+    """Root mean square difference of angle over the disks that can turn, and samples."""
+    return _rms_of(view.angle_deviation, laws.moving_inertia(view.scenario.scene) > 0)
 
 
 def angle_max(view: View) -> Value | None:
@@ -194,6 +203,28 @@ def time_to_1pct_s(view: View) -> Value | None:
         return Value(np.inf, note=f"never within {view.played.t[-1]:g} s")
     k = int(np.argmax(off.any(axis=1)))
     return Value(float(view.played.t[k]), int(np.argmax(off[k])), float(view.played.t[k]))
+
+
+def apex_change(view: View) -> Value | None:
+    """Mean change of the height of a disk's apex from one bounce on a level floor to the next,
+    beyond the e2 that the scene states: above 0 the disk comes too high, below 0 not high enough.
+    Of the disk with the largest."""
+    disks = np.flatnonzero(~view.scenario.scene.static)
+    changes = {int(disk): bounce_changes(view, int(disk)) for disk in disks}
+    means = {disk: 100 * float(change.mean()) for disk, change in changes.items() if len(change)}
+    if not means:
+        return None
+    disk = max(means, key=lambda disk: abs(means[disk]))
+    change = 100 * changes[disk]
+    whole = 100 * (np.prod(changes[disk] + 1) - 1)
+    note = f"{len(change)} bounces, from {change.min():+.2g} to {change.max():+.2g} %,"
+    note += f" in all {whole:+.2g} %"
+    return Value(means[disk], disk, note=note)
+
+
+def _rms_of(values: Array, chosen: np.ndarray) -> Value | None:
+    """Of (k, n) values over the chosen disks (n,); None without any."""
+    return Value(_rms(np.compress(chosen, values, axis=1))) if chosen.any() else None
 
 
 def _rms(values: Array) -> float:
@@ -238,6 +269,10 @@ class Metric:
         return " ".join((getdoc(self.of) or "").split("\n\n")[0].split())
 
 
+SCALES = {
+    f"{scale.__name__.replace('_', ' ')} at hand": " ".join((getdoc(scale) or "").split())
+    for scale in (scales.momentum, scales.angular_momentum, scales.energy)
+}
 METRICS: dict[str, Metric] = {
     "position_max_radii": Metric(
         position_max_radii, "radii", (TRUTH, ENGINE), title="Position, largest error"
@@ -271,6 +306,9 @@ METRICS: dict[str, Metric] = {
         energy_deviation, "1", (TRUTH, ENGINE), title="Energy, root mean square"
     ),
     "energy_created": Metric(energy_created, "1", (ITSELF,), title="Energy created"),
+    "apex_change": Metric(
+        apex_change, "%", (ITSELF,), "zero", title="Apex of a bounce, higher or lower than stated"
+    ),
     "energy_loss_error": Metric(
         energy_loss_error,
         "1",

@@ -18,9 +18,11 @@ class Restitutions(NamedTuple):
         values: (m,) e of each collision that was read.
         spread: (m,) by how much e depends on when in its step the collision was.
         times: (m,) s, the end of that step.
-        below: how many were below the floor.
+        below: how many were below the floor, or, with friction, only graze.
         unfinished: how many did not end before the next collision of a disk, or before the end of
             the run.
+        unclear: how many were not alone, too slow for the gravity that acts, or do not have the
+            change of velocity of one collision.
     """
 
     values: Array
@@ -28,6 +30,7 @@ class Restitutions(NamedTuple):
     times: Array
     below: int
     unfinished: int
+    unclear: int = 0
 
 
 # relative to the change of velocity; float32 leaves about 1e-7 of the velocity, an unreported
@@ -35,6 +38,14 @@ class Restitutions(NamedTuple):
 CLEAN = 1e-4
 # a change of velocity must be this many times its rounding: e is then accurate to about 0.01
 FLOOR = 100
+TINY = 1e-300  # in place of 0 in a denominator
+# of the closing speed: two that come nearer by less have stopped, e is 0 to that
+STOPPED = 0.01
+GRAZE = 0.1  # of the relative speed: two disks that close more slowly graze each other
+# of an impulse: by so much friction's share of it may differ from what the spins say
+RUBBED = 0.2
+# of the velocity that gravity gives: a disk that gains less lies on something
+FREE = 0.9
 
 
 def effective_restitution(
@@ -42,22 +53,27 @@ def effective_restitution(
 ) -> Restitutions:
     """Restitution of each collision that can be read off the samples.
 
-    A collision can be read if neither disk has another in the same sample interval or the next, and
-    neither changes its spin (friction): then the change of velocity points along the normal n, and
-    e = -(dv'.n) / (dv.n). Two disks must also change their momenta by opposite amounts, and a disk
-    at a wall must change its momentum along the wall's normal: else the engine did not report
-    another collision. Collisions closing slower than `slowest` m/s are left out.
+    A collision can be read if neither disk has another in the same sample interval or the next.
+    Without friction the change of velocity points along the normal n, and e = -(dv'.n) / (dv.n);
+    with friction the spins tell n (`speeds_along_normal`). Two disks must also change their momenta
+    by opposite amounts, and a disk at a wall must change its momentum along the wall's normal: else
+    the engine did not report another collision. Collisions closing slower than `slowest` m/s are
+    left out.
 
     The time of a collision is known to one step of `dt` s. In this time gravity changes the closing
     speed v by g dt and the separating speed by as much, so that e is known to (1 + e) g dt / v
     only. Of these values the one nearest to what the scene states is taken: an engine that is exact
-    reads as exact, whenever in a step its disk meets the floor.
+    reads as exact, whenever in a step its disk meets the floor. A disk that lies on something
+    before or after the collision does not fall there: its own acceleration counts, and at the last
+    sample, where it is not known, both are possible.
 
     An engine with soft contacts takes several steps for a collision: it is read at the first sample
     at which the two no longer approach. If the bodies still approach after the impulse, they pass
-    through each other and then separate; this gives e < 0. A collision is unfinished if it does not
-    end, if it does not end before the next collision of either disk, or if it ends so late that
-    gravity matters: one that takes m sample intervals must close m times as fast.
+    through each other and then separate; this gives e < 0. If they come no nearer although their
+    velocities approach, an engine holds them by position correction alone: e = 0. A collision is
+    unfinished if it does not end, if it does not end before the next collision of either disk, or
+    if it ends so late that gravity matters: one that takes m sample intervals must close m times as
+    fast.
 
     A collision is below the floor if it changes the velocities by at most `FLOOR` times their
     rounding: the normal, and so e, would be noise. The velocity that gravity adds is subtracted,
@@ -69,34 +85,47 @@ def effective_restitution(
     # A collision at the instant of a sample, at the end of its step, belongs to the interval that
     # ends there.
     before = np.searchsorted(t, collisions.t - SAME * interval(trajectory), side="left") - 1
-    every = Pairs(before, collisions.i, collisions.j, collisions.t)
+    i, j = collisions.i, collisions.j
+    fixed = scene.static[i]  # then the second is the disk that moves
+    every = Pairs(before, np.where(fixed, j, i), np.where(fixed, i, j), collisions.t)
     count = in_intervals(every, len(t), scene.n)
-    read = every.of((before >= 0) & (before < len(t) - 1) & ~scene.static[every.i])
-    read = read.of(is_alone(read, count))
+    within = every.of((before >= 0) & (before < len(t) - 1) & (every.i >= 0))
+    read = within.of(is_alone(within, count))
     noise = is_rounding(trajectory, scene, read, rounding)
     read = read.of(~noise)
-    after = first_apart(trajectory, scene, read, count, rounding)
+    after, held = first_apart(trajectory, scene, read, count, rounding)
     over = after < len(t)
-    read, after = read.of(over), after[over]
-    turned = np.abs(spin[after] - spin[read.k]) * scene.radius
-    closing, separating, gained = speeds_along_normal(
-        velocities(trajectory, scene, read, read.k),
-        velocities(trajectory, scene, read, after),
-        scene,
-        read,
-        turned,
-    )
-    gained *= dt
-    fast = closing > np.maximum(slowest * (after - read.k), gained)
-    late = (closing > slowest) & ~fast
-    closing, separating, gained = closing[fast], separating[fast], gained[fast]
-    ends = np.stack([separating / closing, (separating + gained) / (closing - gained)])
+    read, after, held = read.of(over), after[over], held[over]
+    disks = np.stack([read.i, read.other], axis=1)
+    turned = spin[after[:, None], disks] - spin[read.k[:, None], disks]
+    falls = [acceleration(trajectory, scene, read, k, count) for k in (read.k - 1, after)]
+    earlier = velocities(trajectory, read, read.k, falls[0])
+    later = velocities(trajectory, read, after, falls[1])
+    closing, separating, normal = speeds_along_normal(earlier, later, scene, read, turned)
+    closing, separating = np.where(held > 0, [held, 0 * held], [closing, separating])
+    gained, lost = (-np.vecdot(fall[:, 0] - fall[:, 1], normal) * dt for fall in falls)
+    lost[held > 0] = 0.0
+    # with friction: noise of a contact, or a graze, whose normal the spins do not tell well enough
+    speed = laws.lengths(earlier[:, 0] - earlier[:, 1])
+    grazes = np.abs(turned[:, 0]) * scene.radius[read.i] > CLEAN * speed
+    grazes &= closing <= np.where(read.j < 0, STOPPED, GRAZE) * speed
+    fast = (closing > np.maximum(slowest * (after - read.k), gained)) & ~grazes
+    late = (closing > slowest) & ~fast & ~grazes
+    lies = closing <= slowest / 5  # the weight of a disk that lies
+    below, unfinished = int(noise.sum() + grazes.sum()), int((~over).sum() + late.sum())
+    still = velocities(trajectory, read, after, 0 * falls[1])
+    lying = np.vecdot(still[:, 0] - still[:, 1], normal)
+    lying = np.where((after == len(t) - 1) & (held == 0), lying, separating)
+    first, third = separating[fast] / closing[fast], lying[fast] / closing[fast]
+    second = (separating + lost)[fast] / (closing - gained)[fast]
+    least, most = (of([first, second, third], axis=0) for of in (np.min, np.max))
     return Restitutions(
-        values=np.clip(scene.restitution, ends.min(axis=0), ends.max(axis=0)),
-        spread=np.ptp(ends, axis=0),
+        values=np.clip(scene.restitution, least, most),
+        spread=most - least,
         times=read.when[fast],
-        below=int(noise.sum()),
-        unfinished=int((~over).sum() + late.sum()),
+        below=below,
+        unfinished=unfinished,
+        unclear=len(within.k) - int(fast.sum() + (lies & ~grazes).sum()) - below - unfinished,
     )
 
 
@@ -147,18 +176,48 @@ def is_alone(read: Pairs, count: np.ndarray) -> np.ndarray:
 
 def first_apart(
     trajectory: Trajectory, scene: Scene, read: Pairs, count: np.ndarray, rounding: float
-) -> np.ndarray:
-    """(m,) the first sample after each collision at which the two do not approach; the number of
-    samples if there is none before another collision of either."""
+) -> tuple[np.ndarray, Array]:
+    """(m,) the first sample after each collision at which the two do not approach, or are held; the
+    number of samples if there is none before another collision of either. (m,) m/s, the closing
+    speed of those that are held, else 0."""
     samples, after = len(trajectory), read.k + 1
+    held = np.zeros(len(after))
     left = np.arange(len(after))  # the pairs that approach at every sample so far
     while len(left):
         left = left[approach(trajectory, scene, read.of(left), after[left], rounding)]
+        held[left] = held_speed(trajectory, scene, read.of(left), after[left])
+        left = left[held[left] == 0]
         pairs, following = read.of(left), after[left] + 1
         again = (count[following + 1, pairs.i] > 0) | (count[following + 1, pairs.other] > 0)
         after[left] = np.where(again, samples, following)
         left = left[after[left] < samples]
-    return after
+    return after, held
+
+
+def held_speed(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
+    """(m,) m/s, the closing speed of those whose velocities approach at sample k, (m,), and at the
+    next, but who come nearer by less than half of that, or than `STOPPED` of their closing speed;
+    else 0."""
+    nexts = np.minimum(k + 1, len(trajectory) - 1)
+    gaps, speeds = [], []
+    for sample in (pairs.k, k, nexts):
+        way = separation(trajectory, scene, pairs, sample)
+        v = velocities(trajectory, pairs, sample, np.zeros((len(k), 2, 2)))
+        gaps.append(laws.lengths(way))
+        speeds.append(-np.vecdot(way, v[:, 0] - v[:, 1]) / np.maximum(gaps[-1], TINY))
+    least = np.minimum(speeds[1], speeds[2])
+    nearer = (gaps[1] - gaps[2]) / interval(trajectory)
+    held = (nexts > k) & (least > 0) & (nearer < np.maximum(least / 2, STOPPED * speeds[0]))
+    return np.where(held, np.maximum(speeds[0], 0.0), 0.0)
+
+
+def separation(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
+    """(m, 2) m, from the second of each pair to the first in sample k, (m,)."""
+    x, other = (trajectory.position[k, disk] for disk in (pairs.i, pairs.other))
+    for wall in np.unique(pairs.j[pairs.j < 0]):
+        at = pairs.j == wall
+        other[at] = laws.nearest_on_segment(x[at], *scene.walls[-1 - wall])
+    return laws.nearer_way(x - other, scene)
 
 
 def approach(
@@ -166,25 +225,37 @@ def approach(
 ) -> np.ndarray:
     """(m,) whether the two of each pair still approach in sample k, (m,), by more than `FLOOR`
     roundings."""
-    x, other = (trajectory.position[k, disk] for disk in (pairs.i, pairs.other))
-    for wall in np.unique(pairs.j[pairs.j < 0]):
-        at = pairs.j == wall
-        other[at] = laws.nearest_on_segment(x[at], *scene.walls[-1 - wall])
-    way = laws.nearer_way(x - other, scene)
-    v = velocities(trajectory, scene, pairs, k)
+    way = separation(trajectory, scene, pairs, k)
+    v = velocities(trajectory, pairs, k, falling(scene, pairs))
     floor = FLOOR * rounding * laws.lengths(v).sum(axis=1)
     nearing: np.ndarray = np.vecdot(way, v[:, 0] - v[:, 1]) < -floor * laws.lengths(way)
     return nearing
 
 
-def velocities(trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray) -> Array:
-    """(m, 2, 2) m/s of both sides of each pair, carried by gravity from sample k, (m,), to the time
-    of their collision; 0 for a wall."""
+def velocities(trajectory: Trajectory, pairs: Pairs, k: np.ndarray, fall: Array) -> Array:
+    """(m, 2, 2) m/s of both sides of each pair, carried by `fall` (m, 2, 2) m/s2 from sample k,
+    (m,), to the time of their collision; 0 for a wall."""
     disks = np.stack([pairs.i, pairs.other], axis=1)
     v: Array = trajectory.velocity[k[:, None], disks]
     v[pairs.j < 0, 1] = 0.0
-    carried: Array = v + falling(scene, pairs) * (pairs.when - trajectory.t[k])[:, None, None]
+    carried: Array = v + fall * (pairs.when - trajectory.t[k])[:, None, None]
     return carried
+
+
+def acceleration(
+    trajectory: Trajectory, scene: Scene, pairs: Pairs, k: np.ndarray, count: np.ndarray
+) -> Array:
+    """(m, 2, 2) m/s2 of both sides of each pair between sample k, (m,), and the next: gravity, or
+    what the samples say of a disk that gains less than `FREE` of it and has no collision there."""
+    fall, inside = falling(scene, pairs), (k >= 0) & (k + 1 < len(trajectory))
+    k = np.where(inside, k, 0)
+    for side, disk in enumerate((pairs.i, pairs.other)):
+        change = trajectory.velocity[k + 1, disk] - trajectory.velocity[k, disk]
+        gained = change / interval(trajectory)
+        lies = inside & (laws.lengths(gained) < FREE * laws.lengths(fall[:, side]))
+        lies &= count[k + 1, disk] == 0
+        fall[lies, side] = gained[lies]
+    return fall
 
 
 def falling(scene: Scene, pairs: Pairs) -> Array:
@@ -196,7 +267,8 @@ def falling(scene: Scene, pairs: Pairs) -> Array:
 def is_rounding(trajectory: Trajectory, scene: Scene, read: Pairs, rounding: float) -> np.ndarray:
     """(m,) whether the change of velocity of a moving disk, or of the relative velocity, is below
     the floor."""
-    earlier, later = (velocities(trajectory, scene, read, k) for k in (read.k, read.k + 1))
+    fall = falling(scene, read)
+    earlier, later = (velocities(trajectory, read, k, fall) for k in (read.k, read.k + 1))
     moving = np.stack([np.ones(len(read.k), bool), second_moves(scene, read)], axis=1)
     change = np.where(moving[..., None], later - earlier, 0.0)
     speed = np.where(moving, laws.lengths(earlier) + laws.lengths(later), 0.0)
@@ -215,31 +287,39 @@ def second_moves(scene: Scene, pairs: Pairs) -> np.ndarray:
 def speeds_along_normal(
     earlier: Array, later: Array, scene: Scene, pairs: Pairs, turned: Array
 ) -> tuple[Array, Array, Array]:
-    """(m,) m/s, closing speed before and separating speed after each collision, and m/s2, what
-    gravity adds to the first and takes from the second; `turned` (m, n) m/s by friction.
+    """(m,) m/s, closing speed before and separating speed after each collision, and (m, 2) the
+    normal; `turned` (m, 2) rad/s is the change of spin of both sides.
 
     The normal is the direction of the change of their relative velocity, whichever of the two is
-    named first. The speeds are nan if the change is not that of one frictionless collision.
+    named first. Friction adds an impulse J along the tangent, which turns both disks by -J r / I,
+    so that the spins tell the angle; a wall's normal is known. The speeds are nan if the change is
+    not that of one collision.
     """
-    number, both, wall = np.arange(len(pairs.k)), second_moves(scene, pairs), pairs.j < 0
-    change = later - earlier
-    one, two = change[:, 0], change[:, 1]
-    slid = turned[number, pairs.i] > CLEAN * laws.lengths(one)
-    slid |= both & (turned[number, pairs.other] > CLEAN * laws.lengths(two))
-    mass = laws.moving_mass(scene)
-    kicks = mass[pairs.i, None] * one, mass[pairs.other, None] * two
-    strongest = np.maximum(*map(laws.lengths, kicks))
-    unreported = both & (laws.lengths(kicks[0] + kicks[1]) > CLEAN * strongest)
+    both, wall = second_moves(scene, pairs), pairs.j < 0
+    disks = np.stack([pairs.i, pairs.other], axis=1)
+    moves = np.stack([~wall | wall, both], axis=1)
+    change = np.where(moves[..., None], later - earlier, 0.0)
+    turned = np.where(moves, turned, 0.0)
+    slid = (np.abs(turned) * scene.radius[disks] > CLEAN * laws.lengths(change)).any(axis=1)
+    kicks = laws.moving_mass(scene)[disks][..., None] * change
+    size, strongest = laws.lengths(kicks[:, 0]), laws.lengths(kicks).max(axis=1)
+    strange = both & (laws.lengths(kicks.sum(axis=1)) > CLEAN * strongest)
+    rubs = -turned * laws.moving_inertia(scene)[disks] / scene.radius[disks]
+    rub = np.where(rubs[:, 0] == 0.0, rubs[:, 1], rubs[:, 0])
+    strange |= slid & (np.abs(rub) >= size)
+    strange |= slid & (rubs != 0.0).all(axis=1) & (np.abs(np.diff(rubs)[:, 0]) > RUBBED * size)
+    between = change[:, 0] - change[:, 1]
+    ahead = between / np.maximum(np.sqrt(np.vecdot(between, between)), TINY)[:, None]
+    sine = np.where(slid & ~strange, rub / np.maximum(size, TINY), 0.0)[:, None]
+    normal = np.sqrt(1 - sine**2) * ahead + sine * np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
     span = np.diff(scene.walls[-1 - pairs.j[wall]], axis=1)[:, 0]
-    slack = CLEAN * laws.lengths(span) * laws.lengths(one[wall])
-    unreported[wall] = np.abs(np.vecdot(one[wall], span)) > slack
-    between = one - two
-    length = np.sqrt(np.vecdot(between, between))
-    normal = between / np.where(length == 0.0, 1.0, length)[:, None]
+    across = np.stack([-span[:, 1], span[:, 0]], axis=1) / laws.lengths(span)[:, None]
+    # friction changes velocity and spin by the same impulse; else the disk met something else, too
+    tilt = np.abs(laws.cross(across, normal[wall]))
+    strange[wall] |= tilt > np.where(slid[wall], RUBBED, CLEAN)
+    across *= np.sign(np.vecdot(across, normal[wall]))[:, None]
+    normal[wall] = np.where(slid[wall, None], across, normal[wall])
     closing, separating = (
         sign * np.vecdot(v[:, 0] - v[:, 1], normal) for sign, v in ((-1, earlier), (1, later))
     )
-    strange = unreported | slid
-    fall = falling(scene, pairs)
-    gained = -np.vecdot(fall[:, 0] - fall[:, 1], normal)
-    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating), gained
+    return np.where(strange, np.nan, closing), np.where(strange, np.nan, separating), normal

@@ -1,5 +1,5 @@
 """The tidy table deviations.csv: a row for each number, with its run and what it is measured
-against."""
+against; a verdict fails above its bound, other numbers have none."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pandas as pd
 
 from adapters.run import Run
 from reports.compare.against import ITSELF
+from reports.compare.verdicts import Verdict
 from reports.compare.view import Value
 
 COLUMNS = (
@@ -24,14 +25,23 @@ COLUMNS = (
     "versus",
     "at_s",
     "note",
+    "bound",
 )
-TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str]  # as `COLUMNS`
+TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str, float]  # as `COLUMNS`
 
 
 def deviation_row(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
     """The row of one metric of a run."""
     whose = (run.scenario, run.engine, run.profile, run.dt, metric)
-    return (*whose, value.disk, value.value, unit, versus, value.at, value.note)
+    return (*whose, value.disk, value.value, unit, versus, value.at, value.note, np.nan)
+
+
+def verdict_row(run: Run, verdict: Verdict) -> TableRow:
+    """The row of one verdict on a run; the note has the second disk, or the wall."""
+    disk, *others = verdict.disks or (-1,)
+    note = ", ".join(f"with disk {k}" if k >= 0 else f"with wall {-1 - k}" for k in others)
+    value = Value(verdict.value, disk, verdict.at, note)
+    return (*deviation_row(run, verdict.id, value, verdict.unit, ITSELF)[:-1], verdict.bound)
 
 
 def status_row(run: Run, why: str, versus: str = ITSELF) -> TableRow:

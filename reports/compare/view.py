@@ -25,7 +25,8 @@ from reports.compare.faces import SAME, interval, on_faces
 from reports.compare.restitution import Restitutions, effective_restitution
 from scenarios.model import Array, Collisions, Scenario, Trajectory
 
-# sample intervals of falling; irrational, so that no closing speed equals the threshold
+# sample intervals of falling, times (1 + e) / 2: e is known to a tenth even if a step is as long as
+# an interval; irrational, so that no closing speed equals the threshold
 SLOWEST = 401**0.5
 LEAST_SHARE = 0.1
 """Fraction of the samples after the start, or of the true collisions, that must be usable for a
@@ -99,21 +100,28 @@ class View:
         return judged
 
     @cached_property
-    def share(self) -> float:
-        """The fraction of the samples after the start, disk by disk, that are judged."""
-        every = (len(self.played) - 1) * int((~self.scenario.scene.static).sum())
-        return float(self.judged.sum() / every) if every else 0.0
+    def judged_spin(self) -> np.ndarray:
+        """(k, n) bool, where the spin of a disk is compared: where its velocity is, and with
+        friction, which changes spins, only if the disk has no collision within `WINDOW` dt in the
+        truth either."""
+        assert self.other is not None
+        if not self.scenario.scene.friction:
+            return self.judged
+        judged: np.ndarray = self.judged & collision_free(self.other, self.dt)
+        return judged
 
-    @cached_property
-    def carried(self) -> str:
-        """How many of the samples are judged, in words."""
-        samples = len(self.played) - 1
-        if self.jumps is not None:
-            return f"{self.judged.any(axis=1).sum()} of {samples} samples"
-        return (
-            f"{self.judged.sum()} of {samples * (~self.scenario.scene.static).sum()} samples of a"
-            " disk"
-        )
+    def share(self, judged: np.ndarray) -> float:
+        """The fraction of the samples after the start, disk by disk, that are `judged` (k, n)."""
+        every = (len(self.played) - 1) * int((~self.scenario.scene.static).sum())
+        return float(judged.sum() / every) if every else 0.0
+
+    def carried(self, judged: np.ndarray) -> str:
+        """How many of the samples are `judged` (k, n), in words."""
+        samples, moving = len(self.played) - 1, int((~self.scenario.scene.static).sum())
+        whole = judged.any(axis=1)
+        if self.jumps is not None and judged.sum() == whole.sum() * moving:
+            return f"{whole.sum()} of {samples} samples"
+        return f"{judged.sum()} of {samples * moving} samples of a disk"
 
     @cached_property
     def velocity_deviation(self) -> Array:
@@ -127,19 +135,9 @@ class View:
 
     @cached_property
     def angular_velocity_deviation(self) -> Array:
-        """(k, n) rad/s between the two; 0 where they are not compared.
-
-        Without friction no collision changes a spin. With friction, samples within `WINDOW` dt of a
-        collision of the disk are not compared.
-        """
+        """(k, n) rad/s between the two."""
         assert self.other is not None
-        deviation: Array = np.abs(self.played.angular_velocity - self.other.angular_velocity)
-        if not self.scenario.scene.friction:
-            return deviation
-        free = collision_free(self.other, self.dt)
-        if self.jumps is None:
-            free = free & collision_free(self.played, self.dt)
-        return np.where(free, deviation, 0.0)
+        return np.abs(self.played.angular_velocity - self.other.angular_velocity)
 
     @cached_property
     def momentum_deviation(self) -> Array:
@@ -213,7 +211,8 @@ class View:
         if self.scenario.thrusts:
             return Restitutions(np.zeros(0), np.zeros(0), np.zeros(0), 0, 0)
         scene = self.scenario.scene
-        slowest = SLOWEST * float(np.linalg.norm(scene.gravity)) * self.scenario.sample_interval
+        slowest = SLOWEST * (1 + scene.restitution) / 2 * self.scenario.sample_interval
+        slowest *= float(np.linalg.norm(scene.gravity))
         return effective_restitution(self.played, scene, self.dt, slowest, self.rounding)
 
     @cached_property

@@ -11,11 +11,11 @@ import numpy as np
 
 from reports.compare import laws, scales
 from reports.compare.view import View
-from scenarios.model import Array, Scenario, Thrust
+from scenarios.model import Array, Scenario
 
 
 def momentum(view: View) -> Array | None:
-    """|P(t) - P(0) - impulse from outside| over the sum of m|v| at hand (scales.py).
+    """|P(t) - P(0) - impulse from outside| over the momentum at hand (scales.py).
 
     The outer impulse comes from weight and world-frame thrust. If walls, static disks or a turning
     thrust act, only the engine knows the impulse: None.
@@ -26,13 +26,12 @@ def momentum(view: View) -> Array | None:
     actual = laws.momentum(played, scene)
     expected = actual[0] + np.outer(played.t, laws.moving_mass(scene).sum() * scene.gravity)
     for thrust in view.scenario.thrusts:
-        expected = expected + np.outer(time_on(thrust, played.t), thrust.force)
+        expected = expected + np.outer(laws.time_on(thrust, played.t), thrust.force)
     return laws.lengths(actual - expected) / (scales.momentum(view.scenario) or 1.0)
 
 
 def angular_momentum(view: View) -> Array | None:
-    """|L(t) - L(0) - angular impulse from outside| over the sum of m|x||v| + I|w| at hand, about
-    the centre of mass.
+    """|L(t) - L(0) - angular impulse from outside| over the angular momentum at hand (scales.py).
 
     The centre of mass is that of the start, so that the origin does not matter. The total weight
     acts at x0 + v0 t + g t2 / 2, so its torque is known. A thrust acts where its disk is, which
@@ -51,27 +50,36 @@ def angular_momentum(view: View) -> Array | None:
 
 
 def energy(view: View) -> Array | None:
-    """|E(t) - E_expected(t)| over the energy at hand (scales.py).
+    """|E(t) - E_expected(t)| over the energy at hand (scales.py)."""
+    gained = energy_gained(view)
+    return None if gained is None else np.abs(gained)
 
-    At e = 1 without thrust E_expected is E(0); else it is the truth's. If a scene wraps under
-    gravity the law says nothing: a disk that is set onto the opposite edge has another height.
+
+def energy_gained(view: View) -> Array | None:
+    """E(t) - E_expected(t) over the energy at hand (scales.py).
+
+    At e = 1 without friction and thrust E_expected is E(0); else it is the truth's. If a scene
+    wraps under gravity the law says nothing: a disk that is set onto the opposite edge has another
+    height.
     """
     scenario, conserved = view.scenario, keeps_energy(view.scenario)
     if conserved == (view.other is not None) or lifts(scenario):
         return None
-    if view.other is None:
-        actual = laws.energy(view.played, scenario.scene)
-        share: Array = np.abs(actual - actual[0]) / (scales.energy(scenario) or 1.0)
-        return share
-    return np.abs(view.energy_deviation) / (scales.energy(scenario, view.other) or 1.0)
+    actual = laws.energy(view.played, scenario.scene)
+    gained = actual - actual[0] if view.other is None else view.energy_deviation
+    return gained / (scales.energy(scenario) or 1.0)
 
 
 def energy_rise(view: View) -> Array | None:
-    """E(t) minus the smallest E before t, over the energy at hand: only thrust can add energy."""
+    """E(t) minus the smallest E before t, over the energy at hand, beyond `laws.half_step`: only
+    thrust can add energy."""
+    scene = view.scenario.scene
     if view.scenario.thrusts or lifts(view.scenario):
         return None
-    actual = laws.energy(view.played, view.scenario.scene)
-    return (actual - np.minimum.accumulate(actual)) / (scales.energy(view.scenario) or 1.0)
+    actual = laws.energy(view.played, scene)
+    slack = laws.half_step(view.played, scene, view.dt)
+    rise = actual - slack - np.minimum.accumulate(actual + slack)
+    return np.maximum(rise, 0.0) / (scales.energy(view.scenario) or 1.0)
 
 
 def lifts(scenario: Scenario) -> bool:
@@ -89,8 +97,3 @@ def keeps_energy(scenario: Scenario) -> bool:
     """Whether neither collisions nor friction nor thrust change the energy."""
     scene = scenario.scene
     return scene.restitution == 1 and not scene.friction and not scenario.thrusts
-
-
-def time_on(thrust: Thrust, t: Array) -> Array:
-    """(k,) s for which the thrust has been on by `t`."""
-    return np.clip(t - thrust.start, 0.0, thrust.stop - thrust.start)

@@ -60,7 +60,9 @@ def render(
         policy=policy,
         css=Markup(sheet),
         looks=looks,
-        looks_json=looks_as_json(looks),
+        looks_json=for_script(
+            {name: look._asdict() | {"path": look.path} for name, look in looks.items()}
+        ),
         scripts=[Markup(source) for source in sources],
         library="".join(map(deflated, library)),
         **fields,
@@ -126,11 +128,6 @@ def css() -> str:
     return f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
         REPORTS / "page" / "page.css"
     ).read_text(encoding="utf-8")
-
-
-def looks_as_json(looks: Mapping[str, style.Look]) -> Markup:
-    """The looks for the scripts, with no `<` that could end the block they stand in."""
-    return for_script({name: look._asdict() | {"path": look.path} for name, look in looks.items()})
 
 
 def for_script(value: Any) -> Markup:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 
+from adapters.engines import ENGINES
 from adapters.engines import OWN as OWN_PROFILE
 from adapters.friction import REFUSAL
 from reports.compare.comparison import Comparison
+from reports.compare.verdicts import failures_at
 from reports.page import pooled
 from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
 from reports.page.style import number
 from reports.terminal.counts import counted, listed
 from scenarios.catalogue import SCENARIOS
+
+PROJECT = {name for name, row in ENGINES.items() if not row.outside}
+FEW = 1  # scenes that are named of each engine that fails
 
 
 def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
@@ -36,7 +42,11 @@ def findings(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str
     off = ranked(position_errors(scores, rough), groups)
     played = [name for name in off.columns if np.isfinite(off[name]).any()]
     said = closest(off[played or list(off.columns)])  # one that refuses friction is not the last
-    return [*sentences, f"Scenes with friction, which are not counted above. {said}"]
+    broken = " ".join(failing(broken_laws(rough, untrusted), len(rough)))
+    return [
+        *sentences,
+        f"Scenes with friction, which are not counted above. {said} {broken}".strip(),
+    ]
 
 
 def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> list[str]:
@@ -56,13 +66,49 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
         if comparison.scenario.name not in refused.get(run.name, ())
     ]
     everyone, engines = engines is off, engines.dropna(axis="columns", how="all")
-    sentences = [closest(engines), worth_of_settings(engines), where_it_fails(engines, statuses)]
+    broken = broken_laws(comparisons, untrusted)
+    sentences = [
+        closest(engines),
+        *failing({k: v for k, v in broken.items() if everyone or k in engines}, len(comparisons)),
+        worth_of_settings(engines),
+        where_it_fails(engines, statuses),
+    ]
     own = [
-        unranked_sentence(name, off, FAR_OFF, len(refused.get(name, ())))
+        unranked_sentence(name, off, FAR_OFF, len(refused.get(name, ())), broken.get(name, {}))
         for name in groups.get(YOURS, [])
     ]
-    exact = [unranked_sentence(name, off, RIGHT, 0) for name in groups.get(EXACT, [])]
+    exact = [unranked_sentence(k, off, RIGHT, 0, broken.get(k, {})) for k in groups.get(EXACT, [])]
     return sentences if everyone else [*own, *sentences, *exact]
+
+
+def broken_laws(
+    comparisons: Sequence[Comparison], untrusted: Set[str]
+) -> dict[str, dict[str, str]]:
+    """Engine -> scene -> the verdict that it fails at the middle step size, in words; this
+    project's solvers first, then those that fail most."""
+    scenes: dict[str, dict[str, str]] = {}
+    for comparison in comparisons:
+        for name, words in failures_at(comparison.table, comparison.middle_dt).items():
+            if name not in untrusted:
+                scenes.setdefault(name, {})[comparison.scenario.name] = words
+    order = sorted(scenes, key=lambda name: (name not in PROJECT, -len(scenes[name])))
+    return {name: scenes[name] for name in order}
+
+
+def where_broken(broken: Mapping[str, str], scenes: int) -> str:
+    """ "fails in 3 of 50 scenes (tunnels in falling_box, ...)", of one scene "tunnels"; "" if it
+    does not."""
+    if scenes == 1 or not broken:
+        return "".join(broken.values())
+    named = [f"{words} in {scene}" for scene, words in broken.items()]
+    more = ", ..." if len(named) > FEW else ""
+    return f"fails in {len(named)} of {counted(scenes, 'scene')} ({', '.join(named[:FEW])}{more})"
+
+
+def failing(broken: Mapping[str, Mapping[str, str]], scenes: int) -> list[str]:
+    """A sentence on the engines that break a law, whatever their distance from the exact answer."""
+    said = "; ".join(f"{name} {where_broken(each, scenes)}" for name, each in broken.items())
+    return [f"Laws broken anywhere in a scene: {said}."] if said else []
 
 
 def early_ends(comparisons: Sequence[Comparison]) -> list[str]:
@@ -120,31 +166,43 @@ def not_counted(broken: Mapping[str, str]) -> list[str]:
 
 
 def position_errors(scores: pd.DataFrame, comparisons: Sequence[Comparison]) -> pd.DataFrame:
-    """Largest deviation from the truth in radii at the middle dt: a row for each scenario that is
-    scored, a column for each `engine:profile`.
+    """Largest deviation from the truth in radii at the middle dt: a row for each scenario with
+    `scores`, a column for each `engine:profile`.
 
     `inf` for an engine without a result, so that refusing a hard scene is no advantage.
     """
-    scored = [each.scenario.name for each in comparisons if pooled.scored(each)]
+    scored = [
+        each.scenario.name
+        for each in comparisons
+        if pooled.scored(each) or each.scenario.name in set(scores.scenario)
+    ]
     names = list(dict.fromkeys(scores.name))
     table = scores.pivot(index="scenario", columns="name", values="error")
     return table.reindex(index=scored, columns=names)
 
 
-def unranked_sentence(name: str, off: pd.DataFrame, within: float, refused: int) -> str:
-    """A sentence on an engine that is not ranked: the number of scenes with an error of at most
-    `within` radii; those with an error above a radius, the worst first; those without a result; and
-    the number `refused` of those not played by design."""
+def unranked_sentence(
+    name: str,
+    off: pd.DataFrame,
+    within: float,
+    refused: int,
+    broken: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """A sentence on an engine that is not ranked: where it breaks a law (`broken`: scene -> how);
+    the number of scenes with an error of at most `within` radii; those with an error above a
+    radius, the worst first; those without a result; and the number `refused` of those not played by
+    design."""
     errors = off[name].dropna()
     far = errors[(errors > FAR_OFF) & np.isfinite(errors)].sort_values(ascending=False)
-    lost = list(errors.index[np.isinf(errors)])
+    lost = [scene for scene in errors.index[np.isinf(errors)] if scene not in broken]
     bound = f"{number(within)} {'radius' if within == 1 else 'radii'} of the exact answer"
     inside = int((errors <= within).sum())
     if len(errors) == 1:
         said = f"is {'' if inside else 'not '}within {bound}"
     else:
         said = f"is within {bound} in {inside} of {len(errors)} scenes"
-    parts = [f"{name.removesuffix(OWN_PROFILE)} {said}"]
+    fails = where_broken(broken, max(len(errors), len(broken)))
+    parts = [f"{name.removesuffix(OWN_PROFILE)} {', '.join(filter(None, (fails, said)))}"]
     if len(far):
         parts.append(f"off by {number(far.iloc[0], 2)} radii in {far.index[0]}")
         if len(far) > 1:
@@ -172,14 +230,14 @@ def closest(off: pd.DataFrame) -> str:
     medians = off.median().sort_values()
     if np.isinf(medians.iloc[0]):
         return (
-            "No engine was played to its end in half of the scenes with an exact answer, so engines"
-            " are not ranked."
+            "No engine was played to its end, without breaking a law, in half of the scenes with an"
+            " exact answer, so engines are not ranked."
         )
     # within 1 % counts as equal
-    wins = {str(name): int((off[name] <= 1.01 * off.min(axis=1)).sum()) for name in off.columns}
+    near = (off.le(1.01 * off.min(axis=1), axis="index") & np.isfinite(off)).sum()
     best, *others = (
-        f"{name} ({number(value, 2)}{f', unbeaten in {wins[str(name)]}' if len(off) > 1 else ''})"
-        for name, value in medians.items()
+        f"{name} ({number(value, 2)}{f', unbeaten in {near[name]}' if len(off) > 1 else ''})"
+        for name, value in medians[np.isfinite(medians)].items()
     )
     ranking = (
         f", then {', '.join(others[:2])}" + (f", last {others[-1]}" if len(others) > 2 else "")
@@ -254,13 +312,13 @@ def where_it_fails(off: pd.DataFrame, statuses: Sequence[str]) -> str:
     counts = lost.sum().sort_values(ascending=False, kind="stable")
     if len(off) == 1:
         who = ", ".join(str(name) for name, count in counts.items() if count)
-        return f"More than one radius off, or without a result: {who}; {cells}"
+        return f"More than one radius off, or failed: {who}; {cells}"
     who = ", ".join(f"{name} in {count}" for name, count in counts.items() if count)
     defeated = lost.sum(axis=1)
     least = off.min(axis=1).where(defeated == defeated.max())  # of the best engine there
     hardest = least.replace(np.inf, np.finfo(float).max).idxmax()
     return (
-        f"More than one radius off, or without a result: {who} of {len(off)} scenes. In the hardest"
+        f"More than one radius off, or failed: {who} of {len(off)} scenes. In the hardest"
         f" scene, {hardest}, {defeated.max()} of {counted(lost.shape[1], 'engine')} fail;"
         f" {cells}"
     )

@@ -97,7 +97,8 @@ def first_screen(
     middle = cost_points.with_times(scores[scores.middle], clock)
     answers = situations.answers(middle, situated(comparisons), untrusted)
     drawings = pooled.drawings(scores, answers, untrusted)
-    first = error_cost.error_cost(pooled.scores(without_friction), clock, untrusted)
+    exact = filter(pooled.scored, without_friction)
+    first = error_cost.error_cost(pooled.scores([*exact]), clock, untrusted)
     return FirstScreen(
         scenes=len(comparisons),
         exact=sum(comparison.truth is not None for comparison in comparisons),

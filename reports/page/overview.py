@@ -15,6 +15,7 @@ from reports.compare import laws
 from reports.compare.against import ITSELF
 from reports.compare.comparison import Comparison
 from reports.compare.metrics import METRICS
+from reports.compare.verdicts import VERDICTS, fails, failures_at
 from reports.compare.view import NOT_JUDGED
 from reports.page import pooled, situations
 from reports.page.style import TRUTH, heat, number
@@ -110,10 +111,14 @@ SUMMARY: dict[str, SummaryColumn] = {
         "missed and spurious collisions of a scene together",
         "number",
     ),
+    "fails": SummaryColumn(
+        "Fails", "scenes", "a verdict: tunnels, sinks, gains energy (list verdicts)", "scenes"
+    ),
     "failed": SummaryColumn(
         "Not played", "scenes", "refused, crashed, diverged or timed out", "scenes"
     ),
 }
+COUNTED = ("fails", "failed")  # columns that count scenes
 
 
 def names_of(comparisons: Iterable[Comparison]) -> list[str]:
@@ -128,7 +133,7 @@ def values(comparison: Comparison) -> Found:
     near = table.dt_s == comparison.middle_dt
     found: Found = {}
     for versus in (ITSELF, TRUTH):  # the truth comes last and replaces the laws
-        rows = table[near & (table.versus == versus) & table.metric.isin(list(METRICS))]
+        rows = table[near & (table.versus == versus) & table.metric.isin([*METRICS, *VERDICTS])]
         for row in rows.to_dict("records"):
             where = (
                 f"disk {row['disk']}"
@@ -169,7 +174,8 @@ def summary(
     comparisons: Sequence[Comparison], names: Sequence[str], untrusted: Set[str]
 ) -> dict[str, list[OverviewCell]]:
     """`engine:profile` -> a cell for each of `SUMMARY`: the median over the scenarios and the worst
-    of them; the last cell counts the scenarios not played.
+    of them; the last two count the scenarios that fail a verdict, and those not played. Both are
+    infinitely far off in each median.
 
     A scene that a solver's own file refuses, because the file is written for another restitution,
     does not count; a file that refuses all of them was not asked. The best is the lowest of its
@@ -180,23 +186,26 @@ def summary(
     failed = [outcome_at_middle_dt(comparison) for comparison in comparisons]
     scores = pooled.scores(comparisons)
     scored = set(scores.scenario)
+    broken = [failures_at(each.table, each.middle_dt) for each in comparisons]
     rows: dict[str, list[OverviewCell]] = {}
     for name in names:
         lost = [
-            comparison.scenario.name
-            for comparison, each in zip(comparisons, failed)
-            if name in each
-            and comparison.scenario.name in scored
-            and not refused_by_file(name, each)
+            name in fails or (name in each and not refused_by_file(name, each))
+            for each, fails in zip(failed, broken)
         ]
         cells = [
-            pool(metric, name, comparisons, found, lost if metric == MAPPED else ())
+            pool(metric, name, comparisons, found, lost, scored)
             for metric in SUMMARY
-            if metric != "failed"
+            if metric not in COUNTED
         ]
+        count = sum(name in fails for fails in broken)
+        played = sum(name not in each for each in failed)
+        cells.append(OverviewCell(f"{count} of {played}", failed=count > 0, value=count))
         if name in untrusted:
-            broken = OverviewCell("breaks", "breaks the protocol: not scored", failed=True)
-            cells = [broken] * len(cells)
+            untested = OverviewCell(
+                "breaks", "breaks the protocol or a law: not scored", failed=True
+            )
+            cells = [untested] * len(cells)
         asked = [each for each in failed if not refused_by_file(name, each)]
         count = sum(name in each for each in asked)
         cells.append(
@@ -247,7 +256,10 @@ def mark_best(
     scored = [rows[name] for name in rows if name not in untrusted]
     if not scored:
         return dict(rows)
-    lowest = [min(column, key=by_value).text for column in zip(*scored)]
+    lowest = [
+        min(column, key=lambda cell: np.inf if np.isnan(cell.value) else cell.value).text
+        for column in zip(*scored)
+    ]
     return {
         name: [
             cell._replace(best=name not in untrusted and cell.text == best and best != "–")
@@ -257,21 +269,18 @@ def mark_best(
     }
 
 
-def by_value(cell: OverviewCell) -> float:
-    """The sort key of a cell of the summary; cells without a number come last."""
-    return np.inf if np.isnan(cell.value) else cell.value
-
-
 def pool(
     metric: str,
     name: str,
     comparisons: Sequence[Comparison],
     found: Sequence[Found],
-    lost: Iterable[str] = (),
+    lost: Sequence[bool],
+    scored: Set[str],
 ) -> OverviewCell:
     """Median and worst of a metric over the scenarios in which it is judged, and their number.
 
-    In the scenarios `lost` the engine has no result, which counts as an infinite error.
+    In those that are `lost` the engine fails, which counts as an infinite error where the metric
+    is judged of any engine; the position where it is `scored`.
 
     Wrong collisions are the missed and the spurious ones of a scene together; if the truth has no
     collision, only the spurious ones.
@@ -286,34 +295,46 @@ def pool(
         if any(one.judged for one in each)
     }
     left_out = sum(bool(each) for each in known) - len(totals)
-    totals |= dict.fromkeys(lost, np.inf)
+    for comparison, numbers, is_lost in zip(comparisons, found, lost):
+        scene = comparison.scenario.name
+        applies = any(key in kinds and number.judged for (_, key), number in numbers.items())
+        if is_lost and (scene in scored if metric == MAPPED else applies):
+            totals[scene] = np.inf
     less = f", {NOT_JUDGED} in {left_out}" if left_out else ""
     remark = f"in {counted(len(totals), 'scene')}{less}"
     if not totals:
         return OverviewCell(number(np.nan), remark)
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
-    worst = totals[worst_in]
-    shown = "no result" if np.isinf(worst) else number(worst) if worst else ""
-    scenes = len(totals)
+    worst = in_text(totals[worst_in]) if totals[worst_in] else ""
     return OverviewCell(
-        number(value), remark, value=value, worst=shown, worst_in=worst_in, scenes=scenes
+        in_text(value), remark, value=value, worst=worst, worst_in=worst_in, scenes=len(totals)
     )
+
+
+def in_text(value: float) -> str:
+    """A number of a table of errors; an infinite one is that of a run that failed."""
+    return "fails" if np.isinf(value) else number(value)
 
 
 def heat_map(
     comparisons: Sequence[Comparison], names: Sequence[str]
 ) -> dict[str, list[OverviewCell]]:
     """scenario -> a cell for each name: the largest position error in radii, or why there is
-    none."""
+    none: the verdict that fails, in words, or what ended the run."""
     rows = {}
     flukes = set(pooled.flukes(pooled.scores(comparisons)))
     for comparison in comparisons:
         found, failed = values(comparison), outcome_at_middle_dt(comparison)
         played = {run.name for run in comparison.middle_runs}
+        broken = failures_at(comparison.table, comparison.middle_dt)
         cells = []
         for name in names:
             if name in failed:
                 cells.append(outcome_cell(failed[name]))
+            elif name in broken:
+                off = found.get((name, MAPPED))
+                remark = f"{off.text} radii off where an exact answer says it" if off else ""
+                cells.append(OverviewCell(broken[name], remark, failed=True))
             elif (name, MAPPED) in found:
                 value, remark, judged = found[name, MAPPED]
                 cells.append(
@@ -345,22 +366,26 @@ def scenario_table(
     comparison: Comparison, names: Sequence[str]
 ) -> list[tuple[str, str, str, list[OverviewCell]]]:
     """(metric, unit, which value is better, a cell for each name) of every metric of this
-    scenario."""
+    scenario, and of every verdict that an engine fails."""
     found, failed = values(comparison), outcome_at_middle_dt(comparison)
+    table = fails(comparison.table[comparison.table.dt_s == comparison.middle_dt])
+    broken = {*zip(table.engine + ":" + table.profile, table.metric)}
+    kinds = {key: (kind.unit, "lower") for key, kind in VERDICTS.items() if key in {*table.metric}}
+    kinds |= {key: (metric.unit, metric.better) for key, metric in METRICS.items()}
     rows = []
-    for key, metric in METRICS.items():
+    for key, (unit, best) in kinds.items():
         if not any((name, key) in found for name in names):
             continue
         cells = []
         for name in names:
             if (name, key) in found:
-                text, remark = found[name, key].text, found[name, key].remark
-                cells.append(OverviewCell(text, remark, share=share_of(key, remark)))
+                _, remark, _ = cell = found[name, key]
+                share, is_broken = share_of(key, remark), (name, key) in broken
+                cells.append(OverviewCell(cell.text, remark, failed=is_broken, share=share))
             else:
                 cells.append(outcome_cell(failed[name]) if name in failed else OverviewCell("–"))
-        unit = "" if metric.unit == "1" else metric.unit
-        better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[metric.better]
-        rows.append((key, unit, better, cells))
+        better = {"lower": "↓", "higher": "↑", "zero": "◦", "as stated": "="}[best]
+        rows.append((key, "" if unit == "1" else unit, better, cells))
     return rows
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 from adapters.engines import OWN
 from adapters.run import Run
 from reports.compare.comparison import Comparison
+from reports.compare.verdicts import failures
 from reports.compare.view import LEAST_SHARE, NOT_JUDGED
 from reports.page import situations, style
 from reports.page.charts import ChartLine, Drawing, figure_of
@@ -25,25 +26,29 @@ SCORES = ["scenario", "name", "error", "angle", "dt_s", "step_size", "middle"]
 def scores(comparisons: Sequence[Comparison]) -> pd.DataFrame:
     """A row for each run of a scene that is scored: columns `SCORES`.
 
-    error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result;
+    error (radii) and angle (rad) are the largest of any disk in any sample, inf without a result
+    or where a verdict fails; a scene without exact answer has rows only of the runs that fail one.
     step_size counts from the coarsest, dt_s is its length, middle: whether it is the middle step
     size. A scene that a solver's own file refuses has no row for that file.
     """
-    rows = []
-    for comparison in comparisons:
-        if not scored(comparison):
-            continue
+    rows: list[tuple[str, str, float, float, float, int, bool]] = []
+    for comparison in comparisons if any(map(scored, comparisons)) else ():
         table, scenario = comparison.table, comparison.scenario.name
         judged = table[(table.versus == style.TRUTH) & table.metric.isin([ERROR, ANGLE])]
         judged = judged[~judged.note.astype(str).str.startswith(NOT_JUDGED)]
         keys = zip(judged.engine + ":" + judged.profile, judged.dt_s, judged.metric)
         found = dict(zip(keys, judged.value.to_numpy(float)))
         steps = sorted({run.dt for run in comparison.runs}, reverse=True)
+        failed = failures(table)
         for run in comparison.runs:
-            if run.name.endswith(OWN) and run.status == "unsupported":
+            fails = (run.name, run.dt) in failed
+            if (run.name.endswith(OWN) and run.status == "unsupported") or not (
+                fails or scored(comparison)
+            ):
                 continue
             error, angle = (
-                float(found.get((run.name, run.dt, each), np.inf)) for each in (ERROR, ANGLE)
+                np.inf if fails else float(found.get((run.name, run.dt, each), np.inf))
+                for each in (ERROR, ANGLE)
             )
             middle = run.dt == comparison.middle_dt
             step_size = steps.index(run.dt)
@@ -66,7 +71,8 @@ def flukes(found: pd.DataFrame) -> list[tuple[str, str]]:
         group = group.sort_values("step_size")
         errors, k = group.error.to_numpy(), int(np.argmax(group.middle.to_numpy()))
         between = 0 < k < len(errors) - 1
-        if between and errors[k] > max(situations.RIGHT, FLUKE * max(errors[k - 1], errors[k + 1])):
+        least = max(situations.RIGHT, FLUKE * max(errors[k - 1], errors[k + 1])) if between else 0
+        if between and least < errors[k] < np.inf:
             marked.append((str(scenario), str(name)))
     return marked
 
@@ -93,8 +99,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Recommendatio
     for k, name in enumerate(names):
         mine = middle[middle.name == name].set_index("scenario")
         errors = [mine[column_of(answer)].reindex(answer.scenes) for answer in answers]
-        asked = [each.dropna() if name.endswith(OWN) else each.fillna(np.inf) for each in errors]
-        medians = [float(each.median()) for each in asked]
+        medians = [float(each.median()) for each in errors]
         y: Array = np.where(np.isfinite(medians), medians, np.nan)
         x = np.arange(len(answers), dtype=np.float64) + (k - (len(names) - 1) / 2) * 0.7 / max(
             len(names), 1
@@ -115,7 +120,7 @@ def by_situation(found: pd.DataFrame, answers: Sequence[situations.Recommendatio
         "Error by situation",
         "Each mark is an engine: the median over the scenes of its largest position error at the"
         " middle step size. For Spin it is the largest error of angle in rad, which is how far a"
-        " point on the rim is off, in radii. Lower is better. No mark: no result in half of the"
+        " point on the rim is off, in radii. Lower is better. No mark: it fails in half of the"
         " scenes.",
         figure,
     )

@@ -2,23 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
 
 from reports.compare.comparison import Comparison
+from reports.page import cost_points, overview, style
+from reports.page.charts import NOISE, POINTS
 from reports.page.cost_points import RunTimes
+from reports.page.documents import CHARTED, render
 from reports.page.findings import findings, not_counted
-from reports.page.own_solvers import with_lines
-from reports.page.page import write_page
+from reports.page.first_screen import first_screen
+from reports.page.links import neighbours
+from reports.page.own_engines import is_lawless, own_engine_sentences
+from reports.page.own_solvers import Said, with_lines
+from reports.page.page_tables import page_tables
+from reports.page.panels import MARKED, panels
+from reports.page.sections import by_family, sections_of
 from reports.run.archive import Archive
 from reports.run.made import writing
 from reports.run.tables import TABLES, comparisons_of, make_tables
 from reports.run.timing_pass import noise_floor
 from reports.terminal.counts import counted
+from reports.terminal.foreign_text import put_text
+
+GENERATOR = "crosscheck run"
+PAPER_CHARTS = ("deviation", "convergence")  # of a scene, where it is printed
+
+
+def write_page(
+    path: Path,
+    comparisons: Sequence[Comparison],
+    *,
+    findings: Sequence[str],
+    untrusted: Set[str],
+    conformance: pd.DataFrame,
+    known_answers: pd.DataFrame,
+    about: Mapping[str, Any],
+    lessons: Mapping[str, Any],
+    clock: cost_points.RunTimes = cost_points.NO_CLOCK,
+    said: Mapping[str, Sequence[Said]] = MappingProxyType({}),
+    on_paper: Sequence[str] = (),
+) -> None:
+    """Write the page of `comparisons`, in reading order, to `path`.
+
+    Args:
+        findings: the sentences of the first screen.
+        untrusted: the engines that are not scored, as they break the protocol.
+        conformance: a row for each question of a probe.
+        known_answers: a row for each reproduced published number.
+        about: command, seed, machine, versions, started, seconds, and why it is unfinished, or "".
+        lessons: name -> an object with its number, title and question.
+        clock: the times of the run.
+        said: a solver's file -> what `crosscheck check` says of it.
+        on_paper: the scenarios that get half a page each in print.
+    """
+    names = overview.names_of(comparisons)
+    tables = page_tables(comparisons, untrusted, conformance, known_answers)
+    html = render(
+        "page/page.html.j2",
+        generator=GENERATOR,
+        scripts=(*CHARTED, "page/panels.js"),
+        looks=style.looks_of((*names, style.TRUTH)),
+        plotly=True,
+        names=names,
+        untrusted=untrusted,
+        first=first_screen(comparisons, untrusted, clock, findings, said),
+        tables=tables,
+        panels=panels(comparisons, names, tables.heat_map, clock),
+        marked=MARKED,
+        families=by_family(sections_of(comparisons)),
+        lessons=lessons,
+        links=neighbours(path, "report"),
+        on_paper=on_paper,
+        paper_charts=PAPER_CHARTS,
+        points=POINTS,
+        noise=NOISE,
+        about=about,
+    )
+    put_text(path, html)
+
 
 PAGE = "report.html"
 
@@ -32,8 +99,8 @@ class Report:
         comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
-        untrusted: the engines that broke the protocol: their rows stay in the tables, but they are
-            not scored.
+        untrusted: the engines that broke the protocol, and the reader's own that break a law:
+            their rows stay in the tables, but they are not scored.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
@@ -96,7 +163,9 @@ def made_report(
         if row["verdict"] == "breaks"
     }
     untrusted = set(broken)
-    sentences = [*findings(comparisons, untrusted), *not_counted(broken)]
+    untrusted |= {name for name, rows in zip(engines, asked) if is_lawless(rows)}
+    own = [sentence for rows in asked for sentence in own_engine_sentences(rows)]
+    sentences = [*own, *findings(comparisons, untrusted), *not_counted(broken)]
     checks = {
         name: archive.checked[name]["checked"]
         for name in header["engines"]

@@ -182,7 +182,9 @@ def answers(
         by_angle = title == SPIN and not here.angle.isna().all()
         if by_angle:
             here = here.assign(error=here.angle.fillna(np.inf))
-        if members and not (title == ALL and len(rows) < 2):
+        # a scene without exact answer has only the engines that fail a verdict in it
+        judged = len(set(here.name)) == len(set(of_kind.name)) or np.isfinite(here.error).any()
+        if members and judged and not (title == ALL and len(rows) < 2):
             rows.append(
                 answer(title, meaning, "rad" if by_angle else "radii", here, groups, ranked)
             )

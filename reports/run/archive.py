@@ -52,6 +52,7 @@ LINES = {
     "footer": ("tasks", "played", "seconds"),
 }
 """The kinds of lines of a run's journal -> what they hold."""
+CELL = ("scene", "seed", "engine", "profile", "substeps")  # what identifies the cell of a line
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class Archive:
             elif kind == "header":
                 header = line["header"]
             elif kind == "cell":
-                cells[what_of(line)] = number, line
+                cells[tuple(line[name] for name in CELL)] = number, line
             elif kind == "timing":
                 timings.setdefault(line["timing"], {})[line["copy"]] = line
             elif kind == "overhead":
@@ -126,11 +127,6 @@ class Archive:
             seconds if complete else float("nan"),
             complete,
         )
-
-
-def what_of(record: dict[str, Any]) -> tuple[Any, ...]:
-    """What identifies the cell of a line."""
-    return tuple(record[name] for name in ("scene", "seed", "engine", "profile", "substeps"))
 
 
 def is_of_run(record: dict[str, Any], header: dict[str, Any]) -> bool:

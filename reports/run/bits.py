@@ -1,21 +1,26 @@
-"""A hash of the bits of every engine in every scene. The repository keeps them, so that another
-machine can find where its bits differ."""
+"""`crosscheck run --bits`: a hash of the bits of every engine in every scene. The repository keeps
+them, so that another machine can find where its bits differ."""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import platform
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from reports.run.cells import Cell
-from reports.run.playing import LOADING, ClockStart, play_cell
-from reports.run.worker_process import allow
-from scenarios.model import Scenario, Trajectory
+from reports.run.archive import Archive, stored_trajectory
+from reports.run.cells import versions
+from reports.run.made import writing
+from reports.terminal.console import Console
+from reports.terminal.counts import counted, listed
+from reports.terminal.foreign_text import put_text
+from reports.terminal.tables import print_list, print_table
+from scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"
 COLUMNS = ["scenario", "engine", "profile", "dt_s", "status", "bits", "until"]
@@ -32,31 +37,38 @@ class ChangedBits(NamedTuple):
     other: int
 
 
-def bits_here(cell: Cell, row: EngineRow, scenario: Scenario) -> dict[str, Any]:
-    """The row of the table for a cell, which is played here; called in a worker."""
-    allow(LOADING)
-    run = play_cell(cell, row, scenario, ClockStart())
-    bits, until = ("", "") if run.trajectory is None else bits_of(run.trajectory)
-    what = (scenario.name, *cell.names, f"{scenario.dt(cell.substeps):.9g}", run.status)
-    return dict(zip(COLUMNS, (*what, bits, until)))
+def rows_of(archive: Archive) -> list[dict[str, Any]]:
+    """A row of the table for each scene and engine of a run, at the middle of the step sizes; none
+    for another seed than that of the kept bits, 0, which gives random scenes other starts."""
+    steps: dict[str, set[int]] = {}
+    for record in archive.records:
+        steps.setdefault(record["scene"], set()).add(record["substeps"])
+    middle = {scene: sorted(sizes)[len(sizes) // 2] for scene, sizes in steps.items()}
+    order = [list(archive.header[name]) for name in ("scenes", "engines")]
+    rows = {}
+    for record in archive.records:
+        if record["seed"] == 0 and record["substeps"] == middle[record["scene"]]:
+            name = f"{record['engine']}:{record['profile']}"
+            trajectory = stored_trajectory(archive.folder, record)
+            bits = ("", "") if trajectory is None else bits_of(trajectory)
+            what = [record[key] for key in ("scenario", "engine", "profile")]
+            row = (*what, f"{record['dt_s']:.9g}", record["status"], *bits)
+            rows[order[0].index(record["scene"]), order[1].index(name)] = dict(zip(COLUMNS, row))
+    return [rows[place] for place in sorted(rows)]
 
 
 def bits_of(played: Trajectory) -> tuple[str, str]:
     """16 hex digits of a hash over all states; and for samples 0, 1, 2, 4, 8 ... and the last,
     `DIGITS` digits of the hash over the states up to there."""
-    digest, marks = hashlib.sha256(), []
+    digest, marks, last = hashlib.sha256(), [], len(played) - 1
+    hashed = {0, *(2**p for p in range(len(played).bit_length()) if 2**p < last), last}
     arrays = (played.position, played.velocity, played.angle, played.angular_velocity)
     for k in range(len(played)):
         for array in arrays:
             digest.update(array[k].astype("<f8").tobytes())
-        if k in samples_of(len(played)):
+        if k in hashed:
             marks.append(digest.hexdigest()[:DIGITS])
     return digest.hexdigest()[:16], " ".join(marks)
-
-
-def samples_of(count: int) -> list[int]:
-    """The samples whose hashes the column `until` holds, if there are `count`."""
-    return [0, *(2**p for p in range(count.bit_length()) if 2**p < count - 1), count - 1]
 
 
 def written(rows: list[dict[str, Any]], about: Mapping[str, str]) -> str:
@@ -99,3 +111,67 @@ def first_other(one: str, other: str) -> tuple[int, int]:
     # the hashes are those of samples 0, 1, 2, 4 ... and the last
     samples = [0, *(2**p for p in range(len(mine)))]
     return (samples[at - 1] if at else -1), samples[at]
+
+
+BITS = "bits.csv"  # in the folder of a run
+SHOWN = 12  # differences
+
+
+def write_bits(folder: Path) -> None:
+    """Write the table of a run to its folder, below the system, architecture and versions, which
+    may affect the bits."""
+    made_by = {
+        "system": platform.system(),
+        "architecture": platform.machine(),
+        "Python": platform.python_version(),
+        **versions(),
+    }
+    with writing(folder, [BITS]):
+        put_text(folder / BITS, written(rows_of(Archive.read(folder)), made_by))
+
+
+def kept_bits(folder: Path) -> bool:
+    """Print in how many scenes the bits of a run equal the kept ones; whether all that can be
+    compared do, and there is something to compare."""
+    kept, here = (path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS))
+    table, made_by = read(here), about_of(here)
+    changed, both = differences(read(kept), table)
+    console = Console()
+    counts = Counter((both.engine + ":" + both.profile).tolist())
+    show(console, changed, counts)
+    if new := {*(table.engine + ":" + table.profile)} - {*counts}:
+        names = listed(sorted(new))
+        console.print(f"No bits are kept of {names} in these scenes and steps.", highlight=False)
+    others = [
+        f"{key} {value} (here {made_by.get(key)})"
+        for key, value in about_of(kept).items()
+        if made_by.get(key) != value
+    ]
+    if others:
+        console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
+    console.print()
+    return not changed and not both.empty
+
+
+def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> None:
+    """Print a row for each engine, and the first differences."""
+    other = Counter(each.name for each in found)
+    rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
+    title = "In how many scenes the bits are those kept in reports/bits.csv"
+    print_table(console, ["engine", "the same", "of"], rows, title)
+    console.print()
+    print_list(console, [in_words(each) for each in found[:SHOWN]])
+    if len(found) > SHOWN:
+        console.print(f"and {counted(len(found) - SHOWN, 'more difference')}")
+
+
+def in_words(one: ChangedBits) -> str:
+    """A sentence on where the bits differ."""
+    if one.other < 0:
+        return f"{one.name} in {one.scenario}: it did not play to the same sample"
+    if one.same < 0:
+        return f"{one.name} in {one.scenario}: other bits from the start on"
+    return (
+        f"{one.name} in {one.scenario}: the same bits up to sample {one.same}, others by sample"
+        f" {one.other}"
+    )

@@ -14,6 +14,7 @@ import pandas as pd
 
 from reports.compare.metrics import METRICS
 from reports.compare.table import COLUMNS
+from reports.compare.verdicts import VERDICTS
 from reports.compare.view import NOT_JUDGED, rounding_of
 from reports.run.archive import Archive
 from reports.run.tables import is_sealed
@@ -127,7 +128,9 @@ def difference(before: Path, after: Path) -> Difference:
             f"differs in scene: {listed(edited)}: edited between the runs, so that no result in it"
             " is called worse or better"
         )
-    numbers, same = changed_numbers(*tables, equal_keys(*cells) if like else set(), edited)
+    # of these scene, settings and versions are the same
+    alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
+    numbers, same = changed_numbers(*tables, alike if like else set(), edited)
     statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, both, edited)
     busy = [archive for archive in (one, other) if archive.timings and is_busy(archive)]
     warnings += [
@@ -172,14 +175,6 @@ def by_name(archive: Archive) -> Cells:
     return {
         (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
         for r in archive.records
-    }
-
-
-def equal_keys(before: Cells, after: Cells) -> set[Name]:
-    """(scenario, `engine:profile`, dt in s) of the cells whose scene, settings and versions are the
-    same."""
-    return {
-        name for name in before if name in after and before[name]["cell"] == after[name]["cell"]
     }
 
 
@@ -267,7 +262,8 @@ def changed_numbers(
     """Every number that differs between the tables, and how many are equal, by engine.
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
-    says which value is better, unless they differ in rounding. A deviation between two engines, a
+    says which value is better, unless they differ in rounding; a verdict that fails now, and did
+    not before, is worse. A deviation between two engines, a
     number that only one run judges, or one of an edited scene is then "other".
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
@@ -283,6 +279,8 @@ def changed_numbers(
             verdict = ROUNDING
         elif row["scenario"] in edited:
             verdict = "other"
+        elif row["metric"] in VERDICTS:
+            verdict = change_of_failure(row)
         else:
             verdict = verdict_of(row["metric"], row["versus"], was, now)
         what = (
@@ -329,6 +327,15 @@ def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
         return False
     bound = max(DIVERGED, *(ROUNDINGS * rounding_of(name) for name in engines))
     return abs(now - was) <= bound * max(1.0, abs(was), abs(now))
+
+
+def change_of_failure(row: Mapping[Hashable, Any]) -> str:
+    """Whether a verdict fails that did not before, or the other way round."""
+    was, now = (
+        not float(row[f"value{end}"] or "nan") <= float(row[f"bound{end}"])
+        for end in ("", "_after")
+    )
+    return "other" if was == now else "worse" if now else "better"
 
 
 def verdict_of(metric: str, versus: str, was: float, now: float) -> str:

@@ -8,7 +8,6 @@ import secrets
 import shutil
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Sequence
@@ -21,7 +20,6 @@ from adapters import system
 from adapters.safe_path import path_of_this, python
 from reports.run import worker_process
 from reports.run.worker import PRINTED, STARTING, Worker
-from reports.terminal.foreign_text import legible
 
 WORK = "from reports.run.portable_worker import main; main(sys.argv[1:])"
 KEY = "CROSSCHECK_WORKER"  # the variable with the key of our processes
@@ -83,8 +81,6 @@ class PortableWorker(Worker):
         with suppress(OSError, ValueError):  # closed
             while new := os.read(self.pipe.fileno(), PRINTED):
                 self.printed = (self.printed + new)[-PRINTED:]
-                if self.show:
-                    sys.stderr.write(legible(new.decode(errors="replace")))
 
     def drain(self, seconds: float) -> None:
         """Wait at most `seconds` until the thread has read all output of the process."""

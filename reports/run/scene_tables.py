@@ -36,7 +36,8 @@ from scenarios.regular import all_of
 JUDGE_SOURCE = ("reports/compare/**/*.py", "scenarios/**/*.py")
 ROOT = Path(__file__).parents[2]
 ANSWER = ".npz"  # the suffix of an answer's file
-NUMBERS = ("dt_s", "value", "at_s")  # columns of deviations.csv in which an empty field is NaN
+# columns of deviations.csv in which an empty field is NaN
+NUMBERS = ("dt_s", "value", "at_s", "bound")
 PATHS = "surrogateescape"  # keeps the path of a solver whose name is not UTF-8
 # s that the comparison of a scene may take: all 38 of the default run take 30, on two cores
 COMPARING = 300.0

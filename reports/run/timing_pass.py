@@ -149,7 +149,11 @@ class Pass:
         rounds: dict[Any, list[Sample]] = {}
         for sample in samples:
             rounds.setdefault(sample.key, []).append(sample)
-        lines = [line_of(key, counted_rounds(found)) for key, found in rounds.items()]
+        lines = [
+            # without the warm-up; with it if there are no others
+            line_of(key, [sample for sample in found if sample.round != WARM_UP] or found)
+            for key, found in rounds.items()
+        ]
         return [*lines, *map(as_played, slow)] if lines else []
 
 
@@ -183,11 +187,6 @@ def can(timed: Timed) -> bool:
         timed.run()
         return True
     return False
-
-
-def counted_rounds(samples: Sequence[Sample]) -> Sequence[Sample]:
-    """The samples without the warm-up; with it if there are no others."""
-    return [sample for sample in samples if sample.round != WARM_UP] or samples
 
 
 def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:

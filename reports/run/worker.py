@@ -8,7 +8,6 @@ import pickle
 import re
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from math import inf
 from multiprocessing import Pipe
@@ -20,7 +19,6 @@ from typing import Any
 from adapters import system
 from adapters.safe_path import path_of_this, python
 from reports.run.worker_process import CLOCK, Failure, out_of_memory
-from reports.terminal.foreign_text import legible
 
 # s for Python to start and to import the modules of a task, on a busy machine
 STARTING = 120.0
@@ -43,10 +41,9 @@ class Worker:
     kept when the worker dies.
     """
 
-    def __init__(self, memory: int, show: bool = False) -> None:
-        """Start the process; `memory` in bytes, 0: no limit; `show`: copy its output to standard
-        error."""
-        self.memory, self.show, self.stopped = memory, show, False
+    def __init__(self, memory: int) -> None:
+        """Start the process; `memory` in bytes, 0: no limit."""
+        self.memory, self.stopped = memory, False
         self.printed = b""
         self.start()
 
@@ -108,8 +105,6 @@ class Worker:
         the end."""
         new = os.read(self.output, PRINTED)
         self.printed = (self.printed + new)[-PRINTED:]
-        if self.show:
-            sys.stderr.write(legible(new.decode(errors="replace")))
         return len(new)
 
     def drain(self, seconds: float) -> None:
@@ -129,9 +124,8 @@ class Worker:
         if code == system.OUT_OF_MEMORY:
             return out_of_memory(self.memory)
         what = "worker died" if begun else "its worker could not start"
-        return Failure(
-            "crashed", f"{what}: {name_of_exit(code)}{self.place()}", self.left(), outside=not begun
-        )
+        how = signal.Signals(-code).name if code < 0 else f"exit status {code}"
+        return Failure("crashed", f"{what}: {how}{self.place()}", self.left(), outside=not begun)
 
     def abort(self) -> str:
         """Kill a worker that hangs; returns the place in Python where it hung."""
@@ -192,8 +186,3 @@ def start(theirs: Connection, trail: int, printing: int, memory: int) -> subproc
         pass_fds=(theirs.fileno(), trail),
         env=os.environ | {"PYTHONPATH": path_of_this()},
     )
-
-
-def name_of_exit(code: int) -> str:
-    """The signal behind a negative exit code, or the code."""
-    return signal.Signals(-code).name if code < 0 else f"exit status {code}"

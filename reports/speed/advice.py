@@ -16,10 +16,10 @@ import pandas as pd
 from adapters.engine import Engine
 from adapters.engines import row_of
 from adapters.mechanisms.options import OPTIONS
-from adapters.mechanisms.table import MECHANISMS
 from adapters.play import play_once
 from reports.compare.delays import jumps_of
 from reports.compare.pareto import kept_from
+from reports.compare.verdicts import first_failed
 from reports.compare.view import beside
 from reports.page.style import number
 from reports.run.machine import busy_cores
@@ -27,7 +27,7 @@ from reports.run.scenes import open_scene
 from reports.run.stepping import Stepping
 from reports.run.timing import Sample, Timed, interleaved
 from reports.run.worker_process import Failure
-from reports.speed.budget import INTERPLAY, RESIDUAL, TIME, TOTALS, budget_of
+from reports.speed.causes import cause_of
 from reports.speed.effort import doublings
 from reports.speed.measure import done
 from reports.speed.plan import PLAIN
@@ -39,6 +39,7 @@ from scenarios.model import Scenario
 from scenarios.no_truth import NoTruth
 
 PATIENCE, ALL_ROUNDS = 60.0, 600.0  # s that a run, and all timings together, may take
+SEARCH = 180.0  # s for the search of a cause, some ten runs and the error budget
 ROUNDS, BUDGET = 11, 0.4  # of timing, and s of it for one engine
 # steps times disks of one run, some seconds of the slowest engine; fewer than `FEW` disks count as
 # `FEW`, as a step with them costs no less
@@ -69,6 +70,7 @@ class Attempt:
         error: of the purpose; inf where the run failed, nan where it cannot be judged.
         reason: why it failed, else "".
         cost: s per simulated second, nan where not timed.
+        broken: whether it failed by a verdict.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Attempt:
     error: float
     reason: str = ""
     cost: float = nan
+    broken: bool = False
 
     @property
     def make(self) -> Callable[[], Engine]:
@@ -138,11 +141,12 @@ class Advice:
         until, duration: s, up to where errors are judged, and how long the scene is.
         collisions: how many of the exact answer are judged.
         step_sizes: s, those that were tried, coarse to fine.
-        keeping: for every engine that keeps the error, and plays the whole scene, the coarsest step
-            size at which it keeps it, as at every finer one; cheapest first.
+        keeping: for every engine that keeps the error, and plays the whole scene without failing a
+            verdict, the coarsest step size at which it does, and keeps the error at every finer
+            one; cheapest first.
         short: the engines that do not keep it.
-        partial: those that keep it where it is judged, but do not play the whole scene; the reason
-            of each says how far it gets.
+        partial: those that keep it where it is judged, but do not play the whole scene, or fail a
+            verdict in it at every step size that keeps it; with the reason.
         changes: options of the engines that keep it, changed one at a time.
         noise: the upper quartile of |log(cost / cost of its own copy)| over the engines.
         busy: cores that others kept busy when the timing began; nan where unknown.
@@ -226,7 +230,7 @@ class Inquiry:
         tried = self.attempts([(name, PLAIN, k) for name in names for k in ladder])
         by_engine = {name: [one for one in tried if one.name == name] for name in names}
         kept = {name: those_that_keep(each, bound) for name, each in by_engine.items()}
-        keeping, partly = self.to_the_end([each[0] for each in kept.values() if each])
+        keeping, partly = self.first_to_the_end([each for each in kept.values() if each])
         at = {one.name: one.substeps for one in keeping}
         optional = self.attempts(
             [
@@ -248,7 +252,7 @@ class Inquiry:
             len(scored(self.scene, self.seed).truth.collisions),
             [scenario.dt(k) for k in ladder],
             sorted(plain.values(), key=lambda one: one.cost),
-            self.reasons([each for name, each in by_engine.items() if not kept[name]]),
+            self.reasons([each for name, each in by_engine.items() if not kept[name]], bound),
             partly,
             [
                 ChangedOption(plain[one.name], one, errors_nearby(one, ladder, error_at))
@@ -274,17 +278,40 @@ class Inquiry:
             for one in wanted
         ]
 
+    def first_to_the_end(
+        self, ladders: Sequence[Sequence[Attempt]]
+    ) -> tuple[list[Attempt], list[Attempt]]:
+        """Of each engine the coarsest of its attempts that is able, as in `to_the_end`: where one
+        fails a verdict the next finer one is tried. Of those that never are the finest tried."""
+        able: list[Attempt] = []
+        unable: list[Attempt] = []
+        first: dict[str, str] = {}
+        while ladders:
+            passed, failed = self.to_the_end([each[0] for each in ladders])
+            finer = {each[0].name: each[1:] for each in ladders if len(each) > 1}
+            able += passed
+            for one in failed:
+                at_dt = f"{one.reason} (dt {number(one.dt * 1e3)} ms)" if one.broken else one.reason
+                coarse = first.setdefault(one.name, at_dt)
+                if not (one.broken and one.name in finer):
+                    both = dict.fromkeys((coarse, at_dt))
+                    unable.append(replace(one, reason="; ".join(both)))
+            ladders = [finer[one.name] for one in failed if one.broken and one.name in finer]
+        return able, unable
+
     def to_the_end(self, wanted: Sequence[Attempt]) -> tuple[list[Attempt], list[Attempt]]:
-        """The attempts that play the whole scene, beyond the horizon of its exact answer, too; and
-        those that do not, each with the reason."""
+        """The attempts that play the whole scene, beyond the horizon of its exact answer, too, and
+        fail no verdict in it; and those that do not, each with the reason."""
         tasks = {one.task: partial(end_of, self.scene, self.seed, one) for one in wanted}
         outcomes = self.done(tasks, "playing to the end")
         able: list[Attempt] = []
         partly: list[Attempt] = []
         for one in wanted:
             outcome = outcomes[one.task]
-            why = f"{outcome.status}: {outcome.reason}" if isinstance(outcome, Failure) else outcome
-            (partly if why else able).append(replace(one, reason=why))
+            if isinstance(outcome, Failure):
+                outcome = f"{outcome.status}: {outcome.reason}", False
+            why, broken = outcome
+            (partly if why else able).append(replace(one, reason=why, broken=broken))
         return able, partly
 
     def timed(
@@ -312,32 +339,33 @@ class Inquiry:
         }
         return priced, differences, busy
 
-    def reasons(self, ladders: Sequence[Sequence[Attempt]]) -> list[OutOfReach]:
+    def reasons(self, ladders: Sequence[Sequence[Attempt]], bound: float) -> list[OutOfReach]:
         """What each engine, of which all attempts are given, coarse to fine, comes to; and the
-        largest contribution to its error at the finest step, from the error budget."""
-        finest = self.ladder[-1]
+        cause of its error, at the coarsest step that has at most twice its least error."""
         best = [min(each, key=smallest) for each in ladders]
-        tasks = {
-            one.task: partial(budget_of, self.scene, self.seed, played_as(one.name), finest)
-            for one in best
-            if played_as(one.name) in MECHANISMS and isfinite(one.error)
-        }
-        budgets = self.done(tasks, "error budget")
-        measure = "energy" if self.purpose == "energy" else "position_radii"
+        tasks = {}
+        for least, each in zip(best, ladders):
+            if isfinite(least.error):
+                at = next(one for one in each if one.error <= 2 * least.error)
+                asked = played_as(least.name), at.substeps, self.purpose, bound
+                tasks[least.task] = partial(cause_of, self.scene, self.seed, *asked)
+        causes = self.done(tasks, "cause of the error", SEARCH)
+        unknown = "not known: the search for it did not end"
         return [
             OutOfReach(
                 one,
                 each[-1].error,
                 one.reason
-                or (ASK_THE_EXERCISE if row_of(one.name).exercise else "")
-                or largest(budgets.get(one.task), measure),
+                or (unknown if isinstance(causes[one.task], Failure) else causes[one.task]),
             )
             for one, each in zip(best, ladders)
         ]
 
-    def done(self, tasks: Mapping[Any, Any], what: str) -> dict[Any, Any]:
-        """The outcome of each task, from worker processes."""
-        return dict(done(tasks, self.workers, self.progress, what, PATIENCE))
+    def done(
+        self, tasks: Mapping[Any, Any], what: str, patience: float = PATIENCE
+    ) -> dict[Any, Any]:
+        """The outcome of each task, from worker processes; each may take `patience` s."""
+        return dict(done(tasks, self.workers, self.progress, what, patience))
 
 
 def neighbours(substeps: int, ladder: Sequence[int]) -> list[int]:
@@ -380,14 +408,16 @@ def error_of(scene: str, seed: int, purpose: str, one: Attempt) -> tuple[float, 
     return error, "" if not isnan(error) else "too little of it can be judged"
 
 
-def end_of(scene: str, seed: int, one: Attempt) -> str:
-    """Why the attempt does not play the whole scene, and how far it gets; "" if it does."""
+def end_of(scene: str, seed: int, one: Attempt) -> tuple[str, bool]:
+    """Why the attempt does not play the whole scene, and how far it gets, or the verdict that it
+    fails in it; "" if neither; and whether it is a verdict."""
     scenario = open_scene(scene, seed)
     run = play_once(one.make, one.name, scenario, one.dt)
     if run.status == "ok":
-        return ""
+        failed = first_failed(run, scenario, scored(scene, seed).truth)
+        return (f"{failed.text} at {failed.at:.3g} s", True) if failed else ("", False)
     until = f", up to {run.trajectory.t[-1]:.3g} s" if run.trajectory is not None else ""
-    return f"{run.status}{until}: {run.reason}"
+    return f"{run.status}{until}: {run.reason}", False
 
 
 def times_of_whole(
@@ -403,24 +433,6 @@ def times_of_whole(
     return interleaved(what, ROUNDS, BUDGET, seed)
 
 
-ASK_THE_EXERCISE = (
-    "not known of a file; a right solver of the exercise has the error of reference:exercise, so"
-    " ask with --engine reference:exercise"
-)
-
-
 def played_as(name: str) -> str:
     """The engine whose bits this engine gives in the scene, which may be itself."""
     return row_of(name).bits_of or name
-
-
-def largest(budget: Any, measure: str) -> str:
-    """The mechanism with the largest contribution, as the end of a sentence."""
-    if budget is None or isinstance(budget, Failure):
-        return "not known: this engine has no error budget here"
-    left_out = (*TOTALS, INTERPLAY)
-    parts = [row for row in budget if row["contribution"] not in left_out and measure in row]
-    if not parts:
-        return "not known: the error budget says nothing of this error"
-    most = str(max(parts, key=lambda row: row[measure])["contribution"])
-    return "mostly " + {TIME: "end-of-step detection", RESIDUAL: "unknown"}.get(most, most)

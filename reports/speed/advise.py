@@ -119,14 +119,14 @@ def print_advice(advice: Advice, purpose: str, bound: float) -> None:
     if advice.keeping:
         print_choices(console, advice)
     else:
-        which = "engine that plays the whole scene" if advice.partial else "engine"
+        which = "engine that is right in the whole scene" if advice.partial else "engine"
         console.print(f"No {which} keeps this error at any step size tried.", style="bold")
     if advice.partial:
         console.print()
         print_texts(
             console,
             {one.name: one.reason for one in advice.partial},
-            "No advice, as they do not play the whole scene",
+            "Not advised: what goes wrong in the whole scene",
         )
     if advice.short:
         console.print()

@@ -49,7 +49,8 @@ COLUMNS = [
     "contribution",
     "position_radii",
     "energy",
-    "share",
+    "left_position_radii",
+    "left_energy",
     "off_engine_radii",
     "off_reference_radii",
     "off_deviation_radii",
@@ -82,12 +83,6 @@ class Offset(NamedTuple):
         """Root mean square over disks and samples."""
         return float(np.sqrt((self.position**2).sum(axis=2).mean()))
 
-    def share_of(self, total: Offset) -> float:
-        """The share of the total's position error along this one; the shares of what adds up to
-        the total sum to 1."""
-        size = float((total.position**2).sum())
-        return float((self.position * total.position).sum()) / size if size else 0.0
-
     @property
     def of_energy(self) -> float:
         """Root mean square over the samples."""
@@ -104,8 +99,8 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         duration_s: the duration of the scene itself.
         position_radii, energy: root mean square of what the contribution changes; the energy over
             the energy at hand.
-        share: the part of the total position error that the contribution makes up; all parts sum
-            to 1; negative: it cancels others.
+        left_position_radii, left_energy: what is left of the error without the contribution, root
+            mean square. Parts that cancel leave more than the error.
         off_engine_radii, off_reference_radii, off_deviation_radii: what disabling it changes in the
             engine, what it changes in the reference with all other mechanisms, and how far these
             two differ.
@@ -135,8 +130,11 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     checks[FLIGHT] = {
         "closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)
     }
-    shares = {
-        contribution: {"share": each.share_of(contributions[TOTAL])}
+    left = {
+        contribution: {
+            "left_position_radii": (contributions[TOTAL] - each).radii,
+            "left_energy": (contributions[TOTAL] - each).of_energy,
+        }
         for contribution, each in contributions.items()
         if contribution not in TOTALS
     }
@@ -148,7 +146,7 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
             "energy": each.of_energy,
             "note": "",
         }
-        | shares.get(contribution, {})
+        | left.get(contribution, {})
         | checks.get(contribution, {})
         for contribution, each in contributions.items()
     ]

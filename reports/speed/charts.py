@@ -222,7 +222,10 @@ def sizes(costs: pd.DataFrame, growth: pd.DataFrame) -> Figure:
     stopped = edge(y_axis, "stopped") if (growth.stopped != "").any() else 0.0
     for engine, profile, group in by_engine(costs):
         rows = group.to_dict("records")
-        text = [f"{row['n']:.0f} disks: {spread(row)} µs a step" for row in rows]
+        text = [
+            f"{row['n']:.0f} disks: {spread(row)} µs a step; the worst {style.number(row['worst'])}"
+            for row in rows
+        ]
         trace = line(engine, profile, group.n, group.cost, text)
         traces.append(trace | {"error_y": bars(group.cost, group.low, group.high)})
     for row in growth[growth.stopped != ""].to_dict("records"):

@@ -11,11 +11,15 @@ import numpy as np
 
 from adapters.play import play_once
 from reports.compare import laws
+from reports.compare.verdicts import first_failed
+from reports.compare.view import cut
 from reports.run.scenes import open_scene
 from reports.run.stepping import Make, Stepping, overheads
 from reports.run.timing import Sample, Timed, interleaved
 from reports.run.timing_pass import can
 from reports.speed.scored_part import scored
+
+FAILS = "fails"  # the status of a run that was played to its end and fails a verdict
 
 
 def errors_of(
@@ -24,18 +28,26 @@ def errors_of(
     """A row for each step size of `ladder` (coarse to fine): the error of engine `name` in the
     scene, up to the horizon.
 
-    until_s is the horizon, where the run ends, and duration_s the duration of the scene.
-    error_radii is the largest distance of any disk from the exact answer, inf where the run failed;
-    change_radii the largest distance from the run at the next coarser step size, nan if either
-    failed. An engine that converges to a wrong motion has a small change and a large error.
+    until_s is the horizon, where the errors end, and duration_s the duration of the scene.
+    error_radii is the largest distance of any disk from the exact answer, inf where the run failed,
+    or fails a verdict anywhere in the scene (its status is then `FAILS`); change_radii the largest
+    distance from the run at the next coarser step size, nan if either failed. An engine that
+    converges to a wrong motion has a small change and a large error.
     """
     scenario, truth = scored(scene, seed)
+    whole = open_scene(scene, seed)
     radius, before, rows = scenario.scene.radius, None, []
     for k in ladder:
-        run = play_once(make, name, scenario, scenario.dt(k))
+        run = play_once(make, name, whole, whole.dt(k))
+        if run.status != "ok" and scenario.duration < whole.duration:
+            run = play_once(make, name, scenario, scenario.dt(k))
         row = error_row(scene, seed, name, k, run.status, run.reason)
         played = run.trajectory if run.status == "ok" else None
+        if played is not None and (failed := first_failed(run, whole, truth)):
+            row |= {"status": FAILS, "reason": failed.text}
+            played = None
         if played is not None:
+            played = cut(played, len(truth))
             row["error_radii"] = float(
                 (laws.deviation(played, truth, scenario.scene) / radius).max()
             )

@@ -27,7 +27,8 @@ from reports.terminal.progress import Progress
 
 # s, limits for a ladder and for a timing: they only stop engines that hang
 HANGS, ALL_ROUNDS = 600.0, 3600.0
-SIZE, TRUTH = "size", "truth"
+SIZE, WORST_STEP, IN_PILE, TRUTH = "size", "worst step", "pile", "truth"
+SLEEPING = "sleeping"  # the option of engines that may let disks sleep
 WORDS = ("kind", "engine", "profile", "scenario", "change")
 NUMBERS = {"dt_s": float, "n": int, "copy_of": int, "round": int, "place": int} | {
     "cost": float,
@@ -122,7 +123,7 @@ class Measuring:
                 {"kind": measurement.kind, "change": measurement.change} | row for row in found
             )
             if measurement.seed == self.plan.seed:
-                well = tuple(row["substeps"] for row in found if row["status"] == "ok")
+                well = tuple(r["substeps"] for r in found if r["status"] in ("ok", ladder.FAILS))
                 played.append(measurement._replace(step_sizes=well))
         self.measured.errors = pd.DataFrame(rows)
         return played
@@ -239,12 +240,29 @@ def scene_rows(
 def size_rows(
     makes: Mapping[str, Callable[..., Any]], plan: SpeedPlan, repeats: Mapping[str, Any]
 ) -> dict[str, list[Any]]:
-    """samples: rows of `Measured.samples` for every number of disks; stopped: (name, disks,
-    why)."""
-    found, stopped = sizes.costs(
+    """samples: rows of `Measured.samples` for every number of disks, and the worst step with it;
+    stopped: (name, disks, why)."""
+    found, worst, stopped = sizes.costs(
         makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **repeats
     )
-    rows = [sample_row(SIZE, sample.key[0], sample, n=sample.key[1]) for sample in found]
+    rows = [
+        sample_row(kind, sample.key[0], sample, n=sample.key[1])
+        for kind, samples in ((SIZE, found), (WORST_STEP, worst))
+        for sample in samples
+    ]
+    piles = {
+        (name, change): make
+        for name in makes
+        if SLEEPING in (options := row_of(name).options)
+        for change, make in (
+            (PLAIN, makes[name]),
+            (SLEEPING, partial(makes[name], **options[SLEEPING])),
+        )
+    }
+    rows += [
+        sample_row(IN_PILE, sample.key[0], sample, n=sizes.PILE, change=sample.key[1])
+        for sample in sizes.pile_costs(piles, seed=plan.seed, **repeats)
+    ]
     return {"samples": rows, "stopped": [(name, n, why) for (name, n), why in stopped.items()]}
 
 

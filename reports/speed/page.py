@@ -26,6 +26,10 @@ from reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck speed"
 FLAGGED = (ELSEWHERE, UNSTEADY)
+BUILDS = (
+    "Each engine runs in one thread: Box2D 3.1 has threads, which are not asked for. Box2D 3.1 is"
+    " built with its default, SSE2 or Neon; Rapier is the npm build without SIMD."
+)
 
 
 class SpeedSection(NamedTuple):
@@ -216,7 +220,9 @@ def sizes_section(results: Results) -> SpeedSection | None:
         return None
     drawing = Drawing(
         "Cost of a step against the number of disks",
-        "A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. Bars are quartiles.",
+        "A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. Bars are quartiles; hover for the"
+        f" worst step. {tables.end_of_all_pairs(results.sizes)}"
+        f" {tables.cost_of_sleep(results.measured)} {BUILDS}",
         charts.sizes(results.sizes, results.growth),
     )
     return section("sizes", "How the cost grows", "", {"sizes": drawing})

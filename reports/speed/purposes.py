@@ -42,7 +42,7 @@ def of_statistics(view: View) -> float:
     height against gravity, over the energy at hand; distance from the start, over the true one."""
     assert view.other is not None
     scenario = view.scenario
-    scale = scales.energy(scenario, view.other) or 1.0
+    scale = scales.energy(scenario) or 1.0
     (kinetic, potential, way), (true_kinetic, true_potential, true_way) = (
         averages(each, scenario.scene) for each in (view.played, view.other)
     )

@@ -21,6 +21,8 @@ WARM_STEPS, MOST_STEPS, SAMPLE = 5, 400, 2e-3
 # steps after which a gas starts again: where collisions lose energy, disks fall asleep and cost
 # nothing
 RESTART_AFTER = 400
+PILE, SETTLED = 100, 480  # disks; steps after which they lie still, and sleep if they may
+REPLAYS = 3  # of the same steps; what is dear in one alone is due to the machine
 FIT_FROM = 100  # disks; with fewer the fixed cost of a step hides the growth
 STOPPED = "stopped: a step would take longer than {:g} s"
 
@@ -43,6 +45,33 @@ def gas(n: int, seed: int) -> Scene:
     )
 
 
+def pile(n: int) -> Scene:
+    """`n` equal disks that rest on each other in columns, in a box as wide as they are; e = 0."""
+    across = int(np.ceil(np.sqrt(n)))
+    side = 2 * RADIUS * across
+    return lay_out(
+        position=(np.stack(np.divmod(np.arange(n), across), axis=-1) + 0.5) * 2 * RADIUS,
+        velocity=np.zeros((n, 2)),
+        radius=np.full(n, RADIUS),
+        mass=np.ones(n),
+        gravity=[0.0, -10.0],
+        walls=box([0.0, 0.0], [side, 2 * side]),
+        restitution=0.0,
+    )
+
+
+def pile_costs(
+    engines: Mapping[tuple[str, str], Make], rounds: int, budget: float, seed: int
+) -> list[Sample]:
+    """Samples in s a step of a pile of `PILE` disks that has settled, by the key of the engine."""
+    piles = {key: RunningGas(make(), pile(PILE), SETTLED) for key, make in engines.items()}
+    what = [Timed(key, going, going.steps) for key, going in piles.items()]
+    samples = interleaved(what, rounds, budget, seed)
+    for going in piles.values():
+        going.engine.close()
+    return samples
+
+
 def costs(
     engines: Mapping[str, Make],
     sizes: Sequence[int],
@@ -50,14 +79,14 @@ def costs(
     budget: float,
     patience: float,
     seed: int,
-) -> tuple[list[Sample], dict[tuple[str, int], str]]:
-    """Samples in s a step, by (name, n), from few disks to many; and which engines were not
-    measured at which sizes, and why.
+) -> tuple[list[Sample], list[Sample], dict[tuple[str, int], str]]:
+    """Samples in s a step, by (name, n), from few disks to many; one sample of the worst step of
+    each; and which engines were not measured at which sizes, and why.
 
     An engine stops before a size at which a step would take longer than `patience` s,
     extrapolated from its last two sizes.
     """
-    samples: list[Sample] = []
+    samples, worst = list[Sample](), list[Sample]()
     left_out: dict[tuple[str, int], str] = {}
     course: dict[str, list[tuple[int, float]]] = {name: [] for name in engines}
     for n in sizes:
@@ -73,18 +102,21 @@ def costs(
         what = [Timed((name, n), going, going.steps) for name, going in awake.items()]
         here = interleaved(what, rounds, budget, seed)
         for name, going in awake.items():
-            course[name].append((n, min(sample.cost for sample in here if sample.key == (name, n))))
+            least = min(sample.cost for sample in here if sample.key == (name, n))
+            course[name].append((n, least))
+            worst.append(Sample((name, n), 0, 0, going.worst_step(least, budget), 0.0, 1))
             going.engine.close()
         samples += here
-    return samples, left_out
+    return samples, worst, left_out
 
 
 class RunningGas:
-    """A gas in motion: every sample continues where the last one ended, or starts again."""
+    """A gas in motion: every sample continues where the last one ended, or starts again, `first`
+    steps after the beginning."""
 
-    def __init__(self, engine: Engine, scene: Scene) -> None:
+    def __init__(self, engine: Engine, scene: Scene, first: int = 1) -> None:
         """Load the gas, and determine how many steps fill a sample."""
-        self.engine, self.scene = engine, scene
+        self.engine, self.scene, self.first = engine, scene, first
         engine.listening = False
         self.begin()
         self.steps = 1
@@ -92,9 +124,9 @@ class RunningGas:
         self.steps = int(np.clip(SAMPLE / each, 1, MOST_STEPS))
 
     def begin(self) -> None:
-        """Load, which may compile, and take a first step; not timed."""
+        """Load, which may compile, and take the first steps; not timed."""
         self.engine.load(self.scene, DT)
-        self.engine.step(1)
+        self.engine.step(self.first)
         self.taken = 1
 
     def __call__(self) -> Spent:
@@ -106,6 +138,19 @@ class RunningGas:
         seconds = perf_counter() - started
         self.taken += self.steps
         return Spent(seconds)
+
+    def worst_step(self, mean: float, budget: float) -> float:
+        """s, of the dearest of up to `RESTART_AFTER` steps: each is taken in `REPLAYS` runs from
+        the same start, and the least of its times counts."""
+        count = int(np.clip(budget / mean, WARM_STEPS, RESTART_AFTER))
+        times = np.empty((REPLAYS, count))
+        for row in times:
+            self.begin()
+            for k in range(count):
+                started = perf_counter()
+                self.engine.step(1)
+                row[k] = perf_counter() - started
+        return float(times.min(axis=0).max())
 
 
 def extrapolated_cost(course: Sequence[tuple[int, float]], n: int) -> float:

@@ -18,16 +18,19 @@ from reports.compare.pareto import (
     NOT_REACHED,
     NOT_TIMED,
     UNREACHABLE,
+    YARDSTICK,
     cost_to_reach,
     paired_cost,
     yardstick_of,
 )
 from reports.compare.pooling import POOLED, WHO, pooled
+from reports.page import style
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
 from reports.run.timing import WARM_UP
-from reports.speed.measure import SIZE, Measured
+from reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
 from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from reports.speed.sizes import exponent
+from reports.terminal.counts import listed
 from scenarios.model import Scenario
 
 NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
@@ -314,10 +317,47 @@ def in_order(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def sizes(measured: Measured) -> pd.DataFrame:
-    """engine, profile, n, cost in µs a step, and the other columns of `summed_up`."""
+    """engine, profile, n, cost in µs a step, the other columns of `summed_up`, worst: µs of the
+    dearest step."""
     samples = measured.samples[measured.samples.kind == SIZE]
-    costs = in_us(summed_up(samples, [*WHO, "n"])).sort_values("n", kind="stable")
+    costs = in_us(summed_up(samples, [*WHO, "n"]))
+    dearest = measured.samples[measured.samples.kind == WORST_STEP]
+    worst = dearest.set_index([*WHO, "n"]).cost.mul(1e6).rename("worst")
+    costs = costs.join(worst, on=[*WHO, "n"]).sort_values("n", kind="stable")
     return in_order(costs.reset_index(drop=True))
+
+
+def end_of_all_pairs(costs: pd.DataFrame) -> str:
+    """A sentence on the number of disks from which on testing all pairs, as `YARDSTICK` does, costs
+    more than other engines, interpolated; "" if it costs more than none."""
+    table = costs.assign(name=costs.engine + ":" + costs.profile)
+    table = table.pivot(index="n", columns="name", values="cost")
+    ends = []
+    for name in table.columns.drop(YARDSTICK, errors="ignore") if YARDSTICK in table else ():
+        both = table[[YARDSTICK, name]].dropna()
+        ratio = np.log(both[YARDSTICK].to_numpy() / both[name].to_numpy())
+        k = int(np.argmax(ratio > 0))  # 0: the first already, or none
+        if k:
+            n = np.interp(0.0, ratio[k - 1 : k + 1], np.log(both.index[k - 1 : k + 1]))
+            ends.append(f"{name} from {np.exp(n):.2g} disks on")
+    return f"Testing all pairs costs more than {listed(ends)}." if ends else ""
+
+
+def cost_of_sleep(measured: Measured) -> str:
+    """A sentence: what a step of a settled pile costs, and with sleeping allowed; "" if none was
+    timed."""
+    samples = measured.samples[measured.samples.kind == IN_PILE]
+    costs = in_us(summed_up(samples, [*WHO, "change", "n"]))
+    named = costs.assign(name=costs.engine + ":" + costs.profile)
+    table = named.pivot(index="name", columns="change", values="cost")
+    both = [
+        f"{name} {style.number(row[PLAIN], 2)}, with sleeping {style.number(row[SLEEPING], 2)}"
+        for name, row in table.iterrows()
+        if len(row.dropna()) > 1
+    ]
+    if not both:
+        return ""
+    return f"A step of a settled pile of {costs.n.max()} disks costs, in µs: {'; '.join(both)}."
 
 
 def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:

@@ -18,6 +18,7 @@ from math import isnan
 from adapters.mechanisms.table import (
     AIR,
     DIGITS,
+    EDGES,
     FLIGHT,
     FRICTION,
     IMPULSE,
@@ -76,6 +77,7 @@ SENTENCES = (
     ),
     (RESTITUTION, "*", "not every collision has the restitution that the scene states", OWN_ORDER),
     (RECYCLING, "*", "a pair that has hardly moved is not looked at again", OWN_ORDER),
+    (EDGES, "*", "a disk that leaves a torus is set onto its edge", "exercise 11, projectObjects"),
     (IMPULSE, "reference:*", "walls come first, then pairs", "reference_impl/lesson.py"),
     (IMPULSE, "*", TOGETHER, OWN_ORDER),
     (POSITION_CORRECTION, "reference:*", AT_ONCE, "exercise 11, task 2"),

@@ -12,7 +12,13 @@ from dataclasses import replace
 
 from reports.stability.ablations import END_OF_STEP, reason_by_ablation, sufficient_mechanisms
 from reports.stability.cases import CASES
-from reports.stability.interventions import SAYS_SO, intervention_of, reason_by_intervention
+from reports.stability.interventions import (
+    FIRST,
+    SAYS_SO,
+    intervention_of,
+    reason_by_intervention,
+    with_settings,
+)
 from reports.stability.limits import NEVER_FAILS, Limit
 from reports.stability.reasons import Reason, reason_of
 from reports.stability.search import LimitSearch
@@ -23,21 +29,27 @@ NEAR = 1.05
 
 
 def with_replays(search: LimitSearch, limit: Limit) -> Limit:
-    """The limit with what was found by playing its failing run again: the mechanisms that are
-    enough to produce it, or an intervention that removes it.
+    """The limit with what was found by playing its failing run again: the settings that remove it,
+    the mechanisms that are enough to produce it, or another intervention that removes it.
 
-    A reason from the table whose predicted limit fits needs no more; otherwise only an ablation
-    can confirm it.
+    A reason from the table whose predicted limit fits needs no more; otherwise only an ablation can
+    confirm it. In a scene of somebody's own the settings come first: they say what to do.
     """
     reason = reason_of(limit)
     if reason is not None and reason.predicts is not None and brackets(limit, reason.predicts):
         return limit
+    if own := reason is None and limit.case not in CASES:
+        limit = replace(limit, intervention=intervention_of(search, limit, FIRST))
+        limit = limit if limit.intervention else with_settings(search, limit)
+        if limit.intervention or limit.settings_help:
+            return limit
     limit = replace(limit, mechanisms=sufficient_mechanisms(search, limit))
-    return (
-        limit
-        if limit.mechanisms or reason
-        else replace(limit, intervention=intervention_of(search, limit))
-    )
+    if limit.mechanisms or reason:
+        return limit
+    limit = limit if own else with_settings(search, limit)
+    if limit.settings_help:
+        return limit
+    return replace(limit, intervention=intervention_of(search, limit))
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
@@ -88,7 +100,7 @@ def tests_of(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Lim
     other = by_name.get((limit.case, variant))
     if other and farther(other, limit):
         tests.append(f"{variant} gets farther")
-    if limit.failing is not None and limit.failing.broken == "refused":
+    if limit.refused:
         tests.append(SAYS_SO)
     return tests
 

@@ -3,28 +3,28 @@ changed, until it works."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from fnmatch import fnmatch
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.engines import ENGINES, FETCHED
+from adapters.engines import row_of
+from adapters.mechanisms.settings import find_remedy, settings_of, without_finer
+from reports.compare.faces import ALONG, first_on_line
 from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.predicates import judge
 from reports.stability.search import LimitSearch
-from reports.stability.variants import play_as
+from reports.stability.variants import DrivenEngine, play_as
 from reports.stability.vary import similar
-from scenarios.model import Scenario
+from scenarios.model import Array, Scenario, Scene
+from scenarios.truth.exact import with_oracle
 
 FINER = 8
-# a power of two: an engine without length and time scales of its own plays the same to the last
-# bit, so that no change helps by chance
-UNITS = 32.0
 
 
 def finer(one: Scenario) -> Scenario:
@@ -35,6 +35,23 @@ def finer(one: Scenario) -> Scenario:
 def at_home(one: Scenario) -> Scenario:
     """The same scene, moved along x so that its middle is at the origin."""
     return similar(one, shift=-float(np.mean(one.scene.position[:, 0])))
+
+
+def joined(one: Scenario) -> Scenario:
+    """The same scene with walls that touch on one line joined into one."""
+    walls, scene = list[Array](), one.scene
+    lines = np.array([first_on_line(scene.walls, w) for w in range(len(scene.walls))])
+    for line in np.unique(lines):
+        start, end = scene.walls[line]
+        way = end - start
+        spans = np.sort((scene.walls[lines == line] - start) @ way / (way @ way), axis=1)
+        spans = spans[spans[:, 0].argsort()]
+        reach = np.maximum.accumulate(spans[:, 1])
+        first = np.flatnonzero(np.append(True, spans[1:, 0] > reach[:-1] + ALONG))
+        last = np.append(first[1:], len(spans)) - 1
+        walls += [start + np.outer(pair, way) for pair in zip(spans[first, 0], reach[last])]
+    whole: Scene = replace(scene, walls=np.array(walls).reshape(-1, 2, 2))
+    return with_oracle(replace(one, scene=whole))
 
 
 def unchanged(one: Scenario) -> Scenario:
@@ -67,41 +84,20 @@ class Intervention(NamedTuple):
 
 SAYS_SO = "the engine's message says so"
 INTERVENTIONS = {
+    "joined": Intervention(
+        "*",
+        "*",
+        "a ghost collision: the disk hits the end of the next wall of its floor; join them into one"
+        " wall",
+        "on a floor of one wall",
+        joined,
+    ),
     "at_home": Intervention(
         "box2d*",
         "offset",
         "positions are float32, too coarse so far from the origin",
         "at the origin",
         at_home,
-    ),
-    "faster": Intervention(
-        "[pb]*",
-        "*",
-        "too slow for a time scale of the engine (threshold of restitution, rate of position"
-        " correction)",
-        "32 times as fast",
-        partial(similar, tempo=UNITS),
-    ),
-    "slower": Intervention(
-        "[pb]*",
-        "*",
-        "too fast for a time scale of the engine (cap on speed, rate of position correction)",
-        "32 times as slow",
-        partial(similar, tempo=1 / UNITS),
-    ),
-    "larger": Intervention(
-        "[pb]*",
-        "*",
-        "too small for a length scale of the engine (slop, margin, skin)",
-        "32 times as large, at the same speeds",
-        partial(similar, size=UNITS, tempo=1 / UNITS),
-    ),
-    "smaller": Intervention(
-        "[pb]*",
-        "*",
-        "too large for a length scale of the engine (limit on displacement in a step, slop)",
-        "32 times as small, at the same speeds",
-        partial(similar, size=1 / UNITS, tempo=UNITS),
     ),
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
@@ -132,28 +128,22 @@ INTERVENTIONS = {
         )
         for bullets in BULLETS
     },
-    **{
-        f"{engine}_matched": Intervention(
-            f"{engine}:shipped",
-            "*",
-            "a default of the engine that the matched profile changes",
-            f"as {engine}:matched",
-            engine=f"{engine}:matched",
-        )
-        for engine in dict.fromkeys(name.partition(":")[0] for name in (*ENGINES, *FETCHED))
-        if {f"{engine}:shipped", f"{engine}:matched"} <= {*ENGINES, *FETCHED}
-    },
 }
 """In the order in which they are tried: changes of one thing only come first, a finer step comes
-later.
+later. The settings of the engine come after `FIRST`.
 
 Where the step itself is varied, a finer one is not tried.
 """
 
 
-def intervention_of(search: LimitSearch, limit: Limit) -> str:
-    """The first change with which the run that failed at the limit works; "" if none does, or if
-    nothing failed.
+FIRST = ("joined",)
+
+
+def intervention_of(
+    search: LimitSearch, limit: Limit, names: Iterable[str] = tuple(INTERVENTIONS)
+) -> str:
+    """The first change of `names` with which the run that failed at the limit works; "" if none
+    does, or if nothing failed.
 
     A refusal needs no other explanation.
     """
@@ -161,16 +151,37 @@ def intervention_of(search: LimitSearch, limit: Limit) -> str:
     if seen is None or seen[1].status == "unsupported":
         return ""
     scenario, _ = seen
-    for name, intervention in INTERVENTIONS.items():
+    for name in names:
+        intervention = INTERVENTIONS[name]
         if intervention.fits(search.engine, search.case.varies):
             changed = intervention.change(scenario)
-            if not judge(
-                search.case.predicate,
-                changed,
-                play_as(intervention.engine or search.engine, changed),
-            ).failed:
+            engine = intervention.engine or search.engine
+            if not judge(search.case.predicate, changed, play_as(engine, changed)).failed:
                 return name
     return ""
+
+
+def with_settings(search: LimitSearch, limit: Limit) -> Limit:
+    """The limit with the settings of the engine with which the run that failed at it works, or with
+    those that do not help."""
+    seen = search.failure(limit)
+    if seen is None or seen[1].status == "unsupported" or "+" in search.engine:
+        return limit
+    scenario, predicate = seen[0], search.case.predicate
+
+    def error(parameters: Mapping[str, Any]) -> float:
+        chosen, steps = without_finer(parameters)
+        driven = DrivenEngine(search.engine, partial(row_of(search.engine).make, **chosen))
+        finer = replace(scenario, substeps=(scenario.substeps[0] * steps,))
+        judged, run = search.case.play(driven, finer)
+        reading = judge(predicate, judged, run)
+        return reading.value / (predicate.bound or 1.0) if reading.failed else 0.0
+
+    dt = scenario.dt(scenario.substeps[0])
+    remedy = find_remedy(settings_of(search.engine, scenario.scene, dt), error, bound=0.0)
+    helps = bool(remedy.settings) and remedy.after == 0.0
+    words = remedy.sentence(search.engine) if helps else remedy._replace(settings=()).sentence("")
+    return replace(limit, settings=words, settings_help=helps)
 
 
 def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
@@ -179,15 +190,18 @@ def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
     failing = limit.failing
     if failing is None:
         return "", "", ""
+    if limit.settings_help:
+        return limit.settings, "", "works with it"
     if limit.mechanisms:
         return reason_by_ablation(limit)
     if intervention := INTERVENTIONS.get(limit.intervention):
         return intervention.reason, "", f"works {intervention.how}"
     if failing.broken == "refused":
         return "the engine refuses it", "", SAYS_SO
-    tried = [
+    tried = dict.fromkeys(
         intervention.how
-        for intervention in INTERVENTIONS.values()
-        if intervention.fits(limit.engine, varied)
-    ]
-    return f"{NOT_KNOWN}; it also fails {', '.join(tried)}" if tried else NOT_KNOWN, "", ""
+        for name, intervention in INTERVENTIONS.items()
+        if name not in FIRST and intervention.fits(limit.engine, varied)
+    )
+    also = [f"it also fails {', '.join(tried)}"] if tried else []
+    return "; ".join([NOT_KNOWN, *also, *filter(None, [limit.settings])]), "", ""

@@ -192,6 +192,8 @@ class Limit:
         seconds: of processor time that the search took.
         intervention: the change of `INTERVENTIONS` with which the failing run works; "" if none was
             found, or looked for.
+        settings: of the engine with which the failing run works, in words; without `settings_help`
+            those that do not help; "" if none were tried.
         mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; ""
             if none were found, or looked for.
         reason, source: why, and where that stands.
@@ -209,6 +211,8 @@ class Limit:
     monotone: bool = True
     spacing: float = nan
     intervention: str = ""
+    settings: str = ""
+    settings_help: bool = False
     mechanisms: str = ""
     reason: str = ""
     source: str = ""
@@ -222,16 +226,17 @@ class Limit:
         return next((trial for trial in self.trials if trial.value == self.fails_at), None)
 
     @property
+    def refused(self) -> bool:
+        """Whether the engine does not play what it meets at `fails_at`: that is no limit of it."""
+        return self.failing is not None and self.failing.broken == "refused"
+
+    @property
     def word(self) -> str:
         """The word that a table shows in place of a limit, "" where there is a limit."""
         if self.status != "ok":
             return self.status
         if self.verdict == NEVER_WORKS:
-            return (
-                "refused"
-                if self.failing is not None and self.failing.broken == "refused"
-                else "everywhere"
-            )
+            return "refused" if self.refused else "everywhere"
         return "–" if self.verdict == NEVER_FAILS else ""
 
     @property

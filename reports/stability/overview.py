@@ -25,7 +25,9 @@ WITH_FRICTION = {case.name for case in FRICTION}
 
 def in_words(limit: Limit) -> str:
     """The limit in a few characters."""
-    return limit.word or limit.sign + number(limit.fails_at) + ("" if limit.monotone else "*")
+    refused = "refused from " if limit.refused else ""
+    end = "" if limit.monotone else "*"
+    return limit.word or f"{refused}{limit.sign}{number(limit.fails_at)}{end}"
 
 
 class LimitCell(NamedTuple):
@@ -156,20 +158,22 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     cases = list(dict.fromkeys(limit.case for limit in mine))
     failing = [limit for limit in mine if limit.verdict != NEVER_FAILS]
     refused = sum(limit.word == "refused" for limit in mine)
-    found = [
+    found = [limit for limit in mine if limit.verdict in (LIMIT, ONLY_BEYOND)]
+    said = [
         f"{counted(len(mine), 'search', 'searches')} in {counted(len(cases), 'case')}:"
         f" {len(mine) - len(failing)} found no failure at any value tried,"
-        f" {sum(limit.verdict in (LIMIT, ONLY_BEYOND) for limit in mine)} found a limit,"
+        f" {sum(not limit.refused for limit in found)} found a limit,"
         f" {sum(limit.verdict == NEVER_WORKS for limit in mine) - refused} failed at every value,"
-        f" and in {refused} the engine refused to play."
+        f" and in {refused + sum(limit.refused for limit in found)} the engine refused to play, at"
+        " every value or from one on."
     ]
     rough = [limit for limit in mine if limit.case in WITH_FRICTION]
     smooth = [limit for limit in mine if limit.case not in WITH_FRICTION]
-    found += fewest_and_most(smooth, " without friction" if rough else "")
-    found += fewest_and_most(rough, " with friction")
+    said += fewest_and_most(smooth, " without friction" if rough else "")
+    said += fewest_and_most(rough, " with friction")
     if failing:
         tested = sum(bool(limit.tested) for limit in failing)
-        found.append(
+        said.append(
             f"The reason of {tested} of {counted(len(failing), 'limit')} was tested in one of four"
             " ways. The limit follows from the reason; an engine that differs in this one thing"
             " works at harsher values; the failing run works without this thing; or the ablated"
@@ -179,11 +183,11 @@ def findings(limits: Sequence[Limit]) -> list[str]:
     odd = [limit for limit in mine if not limit.monotone]
     if odd:
         names = ", ".join(dict.fromkeys(f"{limit.engine} in {limit.case}" for limit in odd[:3]))
-        found.append(
+        said.append(
             f"In {counted(len(odd), 'search', 'searches')} (marked *) the engine works again beyond"
             f" its first failure, for example {names}. The table has the first failure."
         )
-    return found
+    return said
 
 
 def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:

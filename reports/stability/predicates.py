@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from adapters.run import Run
+from reports.compare import laws
+from reports.compare.verdicts import MOST_BOUNCE
 from scenarios.model import Array, Scenario, Trajectory
 
 
@@ -199,17 +201,9 @@ def _bounces_off(scenario: Scenario, played: Trajectory) -> Reading:
 
 def apexes(scenario: Scenario, played: Trajectory) -> Array:
     """(k,) the height that a dropped ball reaches in each flight, the drop itself first, over
-    the height of the drop.
-
-    An apex is the vertex of the parabola through the three highest samples of a flight, for the
-    drop through its first three. A flight with fewer samples is left out.
-    """
+    the height of the drop."""
     y = played.position[:, 0, 1] - scenario.scene.radius[0]
-    top = np.flatnonzero((y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])) + 1
-    top = np.concatenate([[1], top[top > 1]])
-    before, at, after = y[top - 1], y[top], y[top + 1]
-    bend = before - 2 * at + after
-    heights: Array = (at - (after - before) ** 2 / (8 * bend)) / y[0]
+    heights: Array = laws.apexes(y)[1] / y[0]
     return heights
 
 
@@ -267,7 +261,7 @@ ANGLE_OFF = Predicate(
 BOUNCES_OFF = Predicate(
     "bounce off",
     "of the height",
-    0.01,
+    MOST_BOUNCE,
     "a bounce changes the height that the ball reaches",
     _bounces_off,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reports.compare import laws
+from reports.compare.verdicts import MOST_JITTER, MOST_RESIDUAL, MOST_SINKING, own_speed
 from reports.stability.predicates import Predicate, Reading, first_above, largest
 from scenarios.model import Scenario, Trajectory
 
@@ -27,11 +28,6 @@ def _stands(scenario: Scenario, played: Trajectory) -> Reading:
         disk=-1,
     )
     return max(sinks, jitters)
-
-
-def own_speed(scenario: Scenario) -> float:
-    """sqrt(g R) m/s, the speed after a fall of half a radius."""
-    return float(np.sqrt(np.linalg.norm(scenario.scene.gravity) * scenario.scene.radius.min()))
 
 
 def _ejected(scenario: Scenario, played: Trajectory) -> Reading:
@@ -73,7 +69,7 @@ def _not_at_rest(scenario: Scenario, played: Trajectory) -> Reading:
     )
 
 
-MOST_SINKING, MOST_JITTER, MOST_SPEED = 0.1, 0.02, 10.0  # radii; sqrt(g R); radii/s
+MOST_SPEED = 10.0  # radii/s
 
 STANDS = Predicate(
     "does not stand",
@@ -92,5 +88,5 @@ BURSTS = Predicate(
     "bursts", "of the bound", 1.0, "a disk leaves the box, or flies at 10 radii/s", _bursts
 )
 NOT_AT_REST = Predicate(
-    "not at rest", "sqrt(g R)", 0.05, "a disk that should be at rest moves", _not_at_rest
+    "not at rest", "sqrt(g R)", MOST_RESIDUAL, "a disk that should be at rest moves", _not_at_rest
 )

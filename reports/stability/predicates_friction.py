@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from reports.compare.verdicts import SETTLED
 from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
 from scenarios.model import Array, Scenario, Scene, Trajectory
-
-SETTLED = 0.1  # of a run; in this time the engine corrects what it takes for an overlap
 
 
 def _friction_off(scenario: Scenario, played: Trajectory) -> Reading:

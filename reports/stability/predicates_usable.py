@@ -4,63 +4,47 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws, scales
+from reports.compare import laws
 from reports.compare.collisions import match, pair_keys, who
+from reports.compare.faces import on_faces, thrown_off
+from reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
 from reports.compare.view import cut
 from reports.stability.predicates import Predicate, Reading, largest
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
 from scenarios.no_truth import answered
 
-MOST_RISE, MOST_OVERLAP, MOST_LOST = 0.05, 0.1, 0.5  # of the energy at hand; radii; of a distance
 LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding
 STEADY = 1e-9  # of a velocity; a smaller change between two samples is the rounding of the answer
 
 
 def _usable(scenario: Scenario, played: Trajectory) -> Reading:
+    judged = verdicts(scenario, played, scenario.dt(scenario.substeps[0]))
     parts = [
-        part
-        for part in (
-            _rise(scenario, played),
-            _overlap(scenario, played),
-            _escape(scenario, played),
-            _slowed(scenario, played),
-            _wrong_collisions(scenario, played),
-        )
-        if part is not None
+        _overlap(scenario, played),
+        _slowed(scenario, played),
+        _wrong_collisions(scenario, played),
+        _thrown(scenario, played),
+        *(_reading(verdict) for verdict in judged if verdict.id in ("tunnelled", "energy_gained")),
     ]
     # for a single free disk nothing is checked
-    return max(parts, key=lambda part: part.value, default=Reading(0.0))
+    return max(filter(None, parts), key=lambda part: part.value, default=Reading(0.0))
 
 
-def _rise(scenario: Scenario, played: Trajectory) -> Reading | None:
-    if scenario.thrusts or (scenario.scene.wrap is not None and scenario.scene.gravity.any()):
-        return None
-    energy = laws.energy(played, scenario.scene)
-    rise = (energy - energy[0]) / (scales.energy(scenario) or 1.0)
-    event = f"energy grows by {rise.max():.3g} of the energy at hand"
-    return largest(played.t, rise, MOST_RISE, event, of=MOST_RISE, broken="energy", disk=-1)
+def _reading(verdict: Verdict) -> Reading:
+    """A verdict in units of its bound."""
+    value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
+    disk = verdict.disks[0] if verdict.disks else -1
+    return Reading(value, verdict.at, verdict.text, verdict.id, disk=disk)
 
 
 def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
+    """Any overlap in any sample: a verdict allows for the approach in a step, but here the step is
+    what is too large."""
     if scenario.scene.n + len(scenario.scene.walls) < 2:
         return None
     overlap = laws.penetration(played, scenario.scene)
     event, most = f"an overlap of {overlap.max():.3g} radii", MOST_OVERLAP
     return largest(played.t, overlap, most, event, of=most, broken="penetration", disk=-1)
-
-
-def _escape(scenario: Scenario, played: Trajectory) -> Reading | None:
-    if not len(scenario.scene.walls):
-        return None
-    through = np.flatnonzero(laws.tunnelled(played, scenario.scene))
-    event = f"disk {through[0]} goes through a wall" if len(through) else ""
-    return Reading(
-        2.0 * len(through),
-        float(played.t[-1]),
-        event,
-        "escape",
-        disk=int(through[0]) if len(through) else -1,
-    )
 
 
 def _slowed(scenario: Scenario, played: Trajectory) -> Reading | None:
@@ -126,7 +110,7 @@ def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
     """(times, n, 1 + walls): how often each disk has met other disks, and each wall, up to and
     including the times `t` (s)."""
     counts = np.zeros((len(t) + 1, scene.n, 1 + len(scene.walls)))
-    hits = played.collisions
+    hits = on_faces(played, scene)
     when = np.searchsorted(t, hits.t)
     for disk, other in ((hits.i, hits.j), (hits.j, hits.i)):
         of_disk = disk >= 0
@@ -141,10 +125,9 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
     k = min(len(played), len(true))
     played, true = cut(played, k), cut(true, k)
     dt = scenario.dt(scenario.substeps[0])
-    found = match(played.collisions, true.collisions, float(true.t[-1]), dt)
-    wrong = found.first_wrong or never_collision(
-        played.collisions, true.collisions, float(true.t[-1]) - 3 * dt
-    )
+    mine, its = (on_faces(one, scenario.scene) for one in (played, true))
+    found = match(mine, its, float(true.t[-1]), dt)
+    wrong = found.first_wrong or never_collision(mine, its, float(true.t[-1]) - 3 * dt)
     if wrong is None:
         return None
     at, what = wrong
@@ -157,6 +140,16 @@ def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
         "collisions",
         disk=int(pair.split("-")[0]),
     )
+
+
+def _thrown(scenario: Scenario, played: Trajectory) -> Reading | None:
+    """A ghost collision: the disk hits the end of the next wall of a floor."""
+    scenario, true = answered(scenario)
+    if true is None:
+        return None
+    value, at, disk, wall = thrown_off(played, true, scenario.scene)
+    event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
+    return Reading(value, at, event, "ghost collision", disk=disk)
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
@@ -175,8 +168,8 @@ USABLE = Predicate(
     "unusable",
     "of the bound",
     1.0,
-    "a number is not finite, a disk goes through a wall, energy grows by 5 %, disks overlap by a"
-    " tenth of a radius, a disk in free flight moves by half its distance only (its speed is"
-    " capped, or its position has too few digits), or a collision is wrong",
+    "a number is not finite, a disk goes through a wall or a disk, energy grows by 5 %, disks"
+    " overlap by a tenth of a radius, a disk in free flight moves by half its distance only (its"
+    " speed is capped, or its position has too few digits), or a collision is wrong",
     _usable,
 )

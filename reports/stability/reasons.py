@@ -79,8 +79,13 @@ EULER_OUT = (
 )
 QUARTER = "rotation is limited to pi/2 a step"
 EIGHTH = "rotation is limited to pi/4 a step"
+BY_ATAN = ", and a substep rotates by atan(w h) only"
 PLANCK, RAPIER = "planck Settings.maxRotation", "a probe of it: 300 rad/s after 4 steps"
-B2_ROTATION, B3_ROTATION = B2_SETTINGS + "b2_maxRotation", B3_CONSTANTS + "B2_MAX_ROTATION"
+RAPIER_SPEED = (
+    "Rapier IntegrationParameters: normalized_max_linear_velocity, not in the npm package"
+)
+B2_ROTATION = B2_SETTINGS + "b2_maxRotation"
+B3_ROTATION = B3_CONSTANTS + "B2_MAX_ROTATION; pyb2d3 does not hand on b2BodyDef::allowFastRotation"
 MAP = "determinant of the step's map, 1 + (w dt)² (1 - alpha); alpha of ENGINES"
 SWEEP = (
     "restitution is applied in one pass after the substeps, so a disk that touches two others in a"
@@ -122,6 +127,13 @@ REASONS = (
             ("tunnelling_thick_wall", 11.0, "box2d_v3:matched"),
             ("grazing", 1 - sqrt(1 - 0.01), ""),
         )
+    ),
+    Reason(
+        "tunnelling_thin_wall",
+        "rapier2d:matched",
+        "speed is limited to 400 of its length units a second; refused",
+        RAPIER_SPEED,
+        400 * 0.5 / 64,  # a length unit of half a radius, 1/64 s
     ),
     Reason(
         "tunnelling_*",
@@ -245,15 +257,9 @@ REASONS = (
     Reason("spin", "box2d:shipped", QUARTER, B2_ROTATION, pi / 2 / 0.98),
     Reason("spin", "box2d:matched", QUARTER + "; refused", B2_ROTATION, pi / 2),
     Reason("spin", "planck:shipped", QUARTER, PLANCK, pi / 2 / 0.98),
-    Reason("spin", "rapier2d:shipped", EIGHTH, RAPIER, pi / 4 / 0.98),
+    Reason("spin", "rapier2d:shipped", EIGHTH + BY_ATAN, RAPIER, 4 * atan(pi / 16) / 0.98),
     Reason("spin", "rapier2d:matched", EIGHTH + "; refused", RAPIER, pi / 4),
-    Reason(
-        "spin",
-        "box2d_v3:shipped",
-        EIGHTH + ", and a substep rotates by atan(w h) only",
-        B3_ROTATION,
-        4 * atan(pi / 16) / 0.98,
-    ),
+    Reason("spin", "box2d_v3:shipped", EIGHTH + BY_ATAN, B3_ROTATION, 4 * atan(pi / 16) / 0.98),
     Reason("spin", "box2d_v3:matched*", EIGHTH + "; refused", B3_ROTATION, pi / 4),
     # 1.7 rad/s: the spin when the thrusts have ended
     Reason("dt_body_frame_thrust", "box2d_v3:shipped", EIGHTH, B3_ROTATION, pi / 4 / 1.7),

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reports.page.style import number
 from reports.stability.cases_suite import dense_ladder, in_steps, ladder
 from reports.stability.limits import Case
 from reports.stability.predicates_usable import USABLE
@@ -29,13 +30,19 @@ def at_speed(one: Scenario, x: float) -> Scenario:
 
 
 def at_mass_ratio(one: Scenario, x: float) -> Scenario:
-    """The mass of the first disk that moves times x, and its inertia, and the thrusts on it."""
-    scene = one.scene
-    disk = int(np.flatnonzero(~scene.static)[0])
+    """The mass of `heaviest` times x, and its inertia, and the thrusts on it."""
+    scene, disk = one.scene, heaviest(one.scene)
     factor = np.where(np.arange(scene.n) == disk, x, 1.0)
     thrusts = [scaled_thrust(t, x, x) if t.disk == disk else t for t in one.thrusts]
     heavier: Scene = replace(scene, mass=scene.mass * factor, inertia=scene.inertia * factor)
     return with_oracle(replace(one, scene=heavier, thrusts=thrusts))
+
+
+def heaviest(scene: Scene) -> int:
+    """The heaviest disk that moves; of several the smallest, then the first by x and y, so that the
+    order of the disks does not matter."""
+    keys = (*scene.position.T[::-1], scene.radius, -scene.mass, scene.static)
+    return int(np.lexsort(keys)[0])
 
 
 def at_restitution(one: Scenario, x: float) -> Scenario:
@@ -128,7 +135,7 @@ VARIES = {
         at_speed,
     ),
     "mass_ratio": Varied(
-        "mass of the first disk that moves / the file's",
+        "mass of the heaviest disk, times and divided by",
         "1",
         (*FACTORS, 1e4, 1e5, 1e6),
         at_mass_ratio,
@@ -155,12 +162,13 @@ VARIES = {
 """What `--vary` takes, and what it means."""
 
 
-def varied(path: str, what: str, x: float, _run: int) -> Scenario:
-    """The scene of a file at the finest step of its ladder, with one quantity varied."""
+def varied(path: str, what: str, x: float, run: int) -> Scenario:
+    """The scene of a file at the middle step of its ladder, with one quantity varied; in run 1 the
+    other way: divided by x."""
     one = read_scene_file(Path(path))
     if what == "dt":
         return in_steps(one, x)
-    return replace(VARIES[what].change(one, x), substeps=one.substeps[-1:])
+    return replace(VARIES[what].change(one, 1 / x if run else x), substeps=(one.middle_substeps,))
 
 
 def cannot_vary(one: Scenario, what: str) -> str:
@@ -179,14 +187,19 @@ def cannot_vary(one: Scenario, what: str) -> str:
 def case_of_file(path: str, what: str) -> Case:
     """The case: up to which value is the scene of this file usable?"""
     one = read_scene_file(Path(path))
-    meant = VARIES[what]
+    meant, parameter = VARIES[what], VARIES[what].parameter
+    if what == "mass_ratio":
+        parameter = parameter.replace("the heaviest disk", f"disk {heaviest(one.scene)}")
+    if what != "dt":
+        parameter += f", at dt = {number(one.dt(one.middle_substeps))} s"
     return Case(
         f"{path}:{what}",
         f"{one.name}: {one.asks}",
-        meant.parameter,
+        parameter,
         meant.values or dense_ladder(one),
         partial(varied, path, what),
         USABLE,
         meant.unit,
+        runs=2 if what == "mass_ratio" else 1,
         also=WITH_FRICTION_ONLY if one.scene.friction else (),
     )

@@ -3,6 +3,8 @@ disks."""
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from scenarios.families.placing import box, lay_out, scatter
@@ -13,13 +15,13 @@ from scenarios.truth.exact import with_oracle
 SOURCE = 'the lesson "Simple body dynamics"'
 
 
-def free_fall() -> Scenario:
-    """One spinning disk, thrown."""
+def free_fall(spin: float = 2.0) -> Scenario:
+    """One disk, thrown: with a spin (rad/s), or without for engines that model no rotation."""
     scene = lay_out(
         position=[[-4.0, 1.0]],
         velocity=[[3.0, 7.0]],
         angle=[0.5],
-        angular_velocity=[2.0],
+        angular_velocity=[spin],
         radius=[0.25],
         mass=[2.0],
         gravity=[0.0, -9.81],
@@ -32,8 +34,9 @@ def free_fall() -> Scenario:
         )
 
     return Scenario(
-        name="free_fall",
-        asks="How far off the parabola does a thrown disk fly?",
+        name="free_fall" if spin else "free_fall_without_spin",
+        asks="How far off the parabola does a thrown disk fly"
+        f"{'' if spin else ', if it does not turn'}?",
         source=f"{SOURCE}, part 3; x + v t + g t2 / 2",
         scene=scene,
         duration=1.5,
@@ -102,4 +105,4 @@ def falling_box(seed: int = 0) -> Scenario:
     return with_oracle(question)
 
 
-LESSON = (free_fall, ping_pong, falling_box)
+LESSON = (free_fall, partial(free_fall, spin=0.0), ping_pong, falling_box)

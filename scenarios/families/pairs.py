@@ -97,6 +97,20 @@ def oblique(restitution: float) -> Scenario:
     )
 
 
+def off_centre_without_spin() -> Scenario:
+    """Two disks that meet at 37 degrees off the line of centres, for engines without rotation: one
+    that exchanges x and y of the velocities, without a normal, is right on a line."""
+    return _pairs(
+        "off_centre_without_spin",
+        "Do two disks that meet off centre change their velocities along the line of centres only?",
+        position=[[-1.013, 0.3], [0.5, 0.0]],
+        velocity=[[2.0, 0.0], [0.0, 0.0]],
+        mass=[1, 2],
+        restitution=1.0,
+        duration=2.0,
+    )
+
+
 def mass_ratios() -> Scenario:
     """Seven lanes, in each a disk of mass 1 and one of mass 1, 10, ... 1e6."""
     lanes = np.arange(7)
@@ -152,6 +166,7 @@ PAIRS: tuple[Callable[..., Scenario], ...] = (
         for build in (head_on_equal, head_on_unequal, oblique)
         for e in RESTITUTIONS
     ),
+    off_centre_without_spin,
     mass_ratios,
     slow_collision,
     near_miss,

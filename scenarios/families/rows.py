@@ -151,6 +151,27 @@ def cradle_touching() -> Scenario:
     return with_oracle(question)
 
 
+def two_disks_and_a_wall() -> Scenario:
+    """A disk, a resting one and a wall, 1 cm apart each, so that three collisions follow within a
+    step."""
+    question = Scenario(
+        name="two_disks_and_a_wall",
+        asks="Do two disks that meet a wall and each other within one step keep their energy?",
+        source="keenon/nimblephysics#143, where the energy doubles; collisions moved off the steps",
+        scene=lay_out(
+            position=[[0.7786, 0.0], [0.9897, 0.0]],
+            velocity=[[2.0, 0.0], [0.0, 0.0]],
+            radius=[0.1, 0.1],
+            mass=[1.0, 1.0],
+            walls=[[[1.1, -1.0], [1.1, 1.0]]],
+            restitution=1.0,
+        ),
+        duration=1.0,
+        sample_interval=0.04,  # so that two of the collisions share the middle step too
+    )
+    return with_oracle(question)
+
+
 ROWS = (
     line_gas,
     partial(counting_pi, 3, 1.0, 12.0, (1, 2, 4, 8)),
@@ -159,4 +180,5 @@ ROWS = (
     partial(counting_pi, 314, 1e4, 31.0, (1, 4, 16, 64)),
     cradle_with_gaps,
     cradle_touching,
+    two_disks_and_a_wall,
 )

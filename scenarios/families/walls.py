@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from scenarios.families.placing import box, lay_out
@@ -15,6 +17,7 @@ from scenarios.truth.closed_forms import (
     stacked,
     to_and_fro,
 )
+from scenarios.truth.exact import with_oracle
 
 G = 9.81
 FLOOR = [[[-10, 0], [10, 0]]]
@@ -265,6 +268,45 @@ def column_of_ten() -> Scenario:
     )
 
 
+def _one_above_the_other(
+    name: str, asks: str, source: str, duration: float, restitution: float, **disks: Any
+) -> Scenario:
+    """Two disks that fall, the second from above onto the first."""
+    still = [[0.0, 0.0], [0.0, 0.0]]
+    scene = lay_out(
+        velocity=still, walls=FLOOR, gravity=[0.0, -G], restitution=restitution, **disks
+    )
+    return with_oracle(Scenario(name, asks, source, scene, duration, 1 / 60))
+
+
+def heavy_on_light() -> Scenario:
+    """A disk of 100 kg falls onto one of 1 kg, which falls onto a floor first."""
+    return _one_above_the_other(
+        "heavy_on_light",
+        "Does a disk of 100 kg stay on a disk of 1 kg, or sink into it?",
+        "after HighMassRatio1 to 3 of Box2D (samples/sample_robustness.cpp)",
+        duration=3.0,
+        restitution=0.0,
+        position=[[0.0, 0.6], [0.0, 2.0]],
+        radius=[0.5, 0.5],
+        mass=[1.0, 100.0],
+    )
+
+
+def ball_on_supported_ball() -> Scenario:
+    """A ball falls onto an equal one that lies on a floor, so that the impulse returns from it."""
+    return _one_above_the_other(
+        "ball_on_supported_ball",
+        "How high does a ball bounce at e = 0.9 from a ball that lies on a floor?",
+        "after Box2D's test/test_restitution.c; the limit of small gaps",
+        duration=1.5,
+        restitution=0.9,
+        position=[[0.0, 0.25], [0.0, 1.75]],
+        radius=[0.25, 0.25],
+        mass=[1.0, 1.0],
+    )
+
+
 WALLS = (
     bouncing_ball_e1,
     bouncing_ball_e09,
@@ -274,4 +316,6 @@ WALLS = (
     rest_on_floor,
     slide_on_incline,
     column_of_ten,
+    heavy_on_light,
+    ball_on_supported_ball,
 )

@@ -296,18 +296,9 @@ def _overlapping(scene: Scene) -> Iterator[tuple[int, int, float, Array]]:
                 )
 
 
-def write_scene_file(scenario: Scenario, path: str | Path) -> None:
-    """Write `scenario` to `path`, every float so that it reads back bit for bit; truth and seed are
-    left out.
-
-    Raises:
-        OSError: where the file cannot be written.
-    """
-    Path(path).write_text(scene_text(scenario), encoding="utf-8", newline="\n")
-
-
 def scene_text(scenario: Scenario) -> str:
-    """The text that `write_scene_file` writes."""
+    """The scenario as a scene file, every float so that it reads back bit for bit; truth and seed
+    are left out."""
     scene = scenario.scene
     keys = ("name", "asks", "duration", "sample_interval")
     top = {key: getattr(scenario, key) for key in keys} | {

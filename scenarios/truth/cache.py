@@ -54,10 +54,10 @@ def key_of(scenario: Scenario, certifying: bool) -> str:
         scene.restitution,
         [] if scene.wrap is None else scene.wrap,
         scenario.duration,
-        scenario.sample_interval,  # decides which short bounces are listed
         *([p.disk, p.start, p.stop, *p.force, p.frame == "body"] for p in scenario.thrusts),
     ]
-    if scene.friction:  # without friction, the record holds no rotation
+    # Else the record holds no rotation.
+    if scene.friction or any(p.frame == "body" for p in scenario.thrusts):
         torques = [p.torque for p in scenario.thrusts]
         parts += [scene.friction, scene.inertia, scene.angle, scene.angular_velocity, torques]
     hashed.update(f"{source_hash()} {certifying} {[np.shape(part) for part in parts]}".encode())

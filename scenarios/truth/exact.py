@@ -13,9 +13,10 @@ from scenarios.model import Array, Scenario, Thrust, Trajectory
 from scenarios.no_truth import NoTruth
 from scenarios.truth.cache import keep, key_of, look_up
 from scenarios.truth.oracle.bodies import Leg
-from scenarios.truth.oracle.events import trace
+from scenarios.truth.oracle.events import trace, turns_with_disk
 from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
 from scenarios.truth.oracle.path import Path
+from scenarios.truth.oracle.resting import FOR_SERIES
 from scenarios.truth.oracle.work import TimeLimit, WorkLimit
 from scenarios.truth.record import TruthRecord, last_time, record_of
 
@@ -108,13 +109,9 @@ def computed(
         )
     if fault := _out_of_scale(scenario):
         raise NoTruth(fault)
-    if any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts):
-        raise NoTruth(
-            "a thrust that turns with its disk has no exact answer: its contact times are not roots"
-            " of polynomials"
-        )
-    # Without friction a torque does not affect the motion.
-    forced = [p for p in thrusts if p.force.any() or (scene.friction and p.torque)]
+    # Without friction a torque does not affect the motion, unless a thrust turns with its disk.
+    turning = scene.friction or turns_with_disk(thrusts)
+    forced = [p for p in thrusts if p.force.any() or (turning and p.torque)]
     clock = clock or TimeLimit()
     record = certified(scenario, forced, clock) if kind is None and has_balls() else None
     return record or two_precisions(scenario, forced, kind or digits, clock)
@@ -232,9 +229,12 @@ def two_precisions(
             reason = f"numbers of {2 * bits} bits have used up their digits at t = {diverged:.9g} s"
             fine = fine.cut(diverged, reason)
         attempts.append((fine, error, 2 * bits))
-        if diverged >= end or 2 * bits >= MOST_BITS or clock.expired:
+        few = (coarse.few_bits or fine.few_bits) and bits < FOR_SERIES
+        if (diverged >= end and not few) or 2 * bits >= MOST_BITS or clock.expired:
             break
-        needed = ceil(SPARE * bits * until / max(diverged, until * bits / MOST_BITS))
+        needed = FOR_SERIES * few + ceil(
+            SPARE * bits * until / max(diverged, until * bits / MOST_BITS)
+        )
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
     best = (
         max(attempts, key=lambda attempt: min(attempt[0].end, until))

@@ -25,6 +25,7 @@ coordinates of the partners and walls of a disk.
 
 from __future__ import annotations
 
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -201,9 +202,10 @@ class TangentVectors:
         contact, arm = leg.held[0], float(self.scene.radius[i])
         start, end = self.scene.walls[contact.j]
         way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
-        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / (
-            acceleration(leg) @ way + arm * rate(leg)
-        )
+        slower = float(acceleration(leg) @ way + arm * rate(leg))
+        if not slower:  # no slip ends: a group of disks begins or ends
+            return np.zeros_like(self.late)
+        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / slower
         return late
 
     def hold(self, i: int, wall: int | None) -> None:
@@ -292,8 +294,9 @@ class TangentVectors:
             self.carry(i, t)
         legs, k = self.path.legs[i], self.leg[i]
         x, v = along(legs[k], t)
-        follows = k + 1 < len(legs) and float(legs[k + 1].t) == t
-        after = acceleration(legs[k + 1] if follows else legs[k])
+        # The last one from this instant on: a disk that lands may roll at once.
+        following = [legs[k], *takewhile(lambda leg: float(leg.t) == t, legs[k + 1 :])][-1]
+        after = acceleration(following)
         collided = self.collided_at[i] == t
         before, v = (after, self.v[i]) if collided else (acceleration(legs[k]), v)
         weight = 0.0 if self.scene.static[i] else 1 / float(self.scene.mass[i])
@@ -301,7 +304,7 @@ class TangentVectors:
         turn = legs[k].turn
         if turn is None:
             return body
-        rates = rate(legs[k]), rate(legs[k + 1] if follows else legs[k])
+        rates = rate(legs[k]), rate(following)
         return body._replace(
             spin=self.spin[i] if collided else float(turn.spin) + rates[0] * (t - float(legs[k].t)),
             dw=self.dw[i],

@@ -20,7 +20,7 @@ from scenarios.truth.horizon import DIVERGED, EPS, TangentVectors
 from scenarios.truth.oracle.bodies import Bodies
 from scenarios.truth.oracle.numbers import digits
 from scenarios.truth.oracle.path import Event, Path
-from scenarios.truth.oracle.ties import Contact, TieOutcome, Touch, Velocities
+from scenarios.truth.oracle.ties import ENDLESS, TOO_MANY, Contact, TieOutcome, Touch, Velocities
 
 DEVIATIONS = 4  # a gap is within the rounding below so many of its deviations: 1 start in 16000 not
 CLOSE = 1e-6  # radii of the smallest disk; no deviation is as large before a disk diverges
@@ -78,7 +78,10 @@ class CollisionOrder:
         self.scene, self.path, self.tangents = scenario.scene, path, tangents
         self.end = min(path.end, scenario.duration)
         rows = [
-            [*map(float, (leg.t, i, *leg[1:7]))] for i, legs in enumerate(path.legs) for leg in legs
+            # A thrust that turns with its disk ends before the disk touches anything.
+            [*map(float, (leg.t, i, *((np.nan,) * 6 if leg.jet else leg[1:7])))]
+            for i, legs in enumerate(path.legs)
+            for leg in legs
         ]
         self.legs = np.array(sorted(rows, key=lambda row: row[0]))
         self.begun, self.now = 0, np.zeros((self.scene.n, 8))
@@ -97,8 +100,11 @@ class CollisionOrder:
             return None
         disks = sorted({i for one in near for i in one.contact.disks})
         which = f"the outcome depends on it ({len(ends)} outcomes)"
-        if not ends[-1].velocities:
-            which = "they do not end"
+        if ends[-1].unresolved:
+            which = {
+                ENDLESS: "they do not end",
+                TOO_MANY: "the outcome may depend on it (more orders than can be tried)",
+            }[ends[-1].unresolved]
         reason = (
             f"rounding decides the order of the collisions of disk{'s' * (len(disks) > 1)}"
             f" {', '.join(map(str, disks))}, and {which} at t = {t:.9g} s"

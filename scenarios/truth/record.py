@@ -12,15 +12,16 @@ from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
 from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
 from scenarios.truth.horizon import DIVERGED
 from scenarios.truth.oracle.bodies import nearest
+from scenarios.truth.oracle.jets import count_pieces, push
 from scenarios.truth.oracle.path import Event, Path
 from scenarios.truth.order import float64_horizon
 
 EPS = float(np.finfo(float).eps)
 # relative to `reach`: a few roundings, of the start of a leg, of a time and of a sample
 ROUNDINGS = 4 * EPS
-# s; of bounces that die out, those that last less are not listed, as in `walls.bouncing_ball_e09`;
-# in a scene of shorter sample intervals, those that last less than this share of one
-LEAST, LEAST_SHARE = 1e-4, 1e-2
+# of the duration of a scene; of bounces that die out, those that last less are not listed, as in
+# `walls.bouncing_ball_e09`
+LEAST_SHARE = 1e-5
 TOUCH = 1e-6  # m; a disk closer to a wall than this at the end may touch it
 NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
 # The columns of `TruthRecord.legs`; `NORMAL`, `SPEED` and `FALL` are of the bounces, `TURN` is
@@ -66,10 +67,11 @@ class TruthRecord:
     orders: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 3))))
     remains: tuple[str, ...] = ()
 
-    def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
-        later times are left out."""
-        t = np.asarray(t, float)
+    def motion(
+        self, scene: Scene, thrusts: Sequence[Thrust], t: Array
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Position and velocity (k, n, 2) m, m/s, and angle and spin (k, n) rad, rad/s, at the
+        times t (k,) s before the horizon."""
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         angle, spin = turning.angle.copy(), turning.angular_velocity.copy()
@@ -77,8 +79,24 @@ class TruthRecord:
             legs = self.legs[self.legs[:, DISK] == i]
             leg = legs[np.maximum(np.searchsorted(legs[:, T], t, side="right") - 1, 0)]
             position[:, i], velocity[:, i] = along(leg, t, scene.restitution)
+            jets = [p for p in thrusts if p.disk == i and p.frame == "body" and p.force.any()]
+            for jet, begun in (
+                (p, row) for p in jets for row in {row[T]: row for row in legs}.values()
+            ):
+                if jet.start <= begun[T] < jet.stop:
+                    on = (t >= begun[T]) & (leg[:, T] == begun[T])
+                    pushed = push_float64(jet.force / scene.mass[i], begun[TURN], t[on] - begun[T])
+                    position[on, i] += pushed[0]
+                    velocity[on, i] += pushed[1]
             if scene.friction:
                 angle[:, i], spin[:, i] = flight(t - leg[:, T], *leg[:, TURN].T)
+        return (position, velocity), (angle, spin)
+
+    def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
+        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
+        later times are left out."""
+        t = np.asarray(t, float)
+        moved, turned = self.motion(scene, thrusts, t)
         # A disk that rests on a wall from the start has a contact without impulse at t = 0. One
         # that comes to rest later is not listed: its contact began with a collision.
         collisions: list[Collision] = [
@@ -95,9 +113,9 @@ class TruthRecord:
         return answer(
             scene,
             t,
-            (position, velocity),
+            moved,
             collisions,
-            (angle, spin),
+            turned,
             until,
             self.error_bound,
             reason,
@@ -127,6 +145,16 @@ def along(leg: Array, t: Array, restitution: float) -> tuple[Array, Array]:
         position[hops] += normal[hops] * height
         velocity[hops] += normal[hops] * up
     return position, velocity
+
+
+def push_float64(force: Array, turn: Array, s: Array) -> tuple[Array, Array]:
+    """Displacement m and gain of velocity m/s, (k, 2) each, after s (k,) s of a thrust (2,) m/s2
+    that turns with its disk, from its angle, spin and rate of spin (3,) on."""
+    angle, spin, rate = turn
+    pieces = count_pieces(spin, rate, float(s.max(initial=0.0)))
+    gain = push((force[0], force[1]), angle, spin, rate, s, pieces, 60)
+    moved, faster = (np.stack(part, axis=-1) for part in gain)
+    return moved, faster
 
 
 def powers(e: float, k: Array | int) -> Array:
@@ -159,7 +187,8 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
         events=frozen(np.array(sorted(rows, key=lambda row: row[:3])).reshape(-1, 5)),
         # The state at the end itself is not known: the horizon is the float64 before it.
         horizon=max(float(np.nextafter(end, 0)), 0.0) if path.reason else np.inf,
-        error_bound=error + ROUNDINGS * reach(legs, min(end, scenario.duration)),
+        error_bound=error
+        + ROUNDINGS * (reach(legs, min(end, scenario.duration)) + reach_of_jets(scenario, legs)),
         bits=bits,
         method=method,
         reason=path.reason,
@@ -231,6 +260,17 @@ def reach(legs: Array, until: float) -> float:
     return float(far[begun].max() + until * speed[begun].max())
 
 
+def reach_of_jets(scenario: Scenario, legs: Array) -> float:
+    """m, likewise by thrusts that turn with their disk: f T^2, times the rounding of the angle."""
+    begun, total = np.abs(legs[:, TURN]), 0.0
+    for p in (p for p in scenario.thrusts if p.frame == "body" and p.force.any()):
+        angle, spin, rate = begun[legs[:, DISK] == p.disk].max(axis=0)
+        acts, mass = p.stop - p.start, scenario.scene.mass[p.disk]
+        turned = 1 + angle + (spin + rate * acts) * acts
+        total += float(np.hypot(*p.force) / mass * acts * scenario.duration * turned)
+    return total
+
+
 def _row(event: Event) -> list[float]:
     i, j = (event.i, event.j) if event.j < 0 or event.i < event.j else (event.j, event.i)
     return [float(event.t), i, j, float(event.impulse), event.cosine]
@@ -244,11 +284,11 @@ def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
 
 
 def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last `LEAST` s,
-    or `LEAST_SHARE` sample intervals, or more."""
+    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last
+    `LEAST_SHARE` of the duration or more."""
     scene = scenario.scene
     e, v, g, disk = scene.restitution, leg[SPEED], leg[FALL], int(leg[DISK])
-    least = min(LEAST, LEAST_SHARE * scenario.sample_interval)
+    least = LEAST_SHARE * scenario.duration
     count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
     for k in range(1, count):
         t = leg[T] + 2 * v / g * float(powers(e, k))

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import count
-from math import atan, pi, sin
+from math import atan, cos, pi, sin
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -40,6 +40,7 @@ from reports.tune import score
 from scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import HERE as SOLVERS
+from tests.tolerances import share_that_sticks
 
 REASONS = {package: missing(package) for package in pinned()["played"]}
 fetched = pytest.mark.skipif(
@@ -60,6 +61,11 @@ def polygon(sides: int) -> float:
     return 1.5 / (1 + 2 * sin(pi / sides) ** 2) - 1
 
 
+STUCK = {  # friction, 0.2 or 0.5 by default, stops the sliding
+    "off_centre_is_normal": (share_that_sticks(2 * cos(pi / 6), 2 * sin(pi / 6)), 0.004),
+    "wall_is_normal": (share_that_sticks(10.0, 6.0), 0.004),
+}
+
 # Probe -> what its cause makes it read, and how far rounding may take it from there; a cause alone
 # where there is no formula.
 SLOWER = {"restitution_2", "restitution_10", "restitution_100", "restitution_wall"}
@@ -71,6 +77,7 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
         # below the threshold of 1 m/s
         **{f"restitution_{speed}": (0.0, 8 * F64) for speed in ("0.01", "0.1", "0.5")},
         "friction": (0.2, 8 * F64),  # its default
+        **STUCK,
     },
     "planck:matched": {},
     "matter:shipped": {
@@ -85,6 +92,10 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
         **{probe: (polygon(26) * AIR**24, 7e-6) for probe in SLOWER},
         "free_flight": "the air",
         "pair_momentum": "the air",
+        "dt_is_obeyed": "the air",
+        "gravity_is_stated": "the air",
+        **dict.fromkeys(("pair_keeps_e", "wall_keeps_e"), "the air, for 64 steps"),
+        "off_centre_is_normal": "the air and the friction of 0.1",
         "restitution_0.01": "the polygons, inside of their circles, have not met yet",
         "restitution_0.1": "as at 0.01 m/s",
         "restitution_0.5": "below the resting threshold of 1.2 m/s",
@@ -110,6 +121,7 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
         # (cos, sin) += w h (-sin, cos), then normalised, as in Box2D 3.1
         "spins_freely": (1024 * atan(20 / 1024), 3e-4),
         "friction": (0.5 / 1.5, 1e-6),  # its default, bounded before restitution is added
+        **STUCK,
         "friction_0.5": (0.2 / 1.5, 1e-6),
         "friction_1": (0.2 / 2, 1e-6),
     },

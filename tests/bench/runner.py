@@ -30,7 +30,7 @@ from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box
-from scenarios.files.scene_file import write_scene_file
+from scenarios.files.scene_file import scene_text
 from scenarios.model import Scenario
 from tests.adapters.event_driven.gases import gas
 
@@ -172,9 +172,8 @@ def many_cells(folder: Path) -> None:
         one = scenario("slow_collision")
         scene = replace(one.scene, velocity=one.scene.velocity * (1 + number / 100))
         path = folder / f"collision-{number}.toml"
-        write_scene_file(
-            replace(one, name=f"collision-{number}", scene=scene, duration=1.0, truth=None), path
-        )
+        shown = replace(one, name=f"collision-{number}", scene=scene, duration=1.0, truth=None)
+        path.write_text(scene_text(shown), encoding="utf-8")
     for what in (play_many, tables_again):
         words = [sys.executable, "-m", "tests.bench.runner", what.__name__, str(folder)]
         print(subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout.strip())

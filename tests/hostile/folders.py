@@ -294,12 +294,6 @@ NO_RUN: dict[str, tuple[tuple[str, ...], dict[str, str | bytes], str]] = {
         {"out/report.html": "mine"},
         "journal.jsonl",
     ),
-    "replay: nothing there": (("replay", "0123", "--out", "out"), {}, "journal.jsonl"),
-    "replay: a folder of the user's": (
-        ("replay", "0123", "--out", "out"),
-        {"out/a": "mine"},
-        "journal.jsonl",
-    ),
     "diff: nothing there": (("diff", "a", "b"), {}, "a"),
     "diff: two files": (("diff", "a", "b"), {"a": "1", "b": "2"}, "a"),
     "diff: a folder of the user's": (

@@ -16,13 +16,9 @@ from tests.hostile.played import Input
 from tests.hostile.small_run import CELL, copied, edited, torn
 from tests.reports.run.journals import contents, put
 
-REPORT, DIFF, REPLAY = (
-    ("report", "out"),
-    ("diff", "before", "out"),
-    ("replay", CELL, "--out", "out"),
-)
+REPORT, DIFF = ("report", "out"), ("diff", "before", "out")
 RESUME = ("run", "--resume", "out", "--workers", "1")
-ALL = (REPORT, DIFF, REPLAY, RESUME)
+ALL = (REPORT, DIFF, RESUME)
 NEXT = cycle(ALL)  # what is faulty is refused alike by all: each input asks the next
 JOURNAL = "journal.jsonl"
 
@@ -150,7 +146,7 @@ TORN = [
         codes=codes,
         writes=WRITES,
     )
-    for words, codes in zip(ALL, ((0,), (0, 1), (0,), (0,)))
+    for words, codes in zip(ALL, ((0,), (0, 1), (0,)))
 ]
 
 
@@ -211,7 +207,6 @@ SPOILT = [
     for words, codes, says in (
         (REPORT, (1,), "1 error"),
         (DIFF, (1,), "is not what was written"),
-        (REPLAY, (0, 1, 2), ""),
         (RESUME, (0,), "2 cells ended: 2 ok"),
     )
 ]
@@ -274,7 +269,7 @@ WHOLE: dict[str, tuple[Callable[[Path], None], tuple[str, ...], tuple[int, ...]]
     "an earlier version, report": (without_sums, REPORT, (2,)),
     "an earlier version, resume": (without_sums, RESUME, (2,)),
     "a later version, diff": (of_a_kind_to_come, DIFF, (2,)),
-    "a later version, replay": (of_a_kind_to_come, REPLAY, (2,)),
+    "a later version, report": (of_a_kind_to_come, REPORT, (2,)),
 }
 TABLES = [
     Input(
@@ -305,18 +300,5 @@ JOURNALS = (
         Input(what, words, prepare=copied("before", "out", then=do), codes=codes, writes=WRITES)
         for what, (do, words, codes) in WHOLE.items()
     ),
-    Input(
-        "replay: a cell that is not there",
-        ("replay", "ffffffff", "--out", "out"),
-        prepare=copied("out"),
-        says="ff",
-    ),
-    Input(
-        "replay: a cell that climbs",
-        ("replay", "../..", "--out", "out"),
-        prepare=copied("out"),
-        says="../..",
-    ),
-    Input("replay: any cell", ("replay", "", "--out", "out"), prepare=copied("out")),
     Input("diff: a run with itself", ("diff", "out", "out"), prepare=copied("out"), codes=(0,)),
 )

@@ -45,13 +45,14 @@ def forces(
 
 
 def across(scene: Scene, x: float, y: float) -> tuple[float, float] | None:
-    """Where the exercise's box sets a centre that is beyond one of its edges; None if it is not."""
+    """Where a centre that has left the box goes on from the opposite edge; None if it is inside."""
     if scene.wrap is None:
         return None
     (left, bottom), (right, top) = scene.wrap
+    width, height = right - left, top - bottom
     there = (
-        (right if x < left else left if x > right else x),
-        (top if y < bottom else bottom if y > top else y),
+        (x + width if x < left else x - width if x > right else x),
+        (y + height if y < bottom else y - height if y > top else y),
     )
     return None if there == (x, y) else there
 

@@ -31,9 +31,9 @@ def after(scene, t, dt, variant):
     return engine.read()
 
 
-@pytest.mark.parametrize("name", ["asteroids", "box_billiard", "disk_between_static_disks"])
+@pytest.mark.parametrize("name", ["gas_of_100", "box_billiard", "disk_between_static_disks"])
 def test_with_friction_0_it_is_the_exercise_to_the_bit(name):
-    """Pairs, walls, the wrap, static disks, forces."""
+    """Pairs, walls, static disks, forces; not on a torus, where the exercise cuts off a flight."""
     scene = scenario(name)
     one, other = (
         play(Reference(variant), "one:run", scene, scene.dt(2)).trajectory

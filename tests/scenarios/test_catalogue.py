@@ -113,6 +113,7 @@ def test_no_collision_falls_on_a_step(name):
     """What is measured is late detection at some phase of a step, not the luck of a tie."""
     run = scenario(name)
     collisions = run.truth(run.times).collisions.t
+    collisions = collisions[collisions > 0]  # a contact at the start has no phase
     for substeps in run.substeps:
         phase = collisions / run.dt(substeps) % 1
         # Far above the rounding of a clock that adds up steps, 1e5 times 1e-16 of the time.

@@ -11,7 +11,7 @@ import pytest
 
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario, Scene, Thrust
+from scenarios.model import Scenario, Scene
 from scenarios.no_truth import NoTruth
 from scenarios.truth.exact import computed, with_oracle
 from scenarios.truth.oracle import contact_finder
@@ -73,6 +73,7 @@ BALL = lay_out(
     gravity=[0, -9.81],
     restitution=0.1,
 )
+ASIDE = replace(BALL, position=[[0, 1], [0.03, 2]])
 SEAM = lay_out(
     position=[[1.5, 0], [-1.8, 0.1]],
     velocity=[[1, 0], [0, 0]],
@@ -94,25 +95,26 @@ SEAM = lay_out(
                 " collisions (2 outcomes)"
             ),
         ),
-        # The upper one falls 1.25 m onto the lower one, which rests since sqrt(1.5 / 9.81) 1.1 /
-        # 0.9 s.
-        (BALL, np.sqrt(2.5 / 9.81), "disks 0, 1 touch at once and their collisions do not end"),
+        # The lower one rests when the upper one arrives, and is its place to roll over.
+        (ASIDE, None, "disk 1 rolls over disk 0"),
         (SEAM, 0.5, "disk 0 re-enters over the edge of the wrap onto disk 1 at t = 0.5 s"),
     ],
 )
-def test_the_truth_ends_where_there_is_no_more_of_it(scene: Scene, until: float, reason: str):
+def test_the_truth_ends_where_there_is_no_more_of_it(
+    scene: Scene, until: float | None, reason: str
+):
     """The horizon is the instant itself, and the reason names it and the disks."""
     one = asked(scene, 4.0)
     record = computed(one)
 
-    assert record.horizon == pytest.approx(until, rel=1e-15)
     assert reason in record.reason
-    assert f"at t = {until:.4g}"[:10] in record.reason
+    if until is not None:
+        assert record.horizon == pytest.approx(until, rel=1e-15)
+        assert f"at t = {until:.4g}"[:10] in record.reason
     assert states(one, record).t[-1] <= record.horizon
     assert states(one, record).reason == record.reason
 
 
-BODY = [Thrust(0, 0.0, 1.0, [1.0, 0.0], frame="body")]
 CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201, 2)), radius=[0.1] * 201, mass=[1] * 201, restitution=1)  # fmt: skip # noqa: E501
 
 
@@ -128,10 +130,9 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
             "disk 0 and wall 0 overlap by 0.15 m at the start",
         ),
         (
-            asked(replace(ROW, position=ROW.position * [1 - 2**-53, 1])),
-            r"overlap by \d\.?\d*e-17 m at the start",
+            asked(replace(ROW, position=ROW.position * [1 - 2**-47, 1])),
+            r"overlap by \d\.?\d*e-15 m at the start",
         ),
-        (asked(ROW, thrusts=BODY), "a thrust that turns with its disk"),
         (asked(CROWD), "201 disks are more than the 200"),
         (asked(replace(SEAM, radius=[1e-9, 1])), "a radius of 1e-09 m is below 1e-06 m"),
         (
@@ -141,7 +142,7 @@ CROWD = lay_out(position=np.arange(402).reshape(201, 2), velocity=np.zeros((201,
     ],
 )
 def test_what_it_cannot_do_is_refused(one: Scenario, reason: str):
-    """With one sentence; no overlap is corrected."""
+    """With one sentence; no overlap above a few units in the last place is corrected."""
     with pytest.raises(NoTruth, match=reason):
         computed(one)
 
@@ -278,7 +279,7 @@ TILTED = lay_out(
 
 def test_what_can_still_be_said_is_said():
     """Momentum along the floor, energy; on a wedge, where no direction is free, energy alone."""
-    flat, wedge = (computed(asked(scene, 4.0)) for scene in (BALL, TILTED))
+    flat, wedge = (computed(asked(scene, 4.0)) for scene in (ASIDE, TILTED))
 
     assert any(
         "lie along (1, 0), so their momentum in that direction, 0 N s, is conserved" in said
@@ -306,16 +307,7 @@ def test_past_its_horizon_the_truth_is_cut():
 
 
 def test_what_is_said_of_one_disk_is_said_in_the_singular():
-    """A disk that falls into an acute wedge at e = 0."""
-    wedge = lay_out(
-        position=[[0.03, 3]],
-        velocity=[[0.1, 0]],
-        radius=[0.25],
-        mass=[1],
-        walls=[[[-1, 4], [0, 0]], [[0, 0], [1, 4]]],
-        gravity=[0, -9.81],
-        restitution=0.0,
-    )
-    record = computed(asked(wedge))
-    assert record.reason.startswith("disk 0 touches several walls at once and its collisions")
+    """A disk that falls into a wedge."""
+    record = computed(asked(TILTED, 4.0))
+    assert record.reason.startswith("disk 0 touches several walls at once and the outcome")
     assert record.remains[-1].startswith("disk 0: its kinetic energy, ")

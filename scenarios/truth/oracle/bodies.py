@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.model import Array, Scene, Thrust
 from scenarios.truth.oracle.friction import Friction, limited
+from scenarios.truth.oracle.jets import count_pieces, push
 from scenarios.truth.oracle.numbers import Number, Numbers
 from scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
 
@@ -43,7 +44,8 @@ class Turn(NamedTuple):
 
 class Leg(NamedTuple):
     """A flight from t s on: x, y m, vx, vy m/s, ax, ay m/s2 (with a `hop`, only the motion along
-    the wall); the contacts on which the disk rests; and its rotation, where there is friction."""
+    the wall); the contacts on which the disk rests; its rotation, where it matters; and the
+    acceleration, m/s2 in the axes of the disk, by a thrust that turns with it."""
 
     t: Number
     x: Number
@@ -55,6 +57,7 @@ class Leg(NamedTuple):
     hop: Hop | None = None
     held: tuple[Contact, ...] = ()
     turn: Turn | None = None
+    jet: tuple[Number, Number] | None = None
 
 
 class Frame(NamedTuple):
@@ -78,16 +81,21 @@ class Bodies:
         asleep: (b,) whether the bounces of each die out without another contact: it is then left
             out of all searches.
         held: (b,) the contacts each rests on: gap 0, no speed and no acceleration along the normal.
+        group: (b,) the disks that move as one with each, because forces keep them in contact.
+        common: (b,) the kind of such a group and its acceleration, m/s2; else None.
         separated: pair -> the event counts of both when they touched and did not approach.
+        in_step: the same for pairs that touched and had exactly the same velocity.
         leaning: (b,) the walls that each touched without approach at the start of its leg.
         law: masses, restitution and friction.
         rates: (b,) rad/s2, angular acceleration by torques; used only with friction.
         no_slip_on: (b,) the wall on which each has exactly no slip since the collision at the start
             of its leg.
         sliding: (b,) the sign of the slip of a disk that rests on a wall with friction.
+        snug: the bodies of a pair, or disk, wall and side -> m, the distance of their centres, or
+            of centre and wall, where they touch at the start but for a rounding.
     """
 
-    def __init__(self, scene: Scene, k: Numbers) -> None:
+    def __init__(self, scene: Scene, k: Numbers, turning: bool = False) -> None:
         self.k, self.scene, exact = k, scene, k.exact
         ends = np.unique(scene.walls.reshape(-1, 2), axis=0)
         # The wall that a collision with an end point is listed under: the first with this end.
@@ -101,7 +109,8 @@ class Bodies:
             for row in np.hstack([positions, velocities, accelerations]).tolist()
         ]
         self.legs = [Leg(*row) for row in rows]
-        if scene.friction:
+        self.turning = turning or scene.friction > 0
+        if self.turning:
             turns = np.zeros((len(ends) + scene.n, 3))
             turns[: scene.n, :2] = np.stack([scene.angle, scene.angular_velocity], axis=-1)
             self.legs = [
@@ -126,11 +135,16 @@ class Bodies:
         )
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
         self.separated: dict[tuple[int, int], tuple[int, int]] = {}
+        self.in_step: dict[tuple[int, int], tuple[int, int]] = {}
+        self.group: list[frozenset[int]] = [frozenset() for _ in self.legs]
+        self.common: list[tuple[int, Number, Number] | None] = [None for _ in self.legs]
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
         self.nought, self.rates = nought, [nought for _ in self.legs]
+        self.jet: list[tuple[Number, Number] | None] = [None for _ in self.legs]
         self.no_slip_on: list[Contact | None] = [None for _ in self.legs]
         self.sliding = [0 for _ in self.legs]
+        self.snug: dict[tuple[int, ...], Number] = {}
 
     def _friction(self) -> Friction | None:
         """The data for friction; None without friction."""
@@ -163,6 +177,8 @@ class Bodies:
     def state_at(self, i: int, now: Number) -> tuple[Number, Number, Number, Number]:
         """x, y m and vx, vy m/s of body i: x + v t + a t^2 / 2, v + a t."""
         leg = self.legs[i]
+        if leg.jet is not None and leg.t is not now:
+            return self.pushed(leg, now)
         if leg.t is now or self.shape[i] == STILL:
             return leg.x, leg.y, leg.vx, leg.vy
         s = now - leg.t
@@ -175,6 +191,20 @@ class Bodies:
             leg.vx + ux,
             leg.vy + uy,
         )
+
+    def pushed(self, leg: Leg, now: Number) -> tuple[Number, Number, Number, Number]:
+        """x, y m and vx, vy m/s on a leg with a thrust that turns with the disk."""
+        s, k, turn = now - leg.t, self.k, leg.turn
+        assert turn is not None
+        assert leg.jet is not None
+        pieces = count_pieces(float(turn.spin), float(turn.rate), float(s))
+        gain = push(leg.jet, turn.angle, turn.spin, turn.rate, s, pieces, k.bits)
+        # The series are cut at 2^-bits of the size of their sum.
+        cut = 2.0 ** -min(k.bits, 1000) * pieces * sum(abs(float(f)) for f in leg.jet)
+        (dx, dy), (du, dv) = [[x + k.between(-cut, cut) for x in part] for part in gain]
+        vx, vy = leg.vx + leg.ax * s, leg.vy + leg.ay * s
+        x, y = leg.x + (leg.vx + vx) * s / 2 + dx, leg.y + (leg.vy + vy) * s / 2 + dy
+        return x, y, vx + du, vy + dv
 
     def velocity_at(self, i: int, now: Number) -> Velocity:
         """vx, vy m/s, and rad/s where there is friction."""
@@ -197,13 +227,14 @@ class Bodies:
         x, y, _, _ = self.state_at(i, now)
         if beside is not None:
             x, y = self.beside(beside, x, y)
+        self.common[i] = None
         self.begin(i, self.leg(i, now, x, y, v))
 
     def leg(self, i: int, now: Number, x: Number, y: Number, v: Velocity) -> Leg:
         """A leg of body i from (x, y) m with velocity v, on the contacts it rests on."""
         (vx, vy, spin), (ax, ay, rate) = v, self.acceleration(i)
-        turn = None if self.law.friction is None else Turn(self.turn_at(i, now).angle, spin, rate)
-        return Leg(now, x, y, vx, vy, ax, ay, turn=turn)
+        turn = Turn(self.turn_at(i, now).angle, spin, rate) if self.turning else None
+        return Leg(now, x, y, vx, vy, ax, ay, turn=turn, jet=self.jet[i])
 
     def across(self, edge: Contact, now: Number) -> None:
         """Move a disk that has reached an edge of the wrap to the opposite edge."""
@@ -211,7 +242,7 @@ class Bodies:
         i, place = edge.i, list(self.state_at(edge.i, now))
         place[edge.j] = self.k.exact(float(self.scene.wrap[0 if edge.side > 0 else 1, edge.j]))
         spin = self.turn_at(i, now).spin
-        self.held[i] = ()
+        self.held[i], self.common[i] = (), None
         x, y, vx, vy = place
         self.begin(i, self.leg(i, now, x, y, (vx, vy, spin)))
 
@@ -219,37 +250,69 @@ class Bodies:
         """Body i is accelerated by all of `thrusts` from now on."""
         exact, inverse = self.k.exact, self.law.inverse_mass[i]
         a = [exact(g) for g in (self.scene.gravity * (not self.scene.static[i])).tolist()]
+        jet = [self.nought, self.nought]
         for thrust in thrusts:
-            a = [each + exact(float(force)) * inverse for each, force in zip(a, thrust.force)]
+            force = [exact(float(each)) * inverse for each in thrust.force]
+            if thrust.frame == "body":
+                jet = [each + more for each, more in zip(jet, force)]
+            else:
+                a = [each + more for each, more in zip(a, force)]
         kind = 2 + i if thrusts else (FALLING if self.scene.gravity.any() else STATIC)
         self.free[i] = kind, a[0], a[1]
-        if self.law.friction is not None:
+        if self.turning:
             torque = exact(float(sum(thrust.torque for thrust in thrusts)))
-            turns = self.law.friction.inverse_inertia[i]
-            self.rates[i] = torque * turns if any(p.torque for p in thrusts) else self.nought
+            inertia = exact(float(self.scene.inertia[i]))
+            self.rates[i] = torque / inertia if any(p.torque for p in thrusts) else self.nought
+        v, rolls = self.velocity_at(i, now), bool(self.held[i]) and not self.sliding[i]
+        turns = any(p.frame == "body" and p.force.any() for p in thrusts)
+        self.jet[i] = (jet[0], jet[1]) if turns else None
         held = tuple(
             c
             for c in self.held[i]
             if c.kind == "wall" and self.k.sign(self.outward(c, a[0], a[1])) < 0
         )
-        rolls = bool(self.held[i]) and not self.sliding[i]
-        self.hold(i, now, held, self.velocity_at(i, now), rolls)
+        self.hold(i, now, held, v, rolls)
+        self.asleep[i] = turns  # contacts of such a disk are found by `probe`
         # The walls on which it rested still touch it.
         self.leaning[i] = {c for c in self.held[i] if c.kind == "wall"}
 
     def hold(
-        self, i: int, now: Number, contacts: tuple[Contact, ...], v: Velocity, rolls: bool = False
+        self,
+        i: int,
+        now: Number,
+        contacts: tuple[Contact, ...],
+        v: Velocity,
+        rolls: bool = False,
+        common: tuple[int, Number, Number] | None = None,
     ) -> None:
         """Body i goes on with velocity v, resting on these contacts.
 
         rolls: it has exactly no slip on the one wall on which it rests with friction.
+        common: kind and acceleration of its group.
         """
         self.asleep[i] = False
-        self.held[i] = contacts
+        self.held[i], self.common[i] = contacts, common
+        touched_now = self.touched_now(i, now)
         if contacts and self.law.friction is not None:
             self.sliding[i] = 0 if rolls else self.k.sign(self.slip(contacts[0], v))
         x, y, _, _ = self.state_at(i, now)
         self.begin(i, self.leg(i, now, x, y, v))
+        for pairs, pair in touched_now:
+            pairs[pair] = self.count[pair[0]], self.count[pair[1]]
+
+    def touched_now(
+        self, i: int, now: Number
+    ) -> list[tuple[dict[tuple[int, int], tuple[int, int]], tuple[int, int]]]:
+        """The entries of `separated` and `in_step` that body i has got at this instant: they hold
+        on another acceleration, too."""
+        if self.legs[i].t is not now:
+            return []
+        return [
+            (pairs, pair)
+            for pairs in (self.separated, self.in_step)
+            for pair, counts in pairs.items()
+            if i in pair and counts == (self.count[pair[0]], self.count[pair[1]])
+        ]
 
     def slip(self, contact: Contact, v: Velocity) -> Number:
         """m/s, the velocity of the contact point along the wall, positive from its start to its
@@ -268,6 +331,9 @@ class Bodies:
 
     def acceleration(self, i: int) -> tuple[Number, Number, Number]:
         """ax, ay m/s2 and rad/s2 of body i on the contacts it rests on; also sets its kind."""
+        if (common := self.common[i]) is not None:
+            self.kind[i] = common[0]
+            return common[1], common[2], self.rates[i]
         kind, ax, ay = self.free[i]
         rate = self.rates[i]
         walls = [c for c in self.held[i] if c.kind == "wall"]
@@ -323,10 +389,22 @@ class Bodies:
             elif contact.i in collided or not collided:
                 self.leaning[contact.i].add(contact)
 
+    def keep_in_step(self, contact: Contact) -> None:
+        """Note that both bodies of a contact touch and have exactly the same velocity."""
+        i, j = sorted((contact.i, contact.j))
+        self.separated[i, j] = self.in_step[i, j] = self.count[i], self.count[j]
+
     def height(self, contact: Contact, x: Number, y: Number) -> Number:
         """m from the line of the wall to (x, y), positive on the contact's side of it."""
         px, py, tx, ty, _ = self.walls[contact.j]
         return contact.side * (tx * (y - py) - ty * (x - px))
+
+    def reach(self, contact: Contact) -> Number:
+        """m, the distance of two centres, or of a centre from a wall, that touch each other."""
+        i, j = contact.i, contact.j
+        if contact.kind == "body":
+            return self.snug.get((min(i, j), max(i, j))) or self.radius[i] + self.radius[j]
+        return self.snug.get((i, j, contact.side)) or self.radius[i]
 
     def foot(self, wall: int, x: Number, y: Number) -> Number:
         """m along the wall from its start to the point closest to (x, y)."""
@@ -352,7 +430,7 @@ class Bodies:
     def beside(self, contact: Contact, x: Number, y: Number) -> tuple[Number, Number]:
         """The position nearest to (x, y) at which disk contact.i touches the wall exactly."""
         px, py, tx, ty, _ = self.walls[contact.j]
-        foot, away = self.foot(contact.j, x, y), contact.side * self.radius[contact.i]
+        foot, away = self.foot(contact.j, x, y), contact.side * self.reach(contact)
         return px + foot * tx - away * ty, py + foot * ty + away * tx
 
     def stays_still(self, one: Contact, other: Contact) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from scenarios.truth.oracle.bodies import Bodies, rational
 from scenarios.truth.oracle.contacts import Pressed, crossing, falling_meeting, meeting
 from scenarios.truth.oracle.filter import soonest, touching
 from scenarios.truth.oracle.numbers import Number
-from scenarios.truth.oracle.ties import Contact, Touch
+from scenarios.truth.oracle.ties import Contact, Touch, key
 
 # of two equal products: by how much float64 may make them differ, some roundings
 NOT_EXCLUDED = 1e-12
@@ -125,17 +124,21 @@ class ContactFinder:
     def _time_to_body(self, contact: Contact, now: Number, limit: float) -> Number | None:
         bodies, i, j = self.bodies, contact.i, contact.j
         pair = (min(i, j), max(i, j))
-        separated = bodies.separated.get(pair) == (bodies.count[pair[0]], bodies.count[pair[1]])
+        counts = bodies.count[pair[0]], bodies.count[pair[1]]
+        separated = bodies.separated.get(pair) == counts
         alike = bodies.kind[i] == bodies.kind[j]
         if separated and alike:
             return None
         (x, y, u, v), (px, py, pu, pv) = bodies.state_at(i, now), bodies.state_at(j, now)
         dx, dy, du, dv = px - x, py - y, pu - u, pv - v
-        reach = bodies.radius[i] + bodies.radius[j]
+        at_once = bodies.legs[i].t is now or bodies.legs[j].t is now
+        if at_once and bodies.in_step.get(pair) == counts:
+            du, dv = self.k.exact(0.0), self.k.exact(0.0)
+        reach = bodies.reach(contact)
         c, b, a2 = dx * dx + dy * dy - reach * reach, dx * du + dy * dv, du * du + dv * dv
         if alike:
             return meeting(self.k, c, b, a2)
-        if separated and (bodies.legs[i].t is now or bodies.legs[j].t is now):
+        if separated and at_once:
             c = self.k.exact(0.0)
         ax, ay = bodies.legs[j].ax - bodies.legs[i].ax, bodies.legs[j].ay - bodies.legs[i].ay
         gap = [c, 2 * b, a2 + dx * ax + dy * ay, du * ax + dv * ay, (ax * ax + ay * ay) / 4]
@@ -146,7 +149,7 @@ class ContactFinder:
         x, y, u, v = bodies.state_at(i, now)
         fall = bodies.outward(contact, leg.ax, leg.ay)
         leans = contact in bodies.leaning[i] and leg.t is now
-        gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.radius[i]
+        gap = self.k.exact(0.0) if leans else bodies.height(contact, x, y) - bodies.reach(contact)
         try:
             after = crossing(self.k, gap, bodies.outward(contact, u, v), fall)
         except Pressed:
@@ -234,15 +237,27 @@ class ContactFinder:
         for contact in self.touching(i, float(now)):
             if key(contact) in known:
                 continue
+            if self.touches_now(contact, now):
+                found.append((contact, 0))
+                continue
             if contact.kind == "body":
-                touch, reach = self.touch(contact, now), bodies.radius[i] + bodies.radius[contact.j]
+                touch, reach = self.touch(contact, now), bodies.reach(contact)
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
                 within = True
             else:
-                gap = self.k.sign(bodies.height(contact, x, y) - bodies.radius[i])
+                gap = self.k.sign(bodies.height(contact, x, y) - bodies.reach(contact))
                 within = bodies.foot_on(contact.j, x, y)
             found += [(contact, gap)] if gap <= 0 and within else []
         return found
+
+    def touches_now(self, contact: Contact, now: Number) -> bool:
+        """Whether a pair of disks is known to touch at this instant, without approach."""
+        if contact.kind != "body":
+            return False
+        i, j = sorted((contact.i, contact.j))
+        legs, count = self.bodies.legs, self.bodies.count
+        at_once = legs[i].t is now or legs[j].t is now
+        return at_once and self.bodies.separated.get((i, j)) == (count[i], count[j])
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:
         """All contacts that touch now, of the disks in `contacts` and of all disks connected to
@@ -268,12 +283,6 @@ class ContactFinder:
             for contact in found.values()
             if contact.kind != "wall" or contact in once.values()
         ]
-
-
-def key(contact: Contact) -> tuple[Any, ...]:
-    """A key for a contact: the same from both disks of a pair, different for the two sides of a
-    wall."""
-    return ("body", *sorted((contact.i, contact.j))) if contact.kind == "body" else tuple(contact)
 
 
 def line_span(along: np.ndarray, wall: np.ndarray) -> tuple[float, float]:

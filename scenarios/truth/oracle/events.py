@@ -9,24 +9,41 @@ Comput. Phys. 94, 255, 1991).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from scenarios.model import Scene, Thrust
 from scenarios.truth.oracle.bodies import Bodies
-from scenarios.truth.oracle.contact_finder import ContactFinder, key
+from scenarios.truth.oracle.contact_finder import ContactFinder
 from scenarios.truth.oracle.contacts import Pressed
 from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 from scenarios.truth.oracle.path import Event, MotionEnds, Path, RecentCollisions, Record, ambiguous
 from scenarios.truth.oracle.resting import (
+    NO_GAP,
+    NO_MATTER,
+    NoLimit,
     below,
+    gap_of,
+    in_step_after,
+    lasting,
     lie_down,
+    limit_of_series,
     nearly_in_line,
     next_in_line,
     press,
+    probe,
     settle,
 )
-from scenarios.truth.oracle.ties import Collision, Contact, TieOutcome, Touch, Velocities
+from scenarios.truth.oracle.ties import (
+    ENDLESS,
+    Collision,
+    Contact,
+    TieOutcome,
+    Touch,
+    Velocities,
+    key,
+)
 from scenarios.truth.oracle.work import WorkLimit
 
 MOST_IDLE = 100  # contacts in a row without a collision: the digits no longer decide
@@ -40,11 +57,11 @@ class Motion:
         self, scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: WorkLimit
     ) -> None:
         self.k, self.until, self.scene, self.work = k, until, scene, work
-        self.bodies = Bodies(scene, k)
+        self.bodies = Bodies(scene, k, turns_with_disk(thrusts))
         self.finder = ContactFinder(self.bodies)
         self.records: list[Record | None] = [None] * scene.n
         self.due = np.full(scene.n, np.inf)
-        self.now = k.exact(0.0)
+        self.now = self.bodies.nought
         self.path = Path([[self.bodies.legs[i]] for i in range(scene.n)])
         self.recent = RecentCollisions(scene)
         # From the last to the first, so that the next one can be popped.
@@ -53,11 +70,13 @@ class Motion:
         )
         self.thrusts = thrusts
         self.idle = 0
+        self.accumulating: list[int] = []  # disks
         self.by_itself = {
             "edge": self.wrap,
             "end": self.leave,
             "rest": self.stop,
             "slip end": self.roll,
+            "probe": self.probe,
         }
 
     def run(self) -> Path:
@@ -70,6 +89,7 @@ class Motion:
             advice = [nearly_in_line(self.finder, i, float(self.now)) for i in end.disks[:1]]
             self.path.end, self.path.reason = end.t, "".join([str(end), *advice])
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
+            self.path.few_bits = end.few_bits
             self.path.named = [
                 [self.bodies.pair(collision.contact) for collision in one.collisions]
                 for one in end.outcomes
@@ -92,8 +112,7 @@ class Motion:
         if self.starts_and_stops and self.starts_and_stops[-1][0] <= soonest:
             t, disk = self.starts_and_stops.pop()
             self.now = self.k.exact(t)
-            self.set_thrusts(disk)
-            self.follow_up({disk})
+            self.follow_up(self.set_thrusts(disk))
             return True
         if soonest == np.inf:
             return False
@@ -164,6 +183,8 @@ class Motion:
     def predict(self, i: int) -> None:
         """Find the next contact of disk i."""
         k = self.k
+        if self.bodies.jet[i] is not None:
+            return self.probe(Contact("probe", i, i))
         now = float(self.now)
         left = self.until - now
         best: list[tuple[Number, Contact]] = []
@@ -202,6 +223,8 @@ class Motion:
     def press(self, contact: Contact) -> None:
         """Begin a lasting contact: from now on the disk rests on the wall."""
         if not press(self.finder, contact, self.now):
+            if self.join(contact):
+                return
             on = [self.bodies.name(held) for held in self.bodies.held[contact.i]]
             where = f" while it rests on {on[0]}" if on else ""
             others = [contact.j] if contact.kind == "body" and contact.j < self.scene.n else []
@@ -209,6 +232,53 @@ class Motion:
             raise MotionEnds(float(self.now), reason, [contact.i, *others])
         self.rest(contact)
         self.follow_up({contact.i})
+
+    def join(self, contact: Contact) -> bool:
+        """Let the disks that forces keep in contact move as one from now on; False if none do."""
+        bodies, before = self.bodies, {key(c) for held in self.bodies.held for c in held}
+        groups = lasting(self.finder, contact, self.now)
+        for group in groups:
+            for i in group.disks:
+                ours = [c for c in group.contacts if i in c.disks]
+                held = tuple(c if c.i == i else c._replace(i=c.j, j=c.i) for c in ours)
+                v = (*group.velocity, self.bodies.turn_at(i, self.now).spin)
+                bodies.hold(i, self.now, held, v, True, group.common)
+                bodies.group[i] = frozenset(group.disks)
+            for c in group.contacts:
+                if c.kind == "body":
+                    bodies.keep_in_step(c)
+                if key(c) not in before:
+                    self.rest(c)
+        self.follow_up({i for group in groups for i in group.disks})
+        return bool(groups)
+
+    def ungroup(self, disks: set[int]) -> set[int]:
+        """Let the disks that move as one with these go on by themselves, each on the wall that it
+        is pressed onto; those disks."""
+        bodies, k = self.bodies, self.k
+        members = disks.union(*(bodies.group[i] for i in disks))
+        pairs = {key(c): c for i in members for c in bodies.held[i] if bodies.group[i]}
+        v = {
+            group: bodies.velocity_at(min(group), self.now)
+            for group in {bodies.group[i] for i in members}
+            if group
+        }
+        for i in sorted(members):
+            if group := bodies.group[i]:
+                _, ax, ay = bodies.free[i]
+                walls = tuple(
+                    c
+                    for c in bodies.held[i]
+                    if c.kind == "wall" and k.sign(bodies.outward(c, ax, ay)) < 0
+                )
+                spin = bodies.turn_at(i, self.now).spin
+                bodies.group[i] = frozenset()
+                bodies.hold(i, self.now, walls[:1], (*v[group][:2], spin), True)
+                bodies.leaning[i] = {*walls}
+        for contact in pairs.values():
+            if contact.kind == "body":
+                bodies.keep_in_step(contact)
+        return members
 
     def collide(self, contacts: list[Contact]) -> None:
         """Resolve the contacts of one instant; if their order matters there is no exact answer."""
@@ -225,7 +295,59 @@ class Motion:
         touched = {i for collision in outcome.collisions for i in collision.contact.disks} or set(
             disks
         )
-        self.go_on(outcome, touches, touched)
+        first = outcome.collisions[0] if len(outcome.collisions) == 1 else None
+        bounce = first.contact if first and first.contact.kind == "wall" else None
+        self.go_on(
+            outcome, touches, touched, bounce, bounce if first and first.slip_ended else None
+        )
+        if self.accumulating:
+            self.die_out(self.accumulating[0])
+            self.accumulating = []
+
+    def die_out(self, i: int) -> None:
+        """Close the contacts of disk i, and of disks connected to it, whose collisions accumulate,
+        as soon as the rest of their series is far below the rounding of float64.
+
+        Raises `MotionEnds` where this is not known to be their limit.
+        """
+        bodies, recent, now = self.bodies, self.recent, float(self.now)
+        if bodies.asleep[i]:
+            return
+        contacts = recent.dying(i, now)
+        touches = [self.finder.touch(contact, self.now) for contact in contacts]
+        disks = {k for contact in contacts for k in contact.disks}
+        v = {k: bodies.velocity_at(k, self.now) for k in disks}
+        try:
+            limit = limit_of_series(self.finder, touches, v, self.until - now)
+        except NoLimit as fault:
+            if i in recent.since:
+                end = recent.ends(i, now, self.other_side)
+                end.few_bits = fault.few_bits
+                raise end from None
+            return
+        if limit is None and len(touches) > 1 and gap_of(self.finder, touches, self.now) <= NO_GAP:
+            limit = bodies.law.closed(touches, v, frozenset())
+        if limit is None:
+            return
+        contacts = [contact for contact in contacts if contact in limit.still]
+        touches = [touch for touch in touches if touch.contact in limit.still]
+        disks = {k for contact in contacts for k in contact.disks}
+        # As of bounces that die out, those that cannot be told apart are not listed.
+        since, pairs = recent.since.get(i, now - recent.instant), {bodies.pair(c) for c in contacts}
+        self.path.events = [
+            event
+            for event in self.path.events
+            if float(event.t) <= since or not pairs & {(event.i, event.j), (event.j, event.i)}
+        ]
+        self.log_all(limit.collisions, [])
+        recent.close(contacts, now)
+        first = contacts[0]
+        rolls = len(contacts) == 1 and bodies.no_slip_on[first.i] == first
+        self.go_on(limit, touches, disks, None, first if rolls else None)
+
+    def other_side(self, contact: Contact, i: int) -> str:
+        """The other side of a contact of disk i, in words."""
+        return self.bodies.name(contact) if contact.i == i else f"disk {contact.i}"
 
     def refuse_corners(self, contacts: Sequence[Contact]) -> None:
         """Raise `MotionEnds` if a disk reaches an edge of the wrap or the end of its wall, or stops
@@ -255,9 +377,15 @@ class Motion:
         self.work.left -= tried
         if len(ends) == 1 and ends[0].velocities:
             return ends[0]
+        with suppress(NoLimit):
+            rest = self.until - float(self.now)
+            if limit := limit_of_series(self.finder, touches, v, rest, NO_MATTER):
+                return limit
         disks = [i for i in v if i < self.scene.n]
         known = [end for end in ends if end.velocities]
-        raise MotionEnds(float(self.now), ambiguous(disks, ends), list(v), known)
+        end = MotionEnds(float(self.now), ambiguous(disks, ends), list(v), known)
+        end.few_bits = ends[-1].unresolved == ENDLESS and not self.k.proves
+        raise end
 
     def log_all(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
         """Log the collisions of one instant; the first one of each of `contacts` is new."""
@@ -268,53 +396,51 @@ class Motion:
         self.idle = 0 if collisions else self.idle + 1
         if self.idle > MOST_IDLE:
             reason = f"numbers of {self.k.bits} bits have used up their digits"
-            raise MotionEnds(float(self.now), reason)
+            end = MotionEnds(float(self.now), reason)
+            end.few_bits = True
+            raise end
 
-    def go_on(self, outcome: TieOutcome, touches: Sequence[Touch], touched: set[int]) -> None:
-        """Begin new legs after the collisions of one instant; after a bounce off a wall, check
-        whether the bounces die out without another contact."""
+    def go_on(
+        self,
+        outcome: TieOutcome,
+        touches: Sequence[Touch],
+        touched: set[int],
+        bounce: Contact | None,
+        rolls_on: Contact | None,
+    ) -> None:
+        """Begin new legs after the collisions of one instant; after a `bounce` off a wall, check
+        whether the bounces die out without another contact.
+
+        rolls_on: the wall on which its disk has exactly no slip now.
+        """
         bodies = self.bodies
-        walls = [
-            collision.contact
-            for collision in outcome.collisions
-            if collision.contact.kind == "wall"
-        ]
-        bounce = walls[0] if len(outcome.collisions) == 1 and walls else None
+        members, still_keys = self.ungroup(touched) - touched, {key(c) for c in outcome.still}
+        velocities, in_step = in_step_after(self.finder, outcome, touches)
         for i in sorted(touched):
-            bodies.held[i] = tuple(c for c in bodies.held[i] if c in outcome.still)
-            vx, vy, spin = outcome.velocities[i]
-            for still in (c for c in outcome.still if c.kind == "wall" and c.i == i):
-                vx, vy = bodies.slide(still, vx, vy)
+            bodies.held[i] = tuple(c for c in bodies.held[i] if key(c) in still_keys)
+            vx, vy, spin = velocities[i]
             if bodies.law.friction is not None:
                 bodies.held[i] = ()  # `press` decides whether it slides
             bodies.fly(i, self.now, (vx, vy, spin), bounce)
         bodies.remember(touches, touched)
-        if bounce is not None and outcome.collisions[0].slip_ended:
-            bodies.no_slip_on[bounce.i] = bounce
-        # A disk no longer rests on a disk that has collided.
-        dropped = {
-            i
-            for i, held in enumerate(bodies.held)
-            if i not in touched and any(c.disks & touched for c in held)
-        }
-        for i in sorted(dropped):
-            bodies.hold(i, self.now, (), bodies.velocity_at(i, self.now))
+        for contact in in_step:
+            bodies.keep_in_step(contact)
+        if rolls_on is not None:
+            bodies.no_slip_on[rolls_on.i] = rolls_on
         stop = None
         if bounce is not None and 0 < self.scene.restitution < 1:
             stop = settle(self.finder, bounce, self.now, self.thrusts)
-        self.follow_up(touched | dropped)
+        self.follow_up(touched | members)
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 
     def log(self, collision: Collision, new: bool) -> None:
-        """Log a collision; raises `MotionEnds` where those of a disk accumulate."""
+        """Log a collision, and the disks whose collisions accumulate."""
         contact, j = collision.contact, self.bodies.partner(collision.contact)
         self.path.events.append(
             Event(self.now, contact.i, j, collision.impulse, float(collision.cosine), new)
         )
-        self.recent.add(contact.i, float(self.now), self.bodies.name(contact))
-        if j >= 0:
-            self.recent.add(j, float(self.now), f"disk {contact.i}")
+        self.accumulating += self.recent.add(float(self.now), contact)
 
     def rest(self, contact: Contact) -> None:
         """Log that a disk comes to rest: a contact that begins without an impulse."""
@@ -343,12 +469,15 @@ class Motion:
         """Move a disk off the end of the wall it rests on: onto the next wall in line, or into free
         flight."""
         bodies, i, k = self.bodies, contact.i, self.k
-        held = [c for c in bodies.held[i] if c.j == contact.j]
+        held = [c for c in bodies.held[i] if c.kind == "wall" and c.j == contact.j]
         v, end = (
             bodies.velocity_at(i, self.now),
             self.scene.walls[contact.j, 1 if contact.side > 0 else 0],
         )
         following = next_in_line(self.finder, held[0], contact.side)
+        if bodies.group[i]:
+            reason = f"disk {i} reaches the end of wall {contact.j} while it touches another"
+            raise MotionEnds(float(self.now), reason, [i])
         if following is None:
             _, ax, ay = bodies.free[i]
             slow = v[0] * v[0] + v[1] * v[1] + bodies.radius[i] * bodies.outward(held[0], ax, ay)
@@ -374,6 +503,9 @@ class Motion:
         """Move a disk to the opposite edge of the wrap; if it overlaps another one there, there is
         no exact answer."""
         i = contact.i
+        if self.bodies.group[i]:
+            reason = f"disk {i} crosses the edge of the wrap while it touches another"
+            raise MotionEnds(float(self.now), reason, [i])
         self.bodies.across(contact, self.now)
         for other, gap in self.finder.near(i, self.now):
             if gap < 0:
@@ -383,19 +515,33 @@ class Motion:
                 raise MotionEnds(float(self.now), reason, sorted(other.disks))
         self.follow_up({i})
 
-    def set_thrusts(self, disk: int) -> None:
-        """Begin or end a thrust."""
+    def probe(self, contact: Contact) -> None:
+        """Find how long a disk under a thrust that turns with it certainly touches nothing."""
+        after = probe(self.finder, contact.i, self.now)
+        self.expect(contact.i, self.now + self.k.exact(after), (contact,))
+
+    def set_thrusts(self, disk: int) -> set[int]:
+        """Begin or end a thrust; the disks whose motion that changes."""
+        members = self.ungroup({disk})
         on = [p for p in self.thrusts if p.disk == disk and p.start <= float(self.now) < p.stop]
         self.bodies.set_thrusts(disk, self.now, on)
+        return members
 
     def follow_up(self, disks: set[int]) -> None:
         """Add the new legs of these disks to the path, and predict the disks again."""
         moving = sorted(i for i in disks if i < self.scene.n and not self.scene.static[i])
         for i in moving:
             self.path.legs[i].append(self.bodies.legs[i])
-        for i in moving:
-            if not self.bodies.asleep[i]:
+        # Others may have become faster than a disk under a thrust that turns with it was told.
+        jets = [i for i, jet in enumerate(self.bodies.jet) if jet is not None and i not in moving]
+        for i in moving + jets:
+            if not self.bodies.asleep[i] or self.bodies.jet[i] is not None:
                 self.predict(i)
+
+
+def turns_with_disk(thrusts: Sequence[Thrust]) -> bool:
+    """Whether one of these thrusts turns with its disk."""
+    return any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts)
 
 
 def trace(

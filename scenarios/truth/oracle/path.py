@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -12,19 +12,23 @@ import numpy as np
 from scenarios.model import Scene
 from scenarios.truth.oracle.bodies import Leg
 from scenarios.truth.oracle.numbers import Number
-from scenarios.truth.oracle.ties import Contact, TieOutcome
+from scenarios.truth.oracle.ties import ENDLESS, TOO_MANY, Contact, TieOutcome, key
 
 ACCUMULATED = 64  # collisions of one disk ...
 INSTANT = 1e-9  # ... within this many s accumulate; in a fast scene ...
 SHARE = 1e-7  # ... within this share of the time in which a disk moves by its radius
+SUSPECT, OFTEN = 16, 4  # collisions of a disk, and of one contact of it, that may accumulate
 NAMED = 1e-5  # s before that; the bodies it collides with in this time are named in the reason
 
 
 class MotionEnds(Exception):
     """The motion has no exact answer from `t` s on; str() says why.
 
-    disks: those it concerns. outcomes: the possible outcomes, if they are known.
+    disks: those it concerns. outcomes: the possible outcomes, if they are known. few_bits: whether
+    numbers of more bits would go on.
     """
+
+    few_bits = False
 
     def __init__(
         self, t: float, reason: str, disks: Sequence[int] = (), outcomes: Sequence[TieOutcome] = ()
@@ -65,6 +69,7 @@ class Path:
         disks: those that the reason concerns.
         outcomes: the possible outcomes at the end, if they are known.
         named: the collisions of each outcome: disk, other disk or -1 - wall.
+        few_bits: whether it ends because its numbers have too few bits.
     """
 
     legs: list[list[Leg]]
@@ -74,6 +79,7 @@ class Path:
     disks: list[int] = field(default_factory=list)
     outcomes: list[TieOutcome] = field(default_factory=list)
     named: list[list[tuple[int, int]]] = field(default_factory=list)
+    few_bits: bool = False
 
     def cut(self, end: float, reason: str) -> Path:
         """The motion up to an earlier end, for another reason."""
@@ -86,10 +92,12 @@ class RecentCollisions:
     Attributes:
         instant: s; so many collisions within it accumulate. At e = 1 it is 0: there are finitely
             many collisions in a finite time (Vaserstein, Commun. Math. Phys. 69, 31, 1979).
+        since: disk -> s, when its collisions began to accumulate.
+        closed: the latest contacts of each disk whose collisions have died out.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.collisions: list[deque[tuple[float, str]]] = [
+        self.collisions: list[deque[tuple[float, Contact]]] = [
             deque(maxlen=4 * ACCUMULATED) for _ in range(scene.n)
         ]
         radius = float(scene.radius.min())
@@ -100,21 +108,59 @@ class RecentCollisions:
         self.instant = min(INSTANT, SHARE * radius / fastest) if fastest else INSTANT
         if scene.restitution == 1:
             self.instant = 0.0
+        self.since: dict[int, float] = {}
+        self.closed: list[deque[tuple[float, Contact]]] = [deque(maxlen=OFTEN) for _ in scene.mass]
 
-    def add(self, i: int, t: float, other: str) -> None:
-        """Disk i collides with `other` at t s. Raises `MotionEnds` where its collisions
-        accumulate."""
+    def add(self, t: float, contact: Contact) -> list[int]:
+        """Note a collision at t s; those of its disks whose collisions may accumulate."""
+        disks = [i for i in contact.disks if i < len(self.collisions)]
+        for i in disks:
+            self.collisions[i].append((t, contact))
+            if i not in self.since and self.within(i, ACCUMULATED, t):
+                self.since[i] = self.collisions[i][-ACCUMULATED][0]
+        return [i for i in disks if self.within(i, SUSPECT, t)]
+
+    def within(self, i: int, count: int, t: float) -> bool:
+        """Whether the latest `count` collisions of disk i, up to t s, lie within an instant."""
         collisions = self.collisions[i]
-        collisions.append((t, other))
-        if len(collisions) < ACCUMULATED or t - collisions[-ACCUMULATED][0] > self.instant:
-            return
-        others = sorted({name for at, name in collisions if at > t - NAMED})
-        disks = [i, *(int(name[5:]) for name in others if name.startswith("disk"))]
-        raise MotionEnds(
-            collisions[-ACCUMULATED][0],
-            f"the collisions of disk {i} on {' and '.join(others)} accumulate",
-            disks,
-        )
+        return len(collisions) >= count and t - collisions[-count][0] <= self.instant
+
+    def close(self, contacts: Sequence[Contact], t: float) -> None:
+        """Forget the collisions of these contacts: they have closed, at t s."""
+        closed = {key(contact) for contact in contacts}
+        for i in {i for c in contacts for i in c.disks if i < len(self.collisions)}:
+            collisions = self.collisions[i]
+            open_ones = [entry for entry in collisions if key(entry[1]) not in closed]
+            self.collisions[i] = deque(open_ones, collisions.maxlen)
+            self.since.pop(i, None)
+            self.closed[i].extend((t, contact) for contact in contacts if i in contact.disks)
+
+    def dying(self, i: int, t: float) -> list[Contact]:
+        """The contacts, connected to disk i by others of them, whose collisions accumulate at t s:
+        those with `OFTEN` or more within an instant, and those that have closed in it: a disk in
+        a wedge may bounce to its rest on one wall between two bounces on the other one."""
+        contacts, waiting = dict[tuple[object, ...], Contact](), [i]
+        for disk in waiting:
+            latest = [c for at, c in self.collisions[disk] if t - at <= self.instant]
+            count = Counter(map(key, latest))
+            shortly = [c for at, c in self.closed[disk] if t - at <= self.instant]
+            for contact in [*latest, *shortly]:
+                if contact in shortly or count[key(contact)] >= OFTEN:
+                    contacts.setdefault(key(contact), contact)
+                    more = {j for j in contact.disks if j < len(self.collisions)}
+                    waiting += sorted(more - {*waiting})
+        return list(contacts.values())
+
+    def ends(self, i: int, t: float, name: Callable[[Contact, int], str]) -> MotionEnds:
+        """Why the motion ends where the collisions of disk i accumulate, up to t s.
+
+        name: the other side of a contact of disk i, in words.
+        """
+        latest = [contact for at, contact in self.collisions[i] if at > t - NAMED]
+        others = sorted({name(contact, i) for contact in latest})
+        disks = [i, *(int(other[5:]) for other in others if other.startswith("disk"))]
+        reason = f"the collisions of disk {i} on {' and '.join(others)} accumulate"
+        return MotionEnds(self.since[i], reason, disks)
 
 
 def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
@@ -122,8 +168,13 @@ def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
     what, their = f"disks {', '.join(map(str, disks))} touch at once", "their"
     if len(disks) == 1:
         what, their = f"disk {disks[0]} touches several walls at once", "its"
-    if not ends[-1].velocities:
+    if ends[-1].unresolved == ENDLESS:
         return f"{what} and {their} collisions do not end"
+    if ends[-1].unresolved == TOO_MANY:
+        return (
+            f"{what}, {their} collisions have more orders than can be tried, and the outcome may"
+            " depend on the order"
+        )
     return (
         f"{what} and the outcome depends on the order of {their} collisions ({len(ends)} outcomes)"
     )

@@ -6,13 +6,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from itertools import combinations
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from scenarios.truth.oracle.clusters import collapse, complementary, is_m_matrix
 from scenarios.truth.oracle.friction import Friction, limited
-from scenarios.truth.oracle.numbers import Number, Numbers
+from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
 MOST_ORDERS = 3000  # collisions tried in all orders together
-LONGEST = 200  # collisions of one order at one instant; more count as endless
+LARGEST_COLLAPSE = 0.5  # restitution; a larger one needs more contacts than are tried
+LONGEST = 200  # collisions of one order at one instant, and more where one order stands for all
+ENDLESS, TOO_MANY = "endless", "too many"
+DECAYED = 1e-6  # of the largest approach: an order that is as long by then does not end
+MERGE_FROM = 50  # collisions tried; few orders are found faster than whether their states repeat
 
 
 class Contact(NamedTuple):
@@ -20,7 +28,7 @@ class Contact(NamedTuple):
 
     kind: "body", disk j or an end point (j from n on); "wall", a side of wall j; "edge", of the
     wrap across axis j; "end", of wall j on which it rests; "rest", its bounces on a side of wall j
-    have died out; "slip end", its slip on wall j ends.
+    have died out; "slip end", its slip on wall j ends; "probe", until then it touches nothing.
     """
 
     kind: str
@@ -32,6 +40,12 @@ class Contact(NamedTuple):
     def disks(self) -> set[int]:
         """The bodies whose motion it changes; an end point may be among them."""
         return {self.i, self.j} if self.kind == "body" else {self.i}
+
+
+def key(contact: Contact) -> tuple[Any, ...]:
+    """A key for a contact: the same from both disks of a pair, different for the two sides of a
+    wall."""
+    return ("body", *sorted((contact.i, contact.j))) if contact.kind == "body" else tuple(contact)
 
 
 class Touch(NamedTuple):
@@ -60,11 +74,15 @@ Velocities = dict[int, Velocity]
 
 class TieOutcome(NamedTuple):
     """A possible outcome of simultaneous contacts: velocities, the collisions in one order, and the
-    contacts with exactly no speed along their normal (`still`)."""
+    contacts with exactly no speed along their normal (`still`).
+
+    unresolved: `ENDLESS` or `TOO_MANY` for orders that were not followed to an outcome; "" else.
+    """
 
     velocities: Velocities
     collisions: list[Collision]
     still: frozenset[Contact]
+    unresolved: str = ""
 
 
 @dataclass(frozen=True)
@@ -167,30 +185,35 @@ class CollisionLaw:
         still: contacts with exactly no speed along their normal.
         stays_still: whether a collision on one contact keeps another one `still`.
 
-        If some order does not end, the last outcome has no velocities.
+        If some order does not end, or there are too many, the last outcome has no velocities. Equal
+        states are followed once only; where the contacts form a Coxeter group, one order is.
         """
+        if len(touches) > 1 and (closed := self.closed(touches, v, still)):
+            return [closed], len(touches)
         sign, ends = self.numbers.sign, list[TieOutcome]()
-        waiting = [TieOutcome(v, [], still)]
+        waiting, known = [TieOutcome(v, [], still)], dict[tuple[float, ...], list[TieOutcome]]()
+        one_order, unresolved, first = self.any_order_will_do(touches), TOO_MANY, 0.0
         for tried in range(MOST_ORDERS):
             if not waiting:
                 return ends, tried
-            now, collisions, still = waiting.pop()
-            if len(collisions) > LONGEST:
-                break
+            now, collisions, still, _ = waiting.pop()
+            speeds = [(touch, self.approach(touch, now)) for touch in touches]
             closing = [
-                touch
-                for touch in touches
-                if touch.contact not in still and sign(self.approach(touch, now)) < 0
+                (touch, speed)
+                for touch, speed in speeds
+                if touch.contact not in still and sign(speed) < 0
             ]
+            fastest = max((abs(float(speed)) for _, speed in closing), default=0.0)
+            first = first or fastest
             # Collisions whose speed decays to the tie have no end: more digits would give more of
             # them.
-            if (
-                collisions
-                and not self.numbers.proves
-                and any(abs(self.approach(t, now)) < self.least_approach for t in closing)
-            ):
+            decays = not self.numbers.proves and any(
+                abs(speed) < self.least_approach for _, speed in closing
+            )
+            if collisions and (decays or (len(collisions) > LONGEST and not one_order)):
+                unresolved = ENDLESS if decays or fastest < DECAYED * first else TOO_MANY
                 break
-            for touch in closing:
+            for touch, _ in closing[-1:] if one_order else closing:
                 after, collision = self.collide(touch, now)
                 kept = {
                     c
@@ -198,10 +221,149 @@ class CollisionLaw:
                     if not c.disks & touch.contact.disks or stays_still(c, touch.contact)
                 }
                 kept |= {touch.contact} if self.sticks else set()
-                waiting.append(TieOutcome(after, [*collisions, collision], frozenset(kept)))
+                state = TieOutcome(after, [*collisions, collision], frozenset(kept))
+                if one_order or tried < MERGE_FROM or not self._repeats(state, known):
+                    waiting.append(state)
             if not closing and not any(self._same(now, end.velocities) for end in ends):
                 ends.append(TieOutcome(now, collisions, still))
-        return [*ends, TieOutcome({}, [], frozenset())], MOST_ORDERS
+        return [*ends, TieOutcome({}, [], frozenset(), unresolved)], MOST_ORDERS
+
+    def any_order_will_do(self, touches: Sequence[Touch]) -> bool:
+        """Whether elastic collisions of these contacts are reflections that generate a Coxeter
+        group: all angles between two of them are 180 / k degrees, k = 2, 3, 4 or 6. Then every
+        order leads to the same velocities, in as many collisions (Humphreys, Reflection Groups and
+        Coxeter Groups, 1990, 1.8 and 5.13)."""
+        k = self.numbers
+        if len(touches) < 3 or float(self.restitution) != 1 or self.friction is not None:
+            return False
+        a, pairs = delassus(self, touches), combinations(range(len(touches)), 2)
+        try:
+            return all(
+                not k.sign(a[i][j])
+                or (
+                    k.sign(a[i][j]) < 0
+                    and any(not k.sign(4 * a[i][j] ** 2 - n * a[i][i] * a[j][j]) for n in (1, 2, 3))
+                )
+                for i, j in pairs
+            )
+        except Undecided:
+            return False
+
+    def _repeats(self, state: TieOutcome, known: dict[tuple[float, ...], list[TieOutcome]]) -> bool:
+        """Whether a state is certainly one of the known ones; if not, it is added."""
+        place = tuple(
+            round(float(x), 9) for i in sorted(state.velocities) for x in state.velocities[i]
+        )
+        same = known.setdefault(place, [])
+        try:
+            if any(
+                state.still == other.still and self._same(state.velocities, other.velocities)
+                for other in same
+            ):
+                return True
+        except Undecided:
+            pass
+        same.append(state)
+        return False
+
+    def closed(
+        self, touches: Sequence[Touch], v: Velocities, still: frozenset[Contact]
+    ) -> TieOutcome | None:
+        """The outcome where the collisions close contacts for good, the same in every order: at e =
+        0, or where no order of collisions ends. None where this is not known to be so, or where
+        friction acts."""
+        k, e = self.numbers, float(self.restitution)
+        if e >= LARGEST_COLLAPSE or any(k.sign(self.slip(touch, v)) for touch in touches):
+            return None
+        matrix = delassus(self, touches)
+        if not is_m_matrix(k, matrix):
+            return None
+        q = [k.exact(0.0) if t.contact in still else self.approach(t, v) for t in touches]
+        impulses = complementary(k, matrix, q)
+        if impulses is None or (not self.sticks and not self.collapses(matrix, impulses, e)):
+            return None
+        return self.close(touches, v, still, impulses)
+
+    def collapses(
+        self, matrix: Sequence[Sequence[Number]], impulses: Mapping[int, Number], e: float
+    ) -> bool:
+        """Whether every order of collisions closes the contacts with these impulses; the others are
+        then never touched, as no impulse is larger than these."""
+        active = list(impulses)
+        part = np.array([[float(matrix[a][b]) for b in active] for a in active])
+        return len(active) > 1 and collapse(part, np.array([float(impulses[a]) for a in active]), e)
+
+    def close(
+        self,
+        touches: Sequence[Touch],
+        v: Velocities,
+        still: frozenset[Contact],
+        impulses: Mapping[int, Number],
+    ) -> TieOutcome | None:
+        """The outcome of these impulses, after which their contacts have no speed along the normal;
+        None if friction would act then."""
+        k, root = self.numbers, self.numbers.sqrt
+        after = apply(self, touches, impulses, v)
+        if any(k.sign(self.slip(touch, after)) for touch in touches):
+            return None
+        moved = {i for a in impulses for i in touches[a].contact.disks}
+        at_rest = {c for c in still if not c.disks & moved}
+        closed, collisions = {touches[a].contact for a in impulses}, list[Collision]()
+        for a, impulse in sorted(impulses.items()):
+            contact, dx, dy = touches[a]
+            (ux, uy, _), (px, py, _) = self._pair(touches[a], v)
+            square, b = dx * dx + dy * dy, self.approach(touches[a], v)
+            # A contact that was closed before has no angle.
+            meets = contact not in still and k.sign(b) < 0
+            speed2 = (px - ux) * (px - ux) + (py - uy) * (py - uy)
+            cosine = -b / root(square * speed2) if meets else float("nan")
+            collisions.append(Collision(contact, impulse * root(square), cosine))
+        others = {
+            t.contact
+            for a, t in enumerate(touches)
+            if t.contact in still - at_rest
+            and a not in impulses
+            and not k.sign(self.approach(t, after))
+        }
+        return TieOutcome(after, collisions, frozenset(at_rest | closed | others))
+
+    def slip(self, touch: Touch, v: Mapping[int, Velocity]) -> Number:
+        """m2/s (m/s at a wall), the speed of the contact points along the tangent times |dr|; 0
+        without friction."""
+        if self.friction is None:
+            return self.numbers.exact(0.0)
+        (ux, uy, spin), (px, py, turn) = self._pair(touch, v)
+        radius, i, j = self.friction.radius, touch.contact.i, touch.contact.j
+        turning = radius[i] * spin + (radius[j] * turn if touch.contact.kind == "body" else 0)
+        distance = self.numbers.sqrt(touch.dx * touch.dx + touch.dy * touch.dy)
+        return touch.dx * (py - uy) - touch.dy * (px - ux) - distance * turning
 
     def _same(self, one: Mapping[int, Velocity], other: Mapping[int, Velocity]) -> bool:
         return all(self.numbers.sign(a - b) == 0 for i in one for a, b in zip(one[i], other[i]))
+
+
+def delassus(law: CollisionLaw, touches: Sequence[Touch]) -> list[list[Number]]:
+    """(K, K) the change of dr.dv of each contact by 1 impulse, times dr, at each."""
+    return [[_coupling(law, one, other) for other in touches] for one in touches]
+
+
+def _coupling(law: CollisionLaw, one: Touch, other: Touch) -> Number:
+    a, b, total = one.contact, other.contact, law.numbers.exact(0.0)
+    for body in a.disks & b.disks:
+        product = law.inverse_mass[body] * (one.dx * other.dx + one.dy * other.dy)
+        total = total + product if (body == a.i) == (body == b.i) else total - product
+    return total
+
+
+def apply(
+    law: CollisionLaw, touches: Sequence[Touch], forces: Mapping[int, Number], v: Velocities
+) -> Velocities:
+    """The vectors v (x, y, spin) of bodies after these impulses, or under these forces."""
+    after = dict(v)
+    for a, force in forces.items():
+        contact, dx, dy = touches[a]
+        for body, way in ((contact.i, -1), (contact.j, 1))[: len(contact.disks)]:
+            x, y, spin = after[body]
+            kick = way * force * law.inverse_mass[body]
+            after[body] = x + kick * dx, y + kick * dy, spin
+    return after

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from reports.check.command import PAGE
-from reports.check.formats.junit import JUNIT
+from reports.check.formats import JUNIT
 from reports.run.made import is_sealed, may_overwrite, sealed
 from reports.terminal.exits import FolderTaken
 

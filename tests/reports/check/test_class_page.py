@@ -13,7 +13,7 @@ from playwright.sync_api import Browser
 
 from adapters.own_solver.file import SolverText
 from reports.check.class_page import NOTHING, bars, causes, distribution, write_class_page
-from reports.check.formats.marks_csv import csv_text
+from reports.check.formats import csv_text
 from reports.check.marks import Marked
 from reports.check.page import write_page as write_file_page
 from reports.check.terminal import print_tasks

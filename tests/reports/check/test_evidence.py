@@ -15,7 +15,7 @@ from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from reports.check.accesses import Access, accesses_of, part_of
 from reports.check.consequences import with_consequences
-from reports.check.formats.questions_json import SCHEMA, as_json
+from reports.check.formats import SCHEMA, as_json
 from reports.check.lines import Source
 from reports.check.loop import LEAVES_PAIRS_OUT
 from reports.check.questions import QUESTIONS, ask, ask_in_two_orders

@@ -17,9 +17,7 @@ import pytest
 
 from reports.check.class_page import write_class_page
 from reports.check.command import alphabetical, grading_of
-from reports.check.formats.formats import FORMATS
-from reports.check.formats.prairielearn import LARGEST
-from reports.check.formats.questions_json import SCHEMA
+from reports.check.formats import FORMATS, SCHEMA
 from reports.check.marks import Marked, id_of
 from reports.check.outcomes import OUTCOMES
 from reports.check.points import AS_A_WHOLE, DEFAULT, QUESTIONS, BadPoints, Points, read_points
@@ -261,8 +259,6 @@ READERS: dict[str, Callable[[str], Any]] = {
     "json": json.loads,
     "junit": read_xml,
     "gradescope": json.loads,
-    "prairielearn": json.loads,
-    "classroom": json.loads,
     "csv": read_csv,
 }
 
@@ -309,11 +305,10 @@ def test_every_format_says_which_points_a_person_decides_on(tmp_path: Path):
     said = "10 points could not be judged: a person decides."
 
     assert (one.points, one.not_judged) == (10.0, 10.0)
-    for name in ("table", "junit", "gradescope", "prairielearn"):
+    for name in ("table", "junit", "gradescope"):
         assert said in FORMATS[name].text([one]), name
-    for name in ("gradescope", "prairielearn", "classroom"):
-        for points in (3, 4):
-            assert f"{points} points could not be judged" in FORMATS[name].text([one]), name
+    for points in (3, 4):
+        assert f"{points} points could not be judged" in FORMATS["gradescope"].text([one])
     assert READERS["csv"](FORMATS["csv"].text([one]))[0]["not judged"] == "10"
     assert "A person decides on the points under" in (tmp_path / "class.html").read_text()
 
@@ -326,14 +321,6 @@ def test_every_format_says_which_points_a_person_decides_on(tmp_path: Path):
         ("gradescope", lambda one: one["tests"][0].pop("score")),
         ("gradescope", lambda one: one.update(points=1)),
         ("gradescope", lambda one: one["tests"][0].update(number=1)),
-        ("prairielearn", lambda one: one.update(score=20)),
-        ("prairielearn", lambda one: one.pop("score")),
-        ("prairielearn", lambda one: one.update(gradable=False)),
-        ("prairielearn", lambda one: one["tests"][0].update(points=-1)),
-        ("prairielearn", lambda one: one.update(images=[{"url": "http://a.png"}])),
-        ("classroom", lambda one: one["tests"][0].update(status="passed")),
-        ("classroom", lambda one: one.pop("max_score")),
-        ("classroom", lambda one: one["tests"][0].pop("score")),
         ("json", lambda one: one["files"][0].pop("id")),
         ("json", lambda one: one["files"][0]["marks"]["1"].update(points=-1)),
         ("csv", lambda rows: rows[0].update({None: ["more"]})),
@@ -356,54 +343,30 @@ def test_a_schema_rejects_what_its_reader_would_not_take(name: str, edit: Callab
 
 
 def test_all_formats_tell_the_same_points():
-    """Gradescope and Classroom add up tests; PrairieLearn has a share of 1."""
+    """Gradescope adds up its tests."""
     for one in students():
         written = {name: READERS[name](FORMATS[name].text([one])) for name in READERS}
         (line,) = written["csv"]
-        sums = {
-            name: sum(test["score"] for test in written[name]["tests"])
-            for name in ("gradescope", "classroom")
-        }
 
-        assert sums == {"gradescope": one.points, "classroom": one.points}
+        assert sum(test["score"] for test in written["gradescope"]["tests"]) == one.points
         assert written["gradescope"]["score"] == one.points
         assert float(line["total"]) == one.points
         assert written["json"]["files"][0]["points"] == one.points
-        if written["prairielearn"]["gradable"]:
-            assert written["prairielearn"]["score"] == pytest.approx(one.points / one.most)
 
 
 def test_a_status_means_the_same_in_every_format():
     """The one table; what is refused, or could not be asked, never passes."""
     faulty = students()[1]
-    tests = {
-        name: [test["status"] for test in json.loads(FORMATS[name].text([faulty]))["tests"]]
-        for name in ("gradescope", "classroom")
-    }
+    tests = json.loads(FORMATS["gradescope"].text([faulty]))["tests"]
     statuses = [mark.status for mark in faulty.tasks]
 
     assert statuses == ["right", "right", "right", "fault", "not asked"]
-    assert tests == {
-        name: [getattr(OUTCOMES[status], name) for status in statuses] for name in tests
-    }
+    assert [test["status"] for test in tests] == [
+        OUTCOMES[status].gradescope for status in statuses
+    ]
     assert [status for status, one in OUTCOMES.items() if one.points != "given"] == [
         status for status, one in OUTCOMES.items() if one.gradescope == "failed"
     ]
-
-
-def test_what_cannot_be_loaded_costs_no_attempt_and_says_why():
-    """PrairieLearn: not gradable; a wrong file is."""
-    gradable = [json.loads(FORMATS["prairielearn"].text([one])) for one in students()]
-
-    assert [one["gradable"] for one in gradable] == [True, True, True, False, False, True]
-    assert gradable[4]["format_errors"] == ["holds no .js file"]
-
-
-def test_results_for_prairielearn_stay_below_the_size_it_reads():
-    """However much the messages of a file say."""
-    loud = [row(task, name, "fault", name + "\N{SNOWMAN}" * 50_000) for task, name in FEW]
-
-    assert len(FORMATS["prairielearn"].text([marked(*loud)]).encode()) < LARGEST
 
 
 FEW = [(task, name) for task, names in QUESTIONS.items() for name in names[:3]]

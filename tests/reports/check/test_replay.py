@@ -4,16 +4,19 @@ and the rows below it on paper."""
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
 from reports.check.page import WATCHED, speed_of, write_page
+from reports.check.smallest import Smallest, scenario_of
 from reports.check.verdict import FileCheck
+from scenarios.model import Array, Trajectory
 from tests.reports.check.marked import marks_of
 from tests.reports.check.test_outputs import faults_in
-from tests.reports.check.test_picture import smallest
 from tests.reports.page.browsing import opened
 
 # what the picture writes at a time, but for its scale bar
@@ -26,6 +29,23 @@ WRITTEN = """t => {
 }"""
 
 
+@cache
+def smallest() -> Smallest:
+    """A head-on pair; `yours` stays where it is."""
+    scenario = scenario_of([(-1, 0, 1, 0, 1, 1), (1, 0, 0, 0, 1, 2)], (0, 0, 0), 0.9, 0.02)
+    assert scenario is not None
+    count = len(scenario.times)
+    still = motion(scenario.times, np.repeat(scenario.scene.position[np.newaxis], count, axis=0))
+    moved = still.position + np.array([0.5, 0.0]) * scenario.times[:, np.newaxis, np.newaxis]
+    return Smallest(scenario, "sphere 0 rests", still, motion(scenario.times, moved))
+
+
+def motion(t: Array, position: Array) -> Trajectory:
+    """Spheres at these places that do not turn."""
+    zero = np.zeros(position.shape[:2])
+    return Trajectory(t, position, np.zeros_like(position), zero, zero)
+
+
 @pytest.mark.parametrize(("duration", "speed"), [(0.3, 0.1), (1.0, 0.25), (2.0, 0.5), (9.0, 1)])
 def test_a_short_scene_is_played_slowly(duration: float, speed: float):
     """So that it lasts long enough, where the slowest speed suffices; never faster than it is."""
@@ -35,7 +55,8 @@ def test_a_short_scene_is_played_slowly(duration: float, speed: float):
 
 def test_where_a_sphere_has_gone_is_said(browser: Browser, tmp_path: Path):
     """At the edge of the picture, by an arrow and its distance, as long as it is outside; the page
-    begins at the speed of its scene, and on paper a heading stays with its table."""
+    begins at the speed of its scene; on paper it stands at its end, and a heading stays with its
+    table."""
     one = smallest()
     position = one.yours.position.copy()
     position[-1, 0] += [40.0, 0.0]
@@ -47,6 +68,8 @@ def test_where_a_sphere_has_gone_is_said(browser: Browser, tmp_path: Path):
     page.wait_for_function("() => window.players[1]")
     [early, late] = [page.evaluate(WRITTEN, t) for t in (0.0, one.scenario.duration)]
     speed, chosen = page.evaluate("[players[1].speed, document.querySelector('.speed').value]")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    printed = page.evaluate("players[1].time")
     page.emulate_media(media="print")
     breaks = page.evaluate(
         "['h2', 'h2+p'].map((each) => getComputedStyle(document.querySelector(each)).breakAfter)"
@@ -59,3 +82,4 @@ def test_where_a_sphere_has_gone_is_said(browser: Browser, tmp_path: Path):
     assert 35 < float(late[0].split()[0]) < 40
     assert speed == float(chosen) == speed_of(one.scenario.duration)
     assert breaks == ["avoid"] * 2
+    assert printed == one.scenario.duration

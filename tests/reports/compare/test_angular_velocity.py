@@ -34,7 +34,7 @@ def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(
         assert blind is not None
         # what is near the end is not judged
         assert wrong.value > 0.9 * abs(factor - 1) * np.abs(spin[1:-4]).max()
-        assert wrong.note == right.note == read[0].carried
+        assert wrong.note == right.note == read[0].carried(read[0].judged_spin)
         assert (right.value, blind.value) == (0, 0)
 
 

@@ -121,7 +121,9 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 
     assert len(collisions) == 2
     assert (view.judged == (~near & (view.played.t > 0))[:, None]).all()
-    assert view.carried == f"{view.judged.sum()} of {2 * one.intervals} samples of a disk"
+    assert (
+        view.carried(view.judged) == f"{view.judged.sum()} of {2 * one.intervals} samples of a disk"
+    )
 
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
@@ -142,7 +144,7 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
     view = View(one, one.dt(1), replace(found, collisions=collisions), found)
     value = METRICS["velocity_max"].of(view)
 
-    assert view.share < LEAST_SHARE
+    assert view.share(view.judged) < LEAST_SHARE
     assert value is not None
     assert np.isnan(value.value)
     assert value.note.startswith(f"{NOT_JUDGED}: only ")

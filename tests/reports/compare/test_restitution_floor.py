@@ -9,7 +9,7 @@ from adapters.play import play
 from reports.compare import restitution
 from reports.compare.metrics import METRICS
 from reports.compare.restitution import FLOOR, effective_restitution
-from reports.compare.view import NOT_JUDGED, Value, View
+from reports.compare.view import Value, View
 from scenarios.catalogue import scenario
 from scenarios.model import Collisions, Scene, Trajectory
 
@@ -85,33 +85,33 @@ def read(name: str, engine: str, substeps: int) -> dict[str, Value | None]:
     ("name", "substeps"), [("gas_of_100", 1), ("box_billiard", 1), ("box_billiard", 2)]
 )
 def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
-    """Box2D 3.1 as shipped lets a slow disk stick to a wall, and reports a collision whenever it
-    comes nearer again."""
+    """Box2D 3.1 as shipped lets a slow disk stick to a wall (e = 0), and reports a collision
+    whenever it comes nearer again."""
     found = read(name, "box2d_v3:shipped", substeps)["restitution_error"]
 
-    assert found is None or found.value < 1 or found.note.startswith(NOT_JUDGED)
+    assert found is not None
+    # the noise of a contact has e = -1, an error of 2
+    assert found.value < 1.5
 
 
 def test_without_the_floor_it_would_be_read_as_minus_one(monkeypatch: pytest.MonkeyPatch):
     """The control: of most of the collisions that are read nothing is left of the velocity but its
     sign."""
     monkeypatch.setattr(restitution, "FLOOR", 0.0)
-    found = read("gas_of_100", "box2d_v3:shipped", 1)["restitution"]
+    found = read("gas_of_100", "box2d_v3:shipped", 1)["restitution_error"]
 
     assert found is not None
-    assert found.value < -0.99
+    assert found.value > 1.99
 
 
 def test_what_is_below_the_floor_is_counted_in_the_note():
-    """With the number where others are read, and in its place where none is."""
+    """Of a run in which nothing is below it, no word."""
     found = read("gas_of_100", "box2d_v3:shipped", 1)
     matched = read("gas_of_100", "box2d_v3:matched", 1)["restitution"]
     galperin = read("galperin_31", "box2d_v3:shipped", 1)["restitution"]
 
     for value in found.values():
         assert value is not None
-        assert np.isnan(value.value)
-        assert value.note.startswith(f"{NOT_JUDGED}: no collision read, ")
         assert " below the floor" in value.note
     assert matched is not None
     assert matched.note.endswith(" collisions read")

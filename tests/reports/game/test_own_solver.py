@@ -27,8 +27,7 @@ from reports.commands.own_solvers import checked
 from reports.commands.serve import application
 from reports.game.command import PATIENCE, game_of, own_rows
 from reports.game.flight import FRAME, Flight, field_scenario
-from reports.game.page import labels
-from reports.game.server import Game
+from reports.game.server import Game, labels
 from reports.game.session import Session
 from reports.page import server
 from reports.page.own_solvers import with_lines
@@ -411,15 +410,15 @@ def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Pa
 
 
 def test_an_engine_in_a_file_flies(tmp_path: Path):
-    """As the reference does, to rounding, under thrust; one that does not model what the game has
-    is refused with its name and what it lacks."""
+    """As the reference does, to rounding, under thrust, over the edges as `coulomb`; one that does
+    not model what the game has is refused with its name and what it lacks."""
     text = TEMPLATES["javascript"].read_text()
     path, ball = tmp_path / "mine.js", tmp_path / "ball.js"
     path.write_text(text)
     ball.write_text(text.replace('models = "disks walls', 'models = "walls'))
     rows, restitution = own_rows([f"{path}:own"])
     ENGINES.update(rows)
-    flight = Flight(field_scenario(0, 5), [f"{path}:own", "reference:exercise"])
+    flight = Flight(field_scenario(0, 5), [f"{path}:own", "reference:coulomb"])
     flight.key("w", True)
     flight.advance(20)
     mine, reference = flight.flyers

@@ -193,7 +193,7 @@ def test_ghosts_part_after_the_first_collision_and_the_marker_names_the_pair(
     story = page.locator("tr[data-engine='pymunk:shipped'] [data-cell=diverged]").inner_text()
     marks = page.evaluate("game.sky.last[3]")
 
-    # A step at the edge: stepping engines set what wraps onto it, and lose what it flew on beyond.
+    # The exercise sets what leaves onto the edge, and loses what it flew on beyond.
     assert max(together) < 0.71 * FRAME / 16
     assert {diverged["i"], diverged["j"]} == {collisions.i[0], collisions.j[0]}
     assert 0 <= diverged["t"] - collisions.t[0] <= 2 * FRAME

@@ -13,7 +13,7 @@ from adapters.play import play
 from adapters.run import Run
 from reports.compare.comparison import Comparison, compare
 from reports.lessons.catalogue import LESSONS
-from reports.page.page import write_page
+from reports.page.report import write_page
 from scenarios.catalogue import scenario
 
 HOSTILE = (

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, Page
 from adapters.engines import ENGINES
 from adapters.play import play
 from adapters.run import Run
+from reports.compare import laws
 from reports.compare.comparison import Comparison
 from reports.page import overview, panels
 from reports.page.cost_points import NO_CLOCK, RunTimes
@@ -71,7 +72,7 @@ def test_of_many_disks_the_one_is_drawn_that_is_farthest_from_its_place():
     [disk] = drawn_of(many).disks
     assert many.truth is not None
     off = [
-        np.hypot(*(run.trajectory.position[: len(many.truth)] - many.truth.position).T).max(axis=1)
+        laws.deviation(run.trajectory, many.truth, many.scenario.scene).max(axis=0)
         for run in many.runs
         if run.trajectory is not None
     ]

@@ -320,8 +320,7 @@ def test_one_scene_is_described_without_counts_of_scenes():
         "In a the matched settings take box2d farther from the exact answer."
     )
     assert findings.where_it_fails(engines, ["ok"]) == (
-        "More than one radius off, or without a result: box2d:matched; every cell was played"
-        " to its end."
+        "More than one radius off, or failed: box2d:matched; every cell was played to its end."
     )
     assert findings.unranked_sentence("reference:ordered", off, situations.RIGHT, {}) == (
         "reference:ordered is within 10⁻⁶ radii of the exact answer. It is not ranked among the"
@@ -347,7 +346,7 @@ def test_findings_and_summary_have_one_median(comparisons: list[Comparison]):
     rows = overview.summary(comparisons, names, set())
 
     assert {name: rows[name][0].value for name in names} == off.median().to_dict()
-    assert rows["box2d_v3:shipped"][0].worst == "no result"
+    assert rows["box2d_v3:shipped"][0].worst == "fails"
 
 
 @pytest.mark.slow
@@ -484,8 +483,7 @@ def test_every_engine_of_the_table_has_its_worst_scene(
     for row in asked:
         shown = [row.best, *(row.others if row.best.median <= 1 else []), *filter(None, [row.own])]
         said = [
-            f"worst {number(one.worst, 2).replace('∞', 'no result')} in {one.worst_in}"
-            for one in shown
+            f"worst {number(one.worst, 2).replace('∞', 'fails')} in {one.worst_in}" for one in shown
         ]
         assert rows[row.title] == (said if len(row.scenes) > 1 else [])
     assert any(rows.values())

@@ -1,8 +1,9 @@
-"""`crosscheck bits`: which engines have other bits than those that are kept, and from where on."""
+"""`crosscheck run --bits`: which engines have other bits than those kept, and from where on."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +11,31 @@ import pytest
 
 from adapters.engines import ENGINES, UNASKED, told_apart
 from adapters.play import play_once
-from reports.commands import bits as command
 from reports.run import bits
-from reports.run.cells import Cell
+from reports.run.archive import Archive
+from reports.run.journal import Journal
 from reports.run.scenes import open_scene
+from reports.run.suite import carry_out
+from reports.run.tasks import Means, RunPlan
+from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 from tests.measured import MEASURED, TABLE
 from tests.reports.terminal.command_line import crosscheck
 
+SCENE = "head_on_equal_e09"
 
-def row(name: str, scene: str = "head_on_equal_e09") -> dict[str, str]:
-    """Of one engine, played here."""
-    scenario = open_scene(scene, 0)
-    return bits.bits_here(Cell(scene, 0, name, 2), ENGINES[name], scenario)
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of two engines, of which no bits are kept."""
+    folder = tmp_path_factory.mktemp("bits")
+    names = ("pymunk:matched", "reference:exercise")
+    plan = RunPlan(
+        [SCENE], {name: ENGINES[name] for name in names}, 0, [], False, timings=0, command="test"
+    )
+    with Journal(folder) as journal, Progress() as progress:
+        carry_out(plan, Means(workers=2), journal, progress)
+    return folder
 
 
 def compared(kept: Sequence[dict[str, str]], now: Sequence[dict[str, str]]):
@@ -31,12 +44,19 @@ def compared(kept: Sequence[dict[str, str]], now: Sequence[dict[str, str]]):
     return bits.differences(*tables)
 
 
-def test_the_same_engine_has_the_same_bits_and_another_has_not():
-    """Also where both are right: the last place tells them apart."""
-    one, again, other = row("pymunk:matched"), row("pymunk:matched"), row("reference:exercise")
+def test_the_same_engine_has_the_same_bits_and_another_has_not(made: Path):
+    """At the middle step size, as it plays in this process; also where both are right: the last
+    place tells them apart."""
+    one, other = bits.rows_of(Archive.read(made))
+    scenario = open_scene(SCENE, 0)
+    dt = scenario.dt(scenario.middle_substeps)
+    again = play_once(ENGINES["pymunk:matched"].make, "pymunk:matched", scenario, dt).trajectory
+    assert again is not None
+    same = dict(zip(("bits", "until"), bits.bits_of(again)))
 
-    assert compared([one], [again])[0] == []
-    assert one["bits"] == again["bits"] != other["bits"]
+    assert one["dt_s"] == other["dt_s"] == f"{dt:.9g}"
+    assert compared([one], [one | same])[0] == []
+    assert one["bits"] == same["bits"] != other["bits"]
 
 
 @pytest.mark.parametrize(("at", "said"), [(0, (-1, 0)), (3, (2, 4)), (5, (4, 8))])
@@ -72,36 +92,42 @@ def test_an_engine_is_kept_in_every_scene():
     assert (TABLE.bits[TABLE.status == "ok"].str.len() == 16).all()
 
 
-def test_the_command_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.slow
+def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """One hash of the kept table is changed: exit status 1, and the engine is named; else 0. An
-    engine of which no bits are kept is named, too."""
-    monkeypatch.setattr(command, "SCENARIOS", {"head_on_equal_e09": None})
-    monkeypatch.setattr(command, "UNASKED", {"pymunk:matched": ENGINES["pymunk:matched"]})
-    kept = tmp_path / "kept.csv"
-    monkeypatch.setattr(command, "KEPT", kept)
+    engine of which no bits are kept is named, too. A resumed run compares again."""
+    kept, again = tmp_path / "kept.csv", ("run", "--resume", "out")
+    monkeypatch.setattr(bits, "KEPT", kept)
     kept.write_text(bits.written([], {"system": "Linux"}))
-    empty = crosscheck("bits", "--out", "here.csv", cwd=tmp_path)
-    kept.write_bytes((tmp_path / "here.csv").read_bytes())
-    same = crosscheck("bits", cwd=tmp_path)
-    *about, line = (tmp_path / "here.csv").read_text().splitlines()
-    hashes = line.rsplit(" ", 3)
-    kept.write_text(
-        "\n".join([*about, " ".join([hashes[0], "0000 0000 0000"])]).replace(
-            line.split(",")[5], "0" * 16
-        )
-        + "\n"
-    )
-    other = crosscheck("bits", cwd=tmp_path)
-    unwritable = crosscheck("bits", "--out", "nowhere/here.csv", cwd=tmp_path)
+    words = ("run", SCENE, "--engine", "pymunk:matched", "--timings", "0", "--bits", "--out", "out")
+    empty = crosscheck(*words, cwd=tmp_path)
+    here = (tmp_path / "out" / "bits.csv").read_text()
+    kept.write_text(here)
+    same = crosscheck(*again, cwd=tmp_path)
+    *about, line = here.splitlines()
+    hashes = " ".join([line.rsplit(" ", 3)[0], "0000 0000 0000"])
+    kept.write_text("\n".join([*about, hashes]).replace(line.split(",")[5], "0" * 16) + "\n")
+    other = crosscheck(*again, cwd=tmp_path)
 
     assert (empty.returncode, same.returncode, other.returncode) == (1, 0, 1)
-    assert "No bits are kept of pymunk:matched." in empty.stdout
+    assert "No bits are kept of pymunk:matched" in empty.stdout
     assert "No bits are kept" not in same.stdout
-    assert "pymunk:matched in head_on_equal_e09: the same bits up to sample" in other.stdout
-    assert (unwritable.returncode, unwritable.stderr.count("\n")) == (2, 1)
+    assert f"pymunk:matched in {SCENE}: the same bits up to sample" in other.stdout
+
+
+def test_random_scenes_of_another_seed_are_not_compared(made: Path):
+    """The kept bits are those of seed 0."""
+    archive = Archive.read(made)
+    seeded = replace(archive, records=[record | {"seed": 1} for record in archive.records])
+
+    assert len(bits.rows_of(archive)) == 2
+    assert bits.rows_of(seeded) == []
 
 
 @pytest.mark.long
 def test_this_machine_has_the_kept_bits(tmp_path: Path):
-    """Here; elsewhere an engine may have others, which is what the command is for."""
-    assert crosscheck("bits", cwd=tmp_path).returncode == 0
+    """Here; elsewhere an engine may have others, which is what the option is for."""
+    engines = [word for name in sorted(MEASURED) for word in ("--engine", name)]
+    words = ("run", *engines, "--timings", "0", "--bits", "--out", "out")
+
+    assert crosscheck(*words, cwd=tmp_path).returncode == 0

@@ -18,7 +18,7 @@ from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
 from reports.run import suite
 from reports.run.cells import digest
-from reports.run.diff import ROUNDING, Timing, difference, is_rounding, timing
+from reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
 from reports.run.journal import Journal
 from reports.run.suite import carry_out
 from reports.run.tables import seal_of
@@ -176,6 +176,29 @@ def test_where_versions_differ_the_metric_says_what_is_worse(
     assert "differs in version: pymunk: 7.3.1 before, 8.0 after" in changed.warnings
     assert {one.verdict for one in changed.numbers if "against truth" in one.what} == {verdict}
     assert {one.verdict for one in changed.numbers if "against pymunk" in one.what} <= {"other"}
+
+
+def test_a_verdict_that_fails_now_is_worse_and_one_that_passes_still_is_neither(
+    before: Path, after: Path
+):
+    """And the other way round it is better."""
+    edit(after, elsewhere)
+    table = pd.read_csv(after / "deviations.csv")
+    rows = table.index[table.metric == "tunnelled"]
+    table.loc[rows[0], "value"] = 1.0
+    overlap = table.index[table.metric == "overlap"][0]
+    table.loc[overlap, "value"] = 0.5 * table.loc[overlap, "bound"]
+    put_table(table, after)
+
+    def verdicts(changes: list[Change]) -> set[tuple[str, str]]:
+        return {(one.what.split("  ")[-1], one.verdict) for one in changes}
+
+    same = ("overlap against itself", "other")
+    assert verdicts(difference(before, after).numbers) == {
+        ("tunnelled against itself", "worse"),
+        same,
+    }
+    assert ("tunnelled against itself", "better") in verdicts(difference(after, before).numbers)
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_a_line_that_is_none_of_ours_is_named(small: Path, tmp_path: Path, line:
     journal = tmp_path / "out" / "journal.jsonl"
     header, *rest = journal.read_text().splitlines(keepends=True)
     journal.write_text("".join([header, line + "\n", *rest]))
-    for command in (["report", "out"], ["diff", small, "out"], ["replay", "0", "--out", "out"]):
+    for command in (["report", "out"], ["diff", small, "out"]):
         done = crosscheck(*command, cwd=tmp_path)
         assert done.returncode == 2
         assert "line 2:" in done.stderr.replace("\n", " ")
@@ -129,7 +129,6 @@ def test_a_second_writer_is_refused_and_a_dead_one_is_no_hindrance(small: Path, 
             "less than or equal to 1000000000",
         ),
         (["run", "slow_collision", "--memory", "10"], "--memory 10: a worker needs 400 MB"),
-        (["replay", "zzz", "--out", "whole"], "'zzz' is no cell of"),
         (["diff", "whole", "nowhere"], "nowhere: has no journal.jsonl"),
     ],
 )

@@ -137,13 +137,9 @@ def test_from_another_folder_the_same_files_are_played(home: Path, tmp_path: Pat
     (there / "in" / "my.toml").write_text(SCENE.replace("mass = 2.0", "mass = 3.0"))
     (there / "mine.py").write_text("raise SystemExit\n")
     done = crosscheck("run", "--resume", "../home/out", cwd=there)
-    replayed = crosscheck(
-        "replay", cell_of(home / "out", "mine.py"), "--out", "../home/out", cwd=there
-    )
 
     assert done.returncode == 0, done.stderr
     assert last_of(home / "out")["footer"]["played"] == 0
-    assert "bits:    as recorded" in replayed.stdout
     assert sorted(path.name for path in home.iterdir()) == ["in", "mine.py", "out"]
 
 

@@ -242,24 +242,6 @@ def test_the_page_of_a_check_shows_the_text_that_was_checked(tmp_path: Path):
     assert "The smallest scene" in page
 
 
-@pytest.mark.slow
-def test_a_replay_says_that_the_file_is_another(tmp_path: Path):
-    """What is played is what is there now."""
-    path = place(tmp_path, "plain.py", 1)
-    assert crosscheck(*WORDS, "--engine", path.name, "--out", "out", cwd=tmp_path).returncode == 0
-    (record,) = Archive.read(tmp_path / "out").records
-    same = crosscheck("replay", record["cell"], "--out", "out", cwd=tmp_path)
-    place(tmp_path, "plain.py", 2)
-    other = crosscheck("replay", record["cell"], "--out", "out", cwd=tmp_path)
-
-    assert "has changed since" not in same.stderr
-    assert (
-        "plain.py, or a version, has changed since the run; the present one is played"
-        in other.stderr
-    )
-    assert "bits:    not as recorded" in other.stdout
-
-
 def test_a_run_says_which_modules_beside_the_file_were_played(tmp_path: Path):
     """In its settings, with a hash over all, so that two runs can be distinguished."""
     run = played(row_of_file(place(tmp_path, "beside", 1)))

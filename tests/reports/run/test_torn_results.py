@@ -1,4 +1,4 @@
-"""What is not as it was written is named by `report`, `diff` and `replay`, and played again by `run
+"""What is not as it was written is named by `report` and `diff`, and played again by `run
 --resume`."""
 
 import io
@@ -91,17 +91,6 @@ def test_a_torn_trajectory_is_worse_for_diff_and_named(whole: Path, torn: Path, 
     assert crosscheck("diff", whole, whole, cwd=torn.parent).returncode == 0
 
 
-@pytest.mark.parametrize("tear", ["empty", "of other shapes"])
-def test_replay_says_that_a_trajectory_is_torn_and_plays_from_the_start(torn: Path, tear: str):
-    """It is not taken for the last good state."""
-    path = first_file(torn)
-    TEARS[tear](path)
-    done = crosscheck("replay", path.stem, "--out", torn, cwd=torn.parent)
-
-    assert f"{path.name} is not what was written" in done.stderr
-    assert "from:    step 0" in done.stdout
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("tear", ONE_TEAR)
 def test_the_report_names_a_torn_trajectory_and_shows_all_else(whole: Path, torn: Path, tear: str):
@@ -177,18 +166,14 @@ def test_a_file_that_diff_cannot_read_is_named(
 
 @pytest.mark.parametrize("text", ["", "not a scene", None])
 def test_a_scene_copy_that_is_torn_is_named(whole: Path, torn: Path, text: str | None):
-    """Exit 2 of `report` and `replay`, with the file."""
+    """Exit 2 of `report`, with the file."""
     copy = torn / "scenes" / "two-disks.toml"
     if text is None:
         copy.unlink()
     else:
         copy.write_text(text)
-    record = next(
-        record for record in Archive.read(torn).records if record["scenario"] == "two-disks"
-    )
-    for command in (["report", torn], ["replay", record["cell"], "--out", torn]):
-        done = crosscheck(*command, cwd=torn.parent)
+    done = crosscheck("report", torn, cwd=torn.parent)
 
-        assert done.returncode == 2
-        assert str(copy) in done.stderr.replace("\n", "")
+    assert done.returncode == 2
+    assert str(copy) in done.stderr.replace("\n", "")
     assert whole.exists()

@@ -20,7 +20,7 @@ from reports.speed.measure import Measured
 from reports.speed.plan import SCENE, middle
 from reports.speed.versus import COMPARED
 from scenarios.catalogue import SCENARIOS, scenario
-from tests.measured import MEASURED
+from tests.measured import MEASURED, NOT_YET_TIMED
 from tests.reports.speed import statements as speed_figures
 from tests.reports.speed.statements import MATCHED, SHIPPED
 
@@ -74,11 +74,12 @@ def test_the_kept_tables_have_every_scene_and_measured_engine():
         speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED)
     )
 
+    scenes = set(SCENARIOS) - NOT_YET_TIMED
     assert set(zip(orders.scenario, orders.name)) == {
-        (scene, name) for scene in SCENARIOS for name in DISTINCT if name in MEASURED
+        (scene, name) for scene in scenes for name in DISTINCT if name in MEASURED
     }
     assert set(zip(budgets.scenario, budgets.name)) == {
-        (scene, name) for scene in SCENARIOS for name in WITH_MECHANISMS
+        (scene, name) for scene in scenes for name in WITH_MECHANISMS
     }
 
 
@@ -243,8 +244,19 @@ def test_the_readme_says_how_much_each_form_measures():
     root = Path(__file__).parents[3]
     text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
 
-    assert f"the cost of up to {QUICK.sizes[-1]} disks" in text
+    assert f"the cost of up to {QUICK.sizes[-1]:,} disks".replace(",", " ") in text
     assert f"`--full` takes all scenes and up to {FULL.sizes[-1]:,} disks".replace(",", " ") in text
     assert set(FULL.scenes) == set(SCENARIOS)
     assert {len(scenario(name).substeps) for name in SCENARIOS} == {4}
     assert "at 4 step sizes" in (root / "README.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "fails"), [("reference:exercise", True), ("box2d:matched", False)]
+)
+def test_what_fails_a_verdict_is_infinitely_far_off(name: str, fails: bool):
+    """A disk of 100 kg falls through one of 1 kg and the floor."""
+    scene = str(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "heavy_on_light.toml")
+    (row,) = ladder.errors_of(scene, 0, name, ENGINES[name].make, [4])
+    assert (row["status"], np.isinf(row["error_radii"])) == ("fails" if fails else "ok", fails)
+    assert row["until_s"] == 3

@@ -258,14 +258,17 @@ def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
 
 def test_the_line_of_a_sweep_goes_over_all_its_values_from_cheap_to_expensive(results: Results):
     """Its ends are named; beside it the ladder of its engine, from four times its dt to an eighth
-    of it."""
+    of it. At its coarsest step disks tunnel: that point is at the edge."""
     points = results.sweeps[results.sweeps.scenario == "falling_box"]
-    drawn = {trace.name: trace for trace in go.Figure(charts.sweeps(points)).data}
+    traces = go.Figure(charts.sweeps(points)).data
+    drawn = {trace.name: trace for trace in traces if trace.mode != "markers"}
+    (edge,) = [t for t in traces if t.name == "pymunk:matched" and t.mode == "markers"]
     sweep = drawn["pymunk:matched+iterations"]
 
     assert len(sweep.x) == len(sweep.y) == 8
     assert (sweep.texttemplate[0], sweep.texttemplate[-1]) == ("1", "200")
-    assert len(drawn["pymunk:matched"].x) == 6
+    assert len(drawn["pymunk:matched"].x) + len(edge.x) == 6
+    assert all("fails, tunnels" in text for text in edge.text)
 
 
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):

@@ -21,10 +21,10 @@ SPEED = (ROOT / "reports" / "speed" / "README.md").read_text("utf-8")
 
 def test_the_caption_of_the_picture_follows_from_the_kept_table():
     """Word for word but for line breaks: `python -m tests.reports.speed.statements` prints it."""
-    assert speed_figures.caption(figures.read(figures.KEPT)) in " ".join(FRONT.split())
-    assert "the geometric mean over the scenes, without the best and the worst quarter" in " ".join(
-        FRONT.split()
-    )
+    text = " ".join(SPEED.split())
+
+    assert speed_figures.caption(figures.read(figures.KEPT)) in text
+    assert "the geometric mean over the scenes, without the best and the worst quarter" in text
 
 
 def stated(text: str) -> list[tuple[float, float]]:
@@ -59,8 +59,8 @@ def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detectio
     assert sorted(spoken_of) == sorted(late)
     ordered = {"reference:ordered", "event_driven:float64"}
     assert late & MEASURED == (set(DISTINCT) & MEASURED) - ordered
-    assert outside(kept, FRONT) == set()
-    assert ("below 1: the error grows" in " ".join(FRONT.split())) == (
+    assert outside(kept, SPEED) == set()
+    assert ("below 1: the error grows" in " ".join(SPEED.split())) == (
         speed_figures.halving(kept)[0] < 1
     ).any(axis=None)
 
@@ -68,7 +68,7 @@ def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detectio
         worse = kept.copy()
         coarsest = (worse.figure == "pooled error") & (worse["at"] == "0")
         worse.loc[coarsest & (worse.engine + ":" + worse.profile == name), "value"] /= 10
-        assert outside(worse, FRONT) == {name}
+        assert outside(worse, SPEED) == {name}
 
 
 def test_the_scenes_in_which_smaller_steps_do_not_help_are_counted_for_every_engine():

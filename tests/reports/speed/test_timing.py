@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
+from time import sleep
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from adapters.engines import ENGINES
 from reports.run.stepping import Spent
 from reports.run.timing import (
     FEWEST_ROUNDS,
@@ -20,8 +23,9 @@ from reports.run.timing import (
 from reports.speed import ladder, sizes
 from reports.speed.effort import QUICK
 from reports.speed.estimate import READY, all_rounds
+from reports.speed.measure import IN_PILE, Measured, samples_table
 from reports.speed.scored_part import scored
-from reports.speed.tables import summed_up
+from reports.speed.tables import cost_of_sleep, end_of_all_pairs, summed_up
 from scenarios.catalogue import scenario
 from scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
@@ -154,13 +158,95 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
     assert max(ages) <= sizes.RESTART_AFTER + sizes.WARM_STEPS
 
 
+def test_the_worst_step_is_that_of_the_engine_and_not_of_the_machine():
+    """The fourth step of a gas takes 5 ms; a pause that comes in one replay alone is no step."""
+    pauses = iter([*[0.0] * 7, 0.05, *[0.0] * 99])  # in the first replay, at the seventh step
+
+    class Slow(Sleeper):
+        def load(self, scene: Scene, dt: float) -> None:
+            super().load(scene, dt)
+            self.taken = 0
+
+        def step(self, count: int = 1) -> None:
+            self.taken += count
+            sleep(next(pauses) + (5e-3 if self.taken == 4 else 0.0))
+
+    gas = sizes.RunningGas.__new__(sizes.RunningGas)
+    gas.engine, gas.scene, gas.first = Slow(0.0), sizes.gas(3, 0), 1
+
+    # a sleep may take longer, the 50 ms would stand out
+    assert 5e-3 <= gas.worst_step(1e-3, 8e-3) < 0.04
+
+
+@pytest.mark.parametrize(
+    ("costs", "sentence"),
+    [
+        ({10: 2.0, 100: 8.0}, "Testing all pairs costs more than fast:own from 32 disks on."),
+        ({10: 0.5, 100: 1.0}, ""),  # dearer everywhere
+        ({10: 99.0, 100: 999.0}, ""),  # nowhere
+    ],
+)
+def test_where_all_pairs_stop_paying_is_said_in_a_sentence(costs: dict[int, float], sentence: str):
+    """All pairs cost 1 and 16: equal to an engine of 2 and 8 at the square root of 10 times 100."""
+    rows = [("reference", "exercise", n, cost) for n, cost in ((10, 1.0), (100, 16.0))]
+    rows += [("fast", "own", n, cost) for n, cost in costs.items()]
+    table = pd.DataFrame(rows, columns=["engine", "profile", "n", "cost"])
+
+    assert end_of_all_pairs(table) == sentence
+
+
+def test_a_settled_pile_costs_less_asleep_and_nothing_in_it_moves():
+    """Columns of disks at rest: awake each step solves its contacts."""
+    engines = {
+        ("pymunk:matched", change): partial(ENGINES["pymunk:matched"].make, **settings)
+        for change, settings in (("", {}), ("sleeping", {"sleep_time_threshold": 0.5}))
+    }
+    samples = sizes.pile_costs(engines, 5, 0.1, seed=0)
+    least = {key: min(s.cost for s in samples if s.key == key) for key in engines}
+    with closing(ENGINES["pymunk:matched"].make()) as engine:
+        start = sizes.pile(sizes.PILE)
+        engine.load(start, sizes.DT)
+        engine.step(sizes.SETTLED)
+        moved = np.abs(engine.read().position - start.position).max()
+
+    assert 3 * least["pymunk:matched", "sleeping"] < least["pymunk:matched", ""]
+    assert moved < sizes.RADIUS / 5
+
+
+def test_the_cost_of_sleep_is_a_sentence():
+    """Of the engines that were timed both ways."""
+    rows = [
+        {"kind": IN_PILE, "engine": "a", "profile": "b", "change": change, "n": 100, "cost": cost}
+        for change, cost in (("", 2e-5), ("sleeping", 1e-6))
+    ]
+    samples = samples_table(
+        [
+            {
+                "round": 0,
+                "wrapping": 0.0,
+                "runs": 1,
+                "dt_s": 0.0,
+                "copy_of": 0,
+                "place": 0,
+                "scenario": "",
+                **row,
+            }
+            for row in rows
+        ]
+    )
+
+    said = cost_of_sleep(Measured(samples=samples))
+    assert said == "A step of a settled pile of 100 disks costs, in µs: a:b 20, with sleeping 1."
+    assert cost_of_sleep(Measured()) == ""
+
+
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
     """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below
     that."""
     engines = {"sleeper:own": partial(Sleeper, 2e-3)}
-    samples, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
+    samples, worst, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
 
-    assert {sample.key[1] for sample in samples} == {3, 4}
+    assert {sample.key[1] for sample in samples} == {3, 4} == {sample.key[1] for sample in worst}
     assert list(stopped) == [("sleeper:own", 5)]
     assert "longer than 0.001 s" in stopped["sleeper:own", 5]
 

@@ -43,12 +43,13 @@ COLUMNS = (
 
 
 class Kept(NamedTuple):
-    """A row of the file: case, engine, form, verdict, where it works and fails, its reason and how
-    that was tested."""
+    """A row of the file: case, engine, form, what failed, verdict, where it works and fails, its
+    reason and how that was tested."""
 
     case: str
     engine: str
     form: str
+    predicate: str
     verdict: str
     works_at: float
     fails_at: float
@@ -64,6 +65,7 @@ def kept(file: Path = FILE) -> list[Kept]:
             row["case"],
             engine_of(row),
             row["form"],
+            row["predicate"],
             row["verdict"],
             number(row["works_at"]),
             number(row["fails_at"]),
@@ -159,10 +161,9 @@ def in_words(row: Kept) -> str:
     """Where it fails first, to two digits; * where it works again beyond. A spin to three: what is
     2 % off and what is refused at the cap itself are two limits."""
     words = {"does not fail": "–", "never works": "everywhere"}
-    return words.get(
-        row.verdict,
-        style.number(row.fails_at, 3 if row.case == "spin" else 2) + ("" if row.monotone else "*"),
-    )
+    where = style.number(row.fails_at, 3 if row.case == "spin" else 2)
+    refused = "refused from " if row.predicate == "refused" else ""
+    return words.get(row.verdict, f"{refused}{where}{'' if row.monotone else '*'}")
 
 
 def keep(folder: Path) -> None:

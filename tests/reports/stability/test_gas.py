@@ -15,7 +15,6 @@ from adapters.pymunk import Pymunk
 from reports.compare import laws
 from reports.stability.cases import CASES
 from reports.stability.cases_gas import RADIUS, gas, wrapped_run
-from reports.stability.hard_disks import compressibility, gas_in_box
 from reports.stability.limits import QUICK
 from reports.stability.predicates import judge
 from reports.stability.predicates_gas import (
@@ -25,7 +24,9 @@ from reports.stability.predicates_gas import (
     TEMPERATURES_PART,
     WRONG_GAS,
     block_error,
+    compressibility,
     counted,
+    gas_in_box,
     in_blocks,
     literature,
     shares_of_speeds,

@@ -19,12 +19,13 @@ from reports.stability.interventions import (
     INTERVENTIONS,
     intervention_of,
     reason_by_intervention,
+    with_settings,
 )
 from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
 from reports.stability.reasons import reason_of
 from reports.stability.search import LimitSearch
-from reports.stability.variants import DRIVEN_ENGINES, play_as
-from reports.stability.vary import VARIES, case_of_file, varied
+from reports.stability.variants import DRIVEN_ENGINES
+from reports.stability.vary import VARIES, case_of_file, similar, varied
 from scenarios.files.scene_file import read_scene_file
 from scenarios.truth.exact import with_oracle
 
@@ -33,14 +34,14 @@ SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 @cache
 def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
-    """The limit on a scene of tests/data/scenes, with the intervention that removes its failure,
-    asked without an ablation."""
+    """The limit on a scene of tests/data/scenes, with the settings or the intervention that remove
+    its failure, asked without an ablation."""
     path = str(SCENES / scene)
     search = LimitSearch(case_of_file(path, what), engine, QUICK)
-    limit = search.limit()
-    [known] = explained(
-        [replace(limit, case=f"{path}:{what}", intervention=intervention_of(search, limit))]
-    )
+    limit = with_settings(search, replace(search.limit(), case=f"{path}:{what}"))
+    if not limit.settings_help:
+        limit = replace(limit, intervention=intervention_of(search, limit))
+    [known] = explained([limit])
     return known
 
 
@@ -49,8 +50,8 @@ def found(what: str, engine: str, scene: str = "two.toml") -> Limit:
     [
         ("offset", "box2d:matched", "positions are float32"),
         ("offset", "box2d_v3:matched", "positions are float32"),
-        ("scale", "box2d:shipped", "threshold of restitution"),
-        ("scale", "box2d_v3:shipped", "cap on speed"),
+        ("scale", "box2d:shipped", "`b2_maxTranslation`"),
+        ("scale", "box2d_v3:shipped", "`maximum_linear_speed` 400; set 1e+09"),
         (
             "speed",
             "reference:exercise",
@@ -66,13 +67,6 @@ def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, 
     assert expected in limit.reason
     assert limit.tested.startswith("works ")
     assert limit.why == limit.reason
-
-
-def test_a_threshold_shows_where_the_scene_closes_at_it():
-    """Disks that meet at 2 m/s meet at less than 1 m/s in a scene half as large; later a collision
-    is missing for it."""
-    assert 0 < found("scale", "box2d:shipped").fails_at < 0.5
-    assert found("scale", "box2d:matched").verdict == "does not fail"
 
 
 def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_called_not_known():
@@ -98,22 +92,6 @@ def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_cal
     assert replace(nothing, reason=reason).why == reason
 
 
-@pytest.mark.parametrize("change", ["faster", "slower", "larger", "smaller"])
-@pytest.mark.parametrize("engine", ["reference:exercise", "reference:ordered"])
-def test_a_solver_without_units_plays_a_similar_scene_to_the_same_bits(change: str, engine: str):
-    """So that none of these changes can help by chance: in it only what has a unit of its own plays
-    otherwise."""
-    one = replace(read_scene_file(SCENES / "bumper.toml"), substeps=(1,))
-    other = INTERVENTIONS[change].change(one)
-    run, same = play_as(engine, one).trajectory, play_as(engine, other).trajectory
-    assert run is not None
-    assert same is not None
-    size = float(other.scene.radius[0] / one.scene.radius[0])
-
-    assert np.array_equal(run.position * size, same.position)
-    assert len(run.collisions) == len(same.collisions) > 0
-
-
 def test_the_answer_of_a_similar_scene_is_the_one_of_the_scene():
     """Against the oracle's own, where it can follow both: they differ by the last places of the
     scene's numbers."""
@@ -128,7 +106,7 @@ def test_the_answer_of_a_similar_scene_is_the_one_of_the_scene():
         assert np.abs(mine.velocity - its.velocity).max() < 1e-12
         assert np.abs(mine.collisions.impulse - its.collisions.impulse).max() < 1e-12
         assert np.abs(mine.collisions.t - its.collisions.t).max() < 1e-12
-    fast = INTERVENTIONS["faster"].change(one)
+    fast = similar(one, tempo=32.0)
     own = with_oracle(fast).truth
     assert fast.truth is not None
     assert own is not None
@@ -191,13 +169,13 @@ def test_a_disk_that_float32_keeps_where_it_is_fails():
 
 
 def test_a_disk_whose_speed_an_engine_caps_fails():
-    """Box2D moves a disk by 2 m in a step at most: 480 m/s in steps of 1/240 s. At 1200 m/s the
+    """Box2D moves a disk by 2 m in a step at most: 240 m/s in steps of 1/120 s. At 1200 m/s the
     ball does not get as far as the exact answer says, whatever its velocity is read to be."""
     search = LimitSearch(case_of_file(str(SCENES / "bullet.toml"), "speed"), "box2d:shipped", QUICK)
     fast = search.trial(10.0)
 
     assert (fast.works, fast.broken) == (False, "wrong distance")
-    assert fast.event == "disk 0 moves by 0.4 of its distance"
+    assert fast.event == "disk 0 moves by 0.2 of its distance"
     assert search.trial(1.0).works
 
 

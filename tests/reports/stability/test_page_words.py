@@ -8,8 +8,8 @@ from reports.page.sections import limits_of
 from reports.page.situations import FAR_OFF
 from reports.page.style import number
 from reports.stability.cases import CASES
-from reports.stability.limits import Case
-from reports.stability.overview import held, in_report
+from reports.stability.limits import LIMIT, Case, Limit, Trial
+from reports.stability.overview import findings, held, in_report, in_words
 from scenarios.catalogue import SCENARIOS, scenario
 
 COLUMN = "column_of_ten"
@@ -20,6 +20,18 @@ def played_with(case: Case, value: float) -> tuple[str, set[str]]:
     one = case.scene(value, 0)
     radii = one.scene.radius[~one.scene.static]
     return f"{number(1e3 * one.dt(one.substeps[0]))} ms", {number(r) for r in radii}
+
+
+@pytest.mark.parametrize(("broken", "words"), [("refused", "refused from 3"), ("escape", "3")])
+def test_a_refusal_is_no_limit(broken: str, words: str):
+    """The table says so, and it is not counted as one."""
+    trial = Trial(3.0, 1, 1, 1.0, event="it is cut", broken=broken)
+    limit = Limit("spin", "box2d:matched", "quick", LIMIT, 1.0, 3.0, (trial,))
+    limits, refused = (0, 1) if broken == "refused" else (1, 0)
+
+    assert in_words(limit) == words
+    assert f"{limits} found a limit" in findings([limit])[0]
+    assert f"in {refused} the engine refused" in findings([limit])[0]
 
 
 @pytest.mark.parametrize("name", ["slow_collision", "column", "tunnelling_thick_wall", "spin"])

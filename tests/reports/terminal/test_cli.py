@@ -185,16 +185,32 @@ def test_truth_prints_the_exact_answer(tmp_path: Path):
     assert (answer["horizon_s"], answer["reason"], len(answer["collisions"])) == (10.0, "", 20)
 
 
+def test_truth_prints_the_state_of_each_disk_at_a_time(tmp_path: Path):
+    """A closed form, a computed answer, a time beyond the horizon, and a time out of range."""
+    text = crosscheck("truth", "free_fall", "--at", "0.5", cwd=tmp_path).stdout
+    assert "at 0.5 s" in text
+    assert "spin, rad/s" in text
+    stacked = str(SCENES / "break.toml")
+    early = json.loads(crosscheck("truth", stacked, "--at", "0", "--json", cwd=tmp_path).stdout)
+    cue = early["state"]["disks"][0]
+    assert cue["velocity_m_s"] == [1.0, 0.0]
+    late = crosscheck("truth", stacked, "--at", "1.9", cwd=tmp_path)
+    assert (late.returncode, late.stdout) == (1, "")
+    assert "no exact answer at 1.9 s: disks 0, 1, 2 touch at once" in late.stderr
+    never = crosscheck("truth", stacked, "--at=-1", cwd=tmp_path)
+    assert (never.returncode, never.stdout) == (2, "")
+    assert "--at -1: must be from 0 to" in never.stderr
+
+
 def test_truth_says_why_there_is_none(tmp_path: Path):
     """Exit 1: the scene is read, the answer is not known."""
-    turning = (
-        SCENES / "two.toml"
-    ).read_text() + '\n[[thrust]]\ndisk = 0\nstart = 0\nstop = 1\nforce = [1, 0]\nframe = "body"\n'
+    thrust = "disk = 0\nstart = 0\nstop = 2\nforce = [1, 0]\nframe = 'body'\n"
+    turning = f"{(SCENES / 'two.toml').read_text()}\n[[thrust]]\n{thrust}"
     (tmp_path / "turning.toml").write_text(turning)
-    done = crosscheck("truth", "turning.toml", cwd=tmp_path)
+    done = crosscheck("truth", "turning.toml", "--at", "1.5", cwd=tmp_path)
 
     assert done.returncode == 1
-    assert "no exact answer: a thrust that turns with its disk" in done.stderr
+    assert "while a thrust that turns with it acts" in done.stderr
 
 
 @pytest.mark.parametrize("terminal", [True, False])

@@ -83,7 +83,6 @@ STALLED = {
         ["lesson", "order", "--export", "order.html"],
         "reports.lessons.lesson:play_once",
     ),
-    "a cell in replay": (["replay", "", "--out", "done"], "reports.run.playing:play_once"),
 }
 # what the gate plays of these
 FEW = ("the answer in run", "a limit in stability", "a scene in check")
@@ -121,8 +120,6 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
     """Ctrl-C goes to the whole group, as from a terminal, SIGTERM to the command alone: no process
     outlives it."""
     words, stalled = STALLED[stage]
-    if words[0] == "replay":
-        words = [words[0], pd.read_csv(place / "done" / "runs.csv").cell[0], *words[2:]]
     command = Command(*words, cwd=place, stalled=stalled).stalled()
     ended = command.stop(how, whole_group=how == signal.SIGINT)
 

@@ -1,2 +1,0 @@
-"""What `crosscheck check` writes for programs, a file for each format; formats.py is the table of
-them."""

@@ -1,0 +1,122 @@
+"""Rest, slopes and collapse: the exact answers against `resting_motion.py`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenarios.model import Scenario, Scene
+from scenarios.truth.exact import computed
+from tests.independent.resting_motion import ball_on_slope, column, stepped
+
+pytestmark = pytest.mark.independent
+MANY = pytest.param(450, marks=pytest.mark.long)
+STEP = 1e-4  # s
+
+
+def slope_scene(seed: int) -> tuple[Scene, float]:
+    """A ball above a slope, or above a level floor, with friction or none; and its duration, s."""
+    draw = np.random.default_rng([39, seed])
+    angle = draw.uniform(-0.6, 0.6) * (draw.random() < 0.8)
+    along, up = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    radius, mass = draw.uniform(0.1, 0.5), draw.uniform(0.3, 4)
+    scene = Scene(
+        position=[(radius + draw.uniform(0.05, 1.0)) * up],
+        velocity=[draw.normal(size=2) * 1.5],
+        angular_velocity=[draw.normal() * draw.choice([0, 10, 40])],
+        radius=[radius],
+        mass=[mass],
+        inertia=[mass * radius**2 * draw.uniform(0.3, 1.0)],
+        walls=[[-1000 * along, 1000 * along]],
+        gravity=[0, -draw.choice([5.0, 9.81])],
+        restitution=draw.uniform(0.05, 0.8),
+        friction=draw.choice([0.0, 0.05, 0.2, 0.5, 1.5]),
+    )
+    e, g = scene.restitution, -scene.gravity[1] * np.cos(angle)
+    first = np.abs(scene.velocity[0] @ up) + np.sqrt(2 * g * 1.0 + (scene.velocity[0] @ up) ** 2)
+    return scene, float(min(3 * first / g / (1 - e), 6.0)) + 0.5
+
+
+def column_scene(seed: int) -> Scene:
+    """One to four disks above each other, at e = 0 or little."""
+    draw = np.random.default_rng([40, seed])
+    n = int(draw.integers(1, 5))
+    radius, gaps = draw.uniform(0.05, 0.4, n), draw.uniform(0.05, 0.6, n)
+    y = np.cumsum(gaps + 2 * radius) - radius
+    return Scene(
+        position=np.column_stack([np.zeros(n), y]),
+        velocity=np.column_stack([np.zeros(n), draw.normal(size=n) * draw.choice([0, 0.5])]),
+        radius=radius,
+        mass=10 ** draw.uniform(-1, 1, n),
+        walls=[[[-5, 0], [5, 0]]],
+        gravity=[0, -9.81],
+        restitution=draw.choice([0.0, 0.0, 0.1, 0.2]),
+        friction=draw.choice([0.0, 0.5]),
+    )
+
+
+def asked(scene: Scene, duration: float) -> Scenario:
+    """A scenario of this scene."""
+    return Scenario("rest", "?", "random", scene, duration, duration / 40)
+
+
+@pytest.mark.parametrize("count", [30, MANY])
+def test_balls_on_slopes_end_as_in_the_plain_motion(count: int):
+    """Bounces, slides, rolls: all to the end, to 1e-11 m and 1e-11 / s."""
+    for seed in range(count):
+        scene, duration = slope_scene(seed)
+        one = asked(scene, duration)
+        record = computed(one)
+        assert record.reason == "", seed
+        (position, velocity), (_, spin) = record.motion(scene, [], one.times)
+        start, end = scene.walls[0]
+        along = (end - start) / np.hypot(*(end - start))
+        expected, gap = ball_on_slope(scene, one.times)
+        up = np.array([-along[1], along[0]])
+        middle = (start + end) / 2
+
+        np.testing.assert_allclose((position[:, 0] - middle) @ along, expected[:, 0], atol=1e-11)
+        np.testing.assert_allclose(velocity[:, 0] @ along, expected[:, 1], rtol=1e-12, atol=1e-11)
+        # A spin makes no rotation in the record without friction: it is constant then.
+        np.testing.assert_allclose(spin[:, 0], expected[:, 2], rtol=1e-12, atol=1e-10)
+        # The ends of the wall, at 1 km, are rounded to 1e-13 m.
+        height = (position[:, 0] - start) @ up - scene.radius[0]
+        np.testing.assert_allclose(height, gap, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(50, marks=pytest.mark.long)])
+def test_balls_on_slopes_in_small_steps_are_as_near_as_their_step(count: int):
+    """c dt, c = 10 (1 + e) / (1 - e) (v + g T) m/s: each bounce is late by up to a step, at (1 + e)
+    of its speed, and a step of gravity is g T dt / 2."""
+    for seed in range(count):
+        scene, duration = slope_scene(seed)
+        one = asked(scene, duration)
+        (position, velocity), (_, spin) = computed(one).motion(scene, [], np.array([duration]))
+        way, v, w = stepped(scene, duration, round(duration / STEP))
+        along = (scene.walls[0, 1] - scene.walls[0, 0]) / 2000
+        e, g = scene.restitution, -scene.gravity[1]
+        c = 10 * (1 + e) / (1 - e) * (np.hypot(*scene.velocity[0]) + g * duration)
+        assert abs(position[0, 0] @ along - way) < c * STEP, seed
+        assert abs(velocity[0, 0] @ along - v) < c * STEP / duration * 4 + 4 * g * STEP, seed
+        assert abs(spin[0, 0] - w) * scene.radius[0] < c * STEP * 4 + 12 * g * STEP, seed
+
+
+@pytest.mark.parametrize("count", [20])
+def test_columns_come_to_rest_as_in_the_plain_motion(count: int):
+    """Heights to 1e-11 m up to the horizon. An answer ends only where the order of collisions may
+    decide, or is not known not to; four of five last to the end."""
+    ended = 0
+    for seed in range(count):
+        scene = column_scene(seed)
+        one = asked(scene, 2.5)
+        record = computed(one)
+        unknown = any(words in record.reason for words in ("order of", "orders than", "do not end"))
+        assert record.reason == "" or unknown, (seed, record.reason)
+        ended += record.reason == ""
+        times = one.times[one.times < min(record.horizon, one.duration)]
+        (position, _), _ = record.motion(scene, [], times)
+        expected, _ = column(scene, times, np.random.default_rng(seed))
+        np.testing.assert_allclose(
+            position[:, :, 1], expected, rtol=0, atol=1e-11, err_msg=str(seed)
+        )
+    assert ended >= 0.8 * count

@@ -1,0 +1,117 @@
+"""The yardstick fails at every change that changed.toml does not state, and at no other."""
+
+from __future__ import annotations
+
+import importlib.util
+import tomllib
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[1] / ".ci" / "yardstick.py"
+SPEC = importlib.util.spec_from_file_location("yardstick", SCRIPT)
+assert SPEC is not None
+assert SPEC.loader is not None
+yardstick = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(yardstick)
+
+ONE, TWO, NAN = (1.0).hex(), (2.0).hex(), "nan"
+BASE = {"deviation/a/rms": ONE, "deviation/b/rms": ONE, "status/a": "ok", "trajectory/a": "sha:12"}
+
+
+def entry(pattern: str, count: object, direction: str, **more: object) -> str:
+    """An entry of changed.toml."""
+    fields = {"pattern": pattern, "count": count, "direction": direction, "issue": 36}
+    fields |= {"point": "2", "reason": "a reason"} | more
+    return "[[change]]\n" + "".join(f"{key} = {value!r}\n" for key, value in fields.items())
+
+
+def kinds(new: dict[str, str], changes: str = "") -> list[str]:
+    """The faults of a measurement, each by its first word."""
+    return [fault.split("\t")[0] for fault in yardstick.compare(BASE, new, changes)]
+
+
+def test_equal_measurements_and_new_ids_pass():
+    """Without any entry."""
+    assert kinds(BASE) == []
+    assert kinds(BASE | {"deviation/c/rms": ONE}) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        ({"deviation/a/rms": TWO}, "higher"),
+        ({"deviation/a/rms": (1.0 - 2**-53).hex()}, "lower"),
+        ({"deviation/a/rms": NAN}, "status"),
+        ({"status/a": "timeout"}, "status"),
+        ({"trajectory/a": "sha:13"}, "status"),
+    ],
+)
+def test_a_change_without_an_entry_fails(changed: dict[str, str], fault: str):
+    """However small it is, and in whichever direction."""
+    assert kinds(BASE | changed) == [fault]
+
+
+def test_a_missing_id_fails_and_only_gone_allows_it():
+    """ "any" is a change of a value."""
+    new = {key: value for key, value in BASE.items() if key != "status/a"}
+    assert kinds(new) == ["gone"]
+    assert kinds(new, entry("status/*", 1, "any")) == ["gone", "count"]
+    assert kinds(new, entry("status/*", 1, "gone")) == []
+
+
+def test_an_entry_takes_exactly_its_count():
+    """It cannot hide more than it states, nor stay when its change is gone."""
+    new = BASE | {"deviation/a/rms": TWO, "deviation/b/rms": TWO}
+    assert kinds(new, entry("deviation/*/rms", 2, "higher")) == []
+    assert kinds(new, entry("deviation/*/rms", 1, "higher")) == ["count"]
+    assert kinds(new, entry("deviation/*/rms", 3, "any")) == ["count"]
+    assert kinds(BASE, entry("deviation/*/rms", 1, "any")) == ["count"]
+
+
+def test_another_direction_or_pattern_fails():
+    """And the entry, which takes nothing then, too."""
+    new = BASE | {"deviation/a/rms": TWO}
+    assert kinds(new, entry("deviation/*", 1, "lower")) == ["higher", "count"]
+    assert kinds(new, entry("deviation/b/*", 1, "higher")) == ["higher", "count"]
+
+
+def test_a_renamed_id_is_compared_with_its_base():
+    """A new name is no way out."""
+    renamed = '[renamed]\nrms = "root_mean_square"\n'
+    new = {key.replace("rms", "root_mean_square"): value for key, value in BASE.items()}
+    assert kinds(new) == ["gone", "gone"]
+    assert kinds(new, renamed) == []
+    assert kinds(new | {"deviation/a/root_mean_square": TWO}, renamed) == ["higher"]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [entry("*", "all", "any"), entry("*", 1, "up"), entry("*", 1, "any", why="so"), "[[change]]"],
+)
+def test_an_entry_that_is_no_entry_is_refused(wrong: str):
+    """A wrong type, a wrong word, a field too many, a field too few."""
+    with pytest.raises(ValueError, match=r"changed\.toml, entry 1"):
+        yardstick.compare(BASE, BASE, wrong)
+
+
+def test_the_kept_changes_can_be_read_and_the_base_has_every_kind():
+    """The committed files."""
+    yardstick.read_changes((yardstick.KEPT / "changed.toml").read_text())
+    kept = tomllib.loads((yardstick.KEPT / "base.toml").read_text())
+    expected = {"deviation", "status", "trajectory", "truth", "limit", "probe", "check", "lesson"}
+    assert kept["numbers"].keys() == expected | {"exit"}
+
+
+def test_random_scenes_are_the_same_everywhere_and_have_what_they_should():
+    """At least ten scenes of each."""
+    scenes = [tomllib.loads(yardstick.random_scene(k)) for k in range(yardstick.RANDOM_SCENES)]
+    assert yardstick.random_scene(7) == yardstick.random_scene(7)
+    for has in (
+        lambda scene: "wrap" in scene and scene["gravity"][1],
+        lambda scene: "wrap" in scene and scene["friction"],
+        lambda scene: "wall" in scene and scene["friction"] and scene["restitution"] < 1,
+        lambda scene: "thrust" in scene and "box" in scene,
+        lambda scene: any(disk.get("static") for disk in scene["disk"]),
+    ):
+        assert sum(map(bool, map(has, scenes))) >= 10
