@@ -306,11 +306,10 @@ def test_a_disk_at_rest_beside_a_stack_stays_as_alone():
     assert np.abs(ends[0].velocity[4:] - ends[1].velocity).max() < 200 * 4 * ROUNDING
 
 
-@pytest.mark.parametrize("e", [0.5, 1.0])
-def test_a_contact_that_a_collision_opens_pushes_no_more(e):
+def test_a_contact_that_a_collision_opens_pushes_no_more():
     """A disk that is struck after it was held flies off without the force: with it, this scene
     gained up to 2e-3 of its energy in a step."""
-    stack = column([1.0] * 5, e=e)
+    stack = column([1.0] * 5, e=1.0)
     scene = replace(
         stack,
         position=np.vstack([stack.position, [[-3.0, 2.5]]]),
