@@ -138,6 +138,9 @@ def test_a_disk_that_had_time_to_go_round_the_end_of_a_wall_did_not_tunnel():
     slow, fast = 0.6 / one.sample_interval, 1.0 / one.sample_interval
     assert "tunnelled" in failed(one, at(slow))
     assert "tunnelled" not in failed(one, at(fast))
+    # in a corner there is no end to go round
+    corner = replace(one, scene=replace(wall, walls=[*wall.walls, [[0.0, 0.0], [0.0, 5.0]]]))
+    assert "tunnelled" in failed(corner, at(fast))
 
 
 def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step():
