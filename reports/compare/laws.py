@@ -143,7 +143,8 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
 @cached
 def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, int, int]]:
     """(s, disk, -1 - wall) where the centre of a disk crosses a wall between two samples, on a
-    straight line, and had no time to go round an end of the wall.
+    straight line, and had no time to go round an end of the wall. Between an end and another wall
+    nearer than its diameter no disk goes.
 
     If a sample lies on the wall itself, the side of the sample before it counts. A disk that wraps
     moves out of one edge and in at the other, and not across the box; one so fast that it may have
@@ -156,6 +157,11 @@ def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, in
     gained, found = lengths(scene.gravity) * np.diff(t[:2]).sum(), []
     for w, (a, b) in enumerate(scene.walls):
         side, length = cross(x - a, b - a), lengths(b - a)
+        others = np.delete(scene.walls, w, axis=0)
+        gaps = [
+            min((lengths(q - nearest_on_segment(q[None], *c)[0]) for c in others), default=np.inf)
+            for q in (a, b)
+        ]
         tells = np.abs(side) > ON_THE_WALL * scene.radius * length
         last = np.maximum.accumulate(np.where(tells, number, 0), axis=0)[:-1]
         start, end = np.take_along_axis(x, last[..., None], axis=0), x[1:]
@@ -167,10 +173,11 @@ def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, in
             sides = cross(first - a, b - a) * cross(second - a, b - a)
             ends = cross(a - first, way) * cross(b - first, way)
             for k, i in np.argwhere((sides < 0) & tells[1:] & known & (ends <= 0)):
-                along = (b - a) / length * scene.radius[i]
+                r = scene.radius[i]
+                along, span = (b - a) / length * r, (first[k, i], second[k, i])
                 most = (t[k + 1] - t[last[k, i]]) * (speed[k : k + 2, i].max() + gained)
-                span = first[k, i], second[k, i]
-                if min(detour(*span, a - along), detour(*span, b + along)) > most:
+                rounds = zip(gaps, (a - along, b + along))
+                if all(gap < 2 * r or detour(*span, q) > most for gap, q in rounds):
                     found.append((float(t[k + 1]), int(i), -1 - w))
     return found
 

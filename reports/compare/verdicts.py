@@ -292,8 +292,9 @@ class Judge:
         v, way = self.played.velocity, pair.way[:, seen]
         v = (v[:, pair.others[seen]] if pair.others[0] >= 0 else 0.0) - v[:, [pair.disk]]
         nears = np.abs((v * way).sum(axis=2)) / np.maximum(laws.lengths(way), TINY)
-        bound = MOST_OVERLAP + 2 * self.dt * least_of_three(nears) / pair.smaller[seen]
-        stays = least_of_three(depth)
+        nears, stays = least_of_three(nears) / pair.smaller[seen], least_of_three(depth)
+        moves = nears * self.interval > stays  # else they lie in each other, whatever the speed
+        bound = MOST_OVERLAP + np.where(moves, 2 * self.dt * nears, 0.0)
         lasting = (depth[2:] >= STAYS * depth[:-2]) & (stays > bound)
         allowed[2:] = np.where(lasting, bound, allowed[2:])
         depth[2:] = np.where(lasting, stays, depth[2:])

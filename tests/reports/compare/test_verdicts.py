@@ -138,6 +138,9 @@ def test_a_disk_that_had_time_to_go_round_the_end_of_a_wall_did_not_tunnel():
     slow, fast = 0.6 / one.sample_interval, 1.0 / one.sample_interval
     assert "tunnelled" in failed(one, at(slow))
     assert "tunnelled" not in failed(one, at(fast))
+    # in a corner there is no end to go round
+    corner = replace(one, scene=replace(wall, walls=[*wall.walls, [[0.0, 0.0], [0.0, 5.0]]]))
+    assert "tunnelled" in failed(corner, at(fast))
 
 
 def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step():
@@ -184,11 +187,16 @@ def test_an_engine_that_sinks_slowly_fails():
     assert failed(one, moved(truth, down / 10), truth) == {}
 
 
-def test_a_ball_that_rolls_inside_the_floor_fails_at_any_speed():
+def test_a_ball_that_rolls_inside_the_floor_or_seems_to_fall_there_fails():
     one, truth = truth_of("rest_on_floor")
     sunk = moved(truth, np.full(truth.position[:, 0].shape, [0.0, -0.2 * one.scene.radius[0]]))
-    rolling = replace(sunk, velocity=sunk.velocity + [100.0, 0.0])
-    assert failed(one, rolling)["overlap"].value == pytest.approx(0.2, rel=0.02)
+    falling = 0.1 * one.scene.radius[0] / one.sample_interval
+    for velocity in ([100.0, 0.0], [0.0, -falling]):
+        rolling = replace(sunk, velocity=sunk.velocity + velocity)
+        found = verdicts(one, rolling, one.sample_interval)
+        overlap = next(verdict for verdict in found if verdict.id == "overlap")
+        assert overlap.failed
+        assert overlap.value == pytest.approx(0.2, rel=0.02)
 
 
 def test_an_engine_that_lets_a_supported_disk_creep_away_fails():
