@@ -18,6 +18,7 @@ from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.predicates import judge
+from reports.stability.predicates_usable import GHOST
 from reports.stability.search import LimitSearch
 from reports.stability.variants import DrivenEngine, play_as
 from reports.stability.vary import similar
@@ -87,8 +88,7 @@ INTERVENTIONS = {
     "joined": Intervention(
         "*",
         "*",
-        "a ghost collision: the disk hits the end of the next wall of its floor; join them into one"
-        " wall",
+        "the walls of a floor act as several; join them into one wall",
         "on a floor of one wall",
         joined,
     ),
@@ -195,7 +195,9 @@ def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
     if limit.mechanisms:
         return reason_by_ablation(limit)
     if intervention := INTERVENTIONS.get(limit.intervention):
-        return intervention.reason, "", f"works {intervention.how}"
+        ghost = f"a {GHOST}: the disk hits the end of the next wall of its floor; "
+        words = ghost * (failing.broken == GHOST) + intervention.reason
+        return words, "", f"works {intervention.how}"
     if failing.broken == "refused":
         return "the engine refuses it", "", SAYS_SO
     tried = dict.fromkeys(

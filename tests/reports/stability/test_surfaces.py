@@ -72,6 +72,15 @@ def test_the_reason_of_a_ghost_collision_is_the_walls_that_meet(engine: str):
     assert limit.tested == "works on a floor of one wall"
 
 
+@pytest.mark.slow
+def test_a_wrong_distance_is_no_ghost_collision():
+    """In steps of 0.15 s: joined walls help, and nothing was thrown off."""
+    limit = limit_of(PIECES, "dt", "reference:ordered")
+    assert limit.failing is not None
+    assert limit.failing.broken != "ghost collision"
+    assert limit.reason == "the walls of a floor act as several; join them into one wall"
+
+
 def limit_of(path: Path, what: str, engine: str) -> Limit:
     """The limit of a scene file with its reason."""
     search = LimitSearch(case_of_file(str(path), what), engine, QUICK)
