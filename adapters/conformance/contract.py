@@ -68,7 +68,8 @@ def order_and_shapes(row: EngineRow) -> ProbeReading:
                 f"{name} of disk {int(np.argwhere(off == off.max())[0][0])} is off by"
                 f" {off.max():.3g}"
             )
-    return ProbeReading("; ".join(faults) or "as the scene", "as the scene")
+    words = "; ".join(faults) or "as the scene"
+    return ProbeReading(words, "as the scene", departure=Departure.START)
 
 
 def read_copies(row: EngineRow) -> ProbeReading:

@@ -10,9 +10,9 @@ import numpy as np
 from reports.compare import laws
 from scenarios.model import Array, Collisions, Scene, Trajectory, frozen
 
-ALONG = 1e-12
+ALONG = 2.0**-23
 """Fraction of the largest coordinate: an end of a wall this close to the line of another wall lies
-on it. A few thousand roundings: a wall cut in two at any of its points stays on its line."""
+on it. Engines in float32 cannot tell it from the line, nor can a file with seven digits."""
 SAME = 1e-9
 """Fraction of a sample interval, or a step: events closer in time are simultaneous up to the
 rounding of the grid."""

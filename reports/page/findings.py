@@ -70,7 +70,7 @@ def findings_alike(comparisons: Sequence[Comparison], untrusted: Set[str]) -> li
     sentences = [
         closest(engines),
         *failing({k: v for k, v in broken.items() if everyone or k in engines}, len(comparisons)),
-        worth_of_settings(engines),
+        *worth_of_settings(engines),
         where_it_fails(engines, statuses),
     ]
     own = [
@@ -160,7 +160,7 @@ def not_counted(broken: Mapping[str, str]) -> list[str]:
     """A sentence for each engine that broke the protocol; `broken`: name -> the probe that failed,
     and how."""
     return [
-        f"Not counted: {name} breaks the protocol of the harness. {how}"
+        f"Not counted: {name.removesuffix(OWN_PROFILE)} breaks the protocol of the harness. {how}"
         for name, how in sorted(broken.items())
     ]
 
@@ -219,8 +219,8 @@ def closest(off: pd.DataFrame) -> str:
     """The engines closest to the exact answers."""
     if off.columns.empty and len(off):
         return (
-            "No engine that counts was played to its end in a scene with an exact answer, so none"
-            " is scored."
+            "No engine is ranked: none keeps the laws and plays a scene with an exact answer to its"
+            " end."
         )
     if off.empty:
         return (
@@ -256,10 +256,8 @@ def closest(off: pd.DataFrame) -> str:
     )
 
 
-def worth_of_settings(off: pd.DataFrame) -> str:
-    """How much matched settings reduce the deviation of an engine."""
-    if off.empty:
-        return "No scene is scored, so this run does not show the effect of settings."
+def worth_of_settings(off: pd.DataFrame) -> list[str]:
+    """A sentence on how much matched settings reduce the deviation, if both profiles are ranked."""
     moved = {}  # engine -> the number of scenes in which it gets closer, and farther
     for engine in dict.fromkeys(name.split(":")[0] for name in off.columns):
         shipped, matched = f"{engine}:shipped", f"{engine}:matched"
@@ -268,17 +266,14 @@ def worth_of_settings(off: pd.DataFrame) -> str:
             farther = int((off[matched] > 1.01 * off[shipped]).sum())
             moved[engine] = closer, farther
     if not moved:
-        return (
-            "No engine was played in both profiles, so this run does not show the effect of"
-            " settings."
-        )
+        return []
     if len(off) == 1:
-        return worth_in_one_scene(str(off.index[0]), moved)
+        return [worth_in_one_scene(str(off.index[0]), moved)]
     parts = [f"{engine} in {near} (farther in {far})" for engine, (near, far) in moved.items()]
-    return (
+    return [
         "The matched settings bring an engine closer to the exact answer than the shipped ones:"
         f" {', '.join(parts)} of {len(off)} scenes."
-    )
+    ]
 
 
 def worth_in_one_scene(scene: str, moved: Mapping[str, tuple[int, int]]) -> str:

@@ -17,12 +17,14 @@ Finding = Mapping[str, Any]  # a row of the probes
 STATED = "{got} where {expected} is stated"
 # In the order in which they are named.
 WORDS = {
+    Departure.START: "before the first step, read differs from the scene: {got}",
     Departure.MEMORY: "state of the scene before is kept",
     Departure.DT_IGNORED: "dt is ignored",
     Departure.PATH: "a disk of {expected} m/s moves by {got} m in a second",
     Departure.SPEED: "a free disk of {expected} m/s does not keep its speed and ends at {got} m/s",
     Departure.GRAVITY_UNSTATED: "gravity acts where none is stated",
     Departure.GRAVITY_ABSENT: "gravity does not act",
+    Departure.GRAVITY_AT_REST: "gravity does not act on a disk at rest",
     Departure.GRAVITY_UPWARD: "gravity acts upward",
     Departure.GRAVITY: f"gravity is {STATED} (m/s2)",
     Departure.MASSES: "momentum is not kept where masses differ",
@@ -40,7 +42,13 @@ WORDS = {
 }
 # What these change, all later readings show, so that no other cause is named beside them; and a
 # wrong momentum is also that of what cannot move.
-ALONE = (Departure.DT_IGNORED, Departure.PATH, Departure.SPEED, Departure.GRAVITY_UNSTATED)
+ALONE = (
+    Departure.START,
+    Departure.DT_IGNORED,
+    Departure.PATH,
+    Departure.SPEED,
+    Departure.GRAVITY_UNSTATED,
+)
 UNMOVED = (Departure.STATIC, Departure.WALL_PASSES)
 # Of an engine that breaks no law, such as one with a threshold.
 PROPERTIES = {
@@ -49,10 +57,11 @@ PROPERTIES = {
     "fast_spin": "a spin of {expected} rad/s ends at {got} rad/s",
     "spins_freely": "a disk turns by {got} rad where its spin gives {expected}",
     "force_lasts_one_step": "a force lasts for more than one step",
-    "mass_by_force": f"a force acts as on {STATED} (kg)",
-    "inertia_by_torque": f"a torque acts as on {STATED} (kg m2)",
+    "mass_by_force": f"a force acts as on a mass of {STATED} (kg)",
+    "inertia_by_torque": f"a torque acts as on an inertia of {STATED} (kg m2)",
     "friction": "friction of {got} acts where none is stated",
     "friction_at_rest": f"the friction of a sliding disk is {STATED}",
+    "restitution_wall": f"off a wall that is not one of a box e is {STATED}",
     **{f"restitution_{v}": f"at {v} m/s e is {STATED}" for v in ("0.01", "0.1", "0.5", "2", "100")},
 }
 SCENES = {
@@ -82,6 +91,8 @@ def own_engine_sentences(findings: Sequence[Finding]) -> list[str]:
         laws = [law for law in laws if law not in UNMOVED]
     words = [in_words(WORDS[law], broken[law]) for law in laws]
     if not laws:
+        if any(row["verdict"] == "breaks" for row in missed.values()):
+            return []  # it is not counted, and a sentence says why
         seen = [probe for probe in PROPERTIES if probe in missed and is_visible(missed[probe])]
         words = [in_words(PROPERTIES[probe], missed[probe]) for probe in seen]
     refused = {row["probe"] for row in findings if row["verdict"] == "not asked"}
@@ -105,4 +116,5 @@ def is_visible(row: Finding) -> bool:
 
 def in_words(text: str, row: Finding) -> str:
     """The text with the two numbers of a row."""
-    return text.format(got=number(row["got"], 2), expected=number(row["expected"], 2))
+    got = row["got"] if isinstance(row["got"], str) else round(row["got"], 9)  # 0 for 4e-15
+    return text.format(got=number(got, 2), expected=number(row["expected"], 2))

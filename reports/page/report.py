@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from adapters.engines import OWN
 from reports.compare.comparison import Comparison
 from reports.page import cost_points, overview, style
 from reports.page.charts import NOISE, POINTS
@@ -165,7 +166,14 @@ def made_report(
     untrusted = set(broken)
     untrusted |= {name for name, rows in zip(engines, asked) if is_lawless(rows)}
     own = [sentence for rows in asked for sentence in own_engine_sentences(rows)]
-    sentences = [*own, *findings(comparisons, untrusted), *not_counted(broken)]
+    theirs = {name: how for name, how in broken.items() if name.endswith(OWN)}
+    others = {name: how for name, how in broken.items() if name not in theirs}
+    sentences = [
+        *own,
+        *not_counted(theirs),
+        *findings(comparisons, untrusted),
+        *not_counted(others),
+    ]
     checks = {
         name: archive.checked[name]["checked"]
         for name in header["engines"]

@@ -49,8 +49,6 @@ COLUMNS = [
     "contribution",
     "position_radii",
     "energy",
-    "left_position_radii",
-    "left_energy",
     "off_engine_radii",
     "off_reference_radii",
     "off_deviation_radii",
@@ -99,8 +97,6 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         duration_s: the duration of the scene itself.
         position_radii, energy: root mean square of what the contribution changes; the energy over
             the energy at hand.
-        left_position_radii, left_energy: what is left of the error without the contribution, root
-            mean square. Parts that cancel leave more than the error.
         off_engine_radii, off_reference_radii, off_deviation_radii: what disabling it changes in the
             engine, what it changes in the reference with all other mechanisms, and how far these
             two differ.
@@ -130,14 +126,6 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
     checks[FLIGHT] = {
         "closed_deviation_radii": at.flight_deviation(contributions[FLIGHT], row_of(name).alpha)
     }
-    left = {
-        contribution: {
-            "left_position_radii": (contributions[TOTAL] - each).radii,
-            "left_energy": (contributions[TOTAL] - each).of_energy,
-        }
-        for contribution, each in contributions.items()
-        if contribution not in TOTALS
-    }
     return [
         known
         | {
@@ -146,7 +134,6 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
             "energy": each.of_energy,
             "note": "",
         }
-        | left.get(contribution, {})
         | checks.get(contribution, {})
         for contribution, each in contributions.items()
     ]

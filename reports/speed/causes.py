@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from math import isfinite
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,21 +14,16 @@ import numpy as np
 from adapters.engines import row_of
 from adapters.mechanisms.ablated import AblatedReference
 from adapters.mechanisms.settings import GONE, find_remedy, settings_of, without_finer
-from adapters.mechanisms.table import END_OF_STEP, MECHANISMS
+from adapters.mechanisms.table import AIR, END_OF_STEP, FRICTION, MECHANISMS, SKIN, mechanisms_of
 from adapters.play import play_once
 from reports.compare import laws
 from reports.compare.delays import jumps_of
 from reports.compare.view import beside
 from reports.page.style import number
 from reports.speed.budget import (
-    INTERPLAY,
-    RESIDUAL,
-    TIME,
-    TOTAL,
-    TOTALS,
+    Budget,
     NotPlayed,
-    budget_of,
-    window_of,
+    Window,
 )
 from reports.speed.explained import LEAST
 from reports.speed.purposes import PURPOSES
@@ -36,6 +32,7 @@ from reports.terminal.counts import listed
 from scenarios.model import Scene, Trajectory
 
 LATE = "end-of-step detection"
+SWITCHED = (AIR, SKIN)  # by a setting of each library that has them, which was tried
 SEEN = 0.01  # radii, or of a spin or speed: what is less is not worth a word
 EXERCISE = {"alpha": 1.0, "project": True, "project_walls": True}
 CANDIDATES: dict[str, Mapping[str, Any]] = {
@@ -83,30 +80,44 @@ def cause_of(scene: str, seed: int, name: str, substeps: int, purpose: str, boun
 
 
 def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) -> str:
-    """The mechanism without which at most `GONE` of the error is left, or those that were ruled
-    out. Raises `NotPlayed`."""
+    """The mechanism without which at most `GONE` of the error in all of the scored part is left; or
+    the few that leave no more together with end-of-step detection; or those that were ruled out.
+    Raises `NotPlayed`."""
+    scenario, truth = scored(scene, seed)
+    at = Window(scenario, truth, scenario.dt(substeps))
+    run = at.played(row_of(name).make)
+    whole, size = at.offset(run), attrgetter("of_energy" if measure == "energy" else "radii")
+    total = size(whole)
+    left, together = dict[str, float](), dict[str, float]()
+    for words, changes in {} if name in MECHANISMS else CANDIDATES.items():
+        left[words] = size(whole - at.offset(at.played(partial(ablated, changes))))
     if name in MECHANISMS:
-        rows = budget_of(scene, seed, name, substeps)
-        if rows[0]["note"]:
-            raise NotPlayed(rows[0]["note"])
-        total = next(row[measure] for row in rows if row["contribution"] == TOTAL)
-        left = {
-            LATE if row["contribution"] == TIME else row["contribution"]: row[f"left_{measure}"]
-            for row in rows
-            if row["contribution"] not in (*TOTALS, INTERPLAY, RESIDUAL)
-        }
-    else:
-        at = window_of(scene, seed, substeps)
-        whole = at.offset(at.played(row_of(name).make))
-        size = "of_energy" if measure == "energy" else "radii"
-        total = getattr(whole, size)
-        left = {
-            words: getattr(whole - at.offset(at.played(partial(ablated, changes))), size)
-            for words, changes in CANDIDATES.items()
-        }
-    least = min(left, key=lambda part: left[part])
-    if total > LEAST and left[least] <= GONE * total:
-        return f"{least}: without it {number(left[least] / total, 2)} of the error is left"
+        known = mechanisms_of(name, run.settings, scenario.scene, at.dt)
+        if name.endswith(":shipped"):
+            tried = SWITCHED if scenario.scene.friction else (*SWITCHED, FRICTION)
+            known = [each for each in known if each.name not in tried]
+        budget = Budget(at, known, whole)
+        late = [LATE] if (truth.collisions.impulse > 0).any() else []  # else nothing collides
+        left |= dict.fromkeys(late, size(whole - budget.reference([])))
+        for mechanism in known:
+            below = [each for each in known if each.name in mechanism.on_top]
+            if mechanism.parameters:
+                changed = budget.reference([*below, mechanism]) - budget.reference(below)
+                left[mechanism.name] = size(whole - changed)
+            elif mechanism.without is not None:
+                left[mechanism.name] = size(at.offset(at.played(mechanism.without)))
+        needed = [each for each in known if each.parameters]
+        for mechanism in list(needed):
+            fewer = [x for x in needed if x is not mechanism and mechanism.name not in x.on_top]
+            if size(whole - budget.reference(fewer)) <= GONE * total:
+                needed = fewer
+        if needed:
+            words = " with ".join([*late, listed([each.name for each in needed])])
+            together[words] = size(whole - budget.reference(needed))
+    for parts in (left, together):
+        least = min(parts, key=lambda part: parts[part], default="")
+        if least and total > LEAST and parts[least] <= GONE * total:
+            return f"{least}: without it {number(parts[least] / total, 2)} of the error is left"
     return f"not known: without any of these more than half of it is left: {'; '.join(left)}"
 
 
@@ -121,11 +132,15 @@ def effects_of(played: Trajectory, truth: Trajectory, scene: Scene) -> list[str]
     k = min(len(played), len(truth)) - 1
     deep = float(np.max(laws.penetration(played, scene)[: k + 1]))
     effects = [f"sinks {number(deep, 2)} radii into what it touches"] * (deep > SEEN)
-    spins = np.abs(played.angular_velocity[k]), np.abs(truth.angular_velocity[k])
-    speeds = (laws.lengths(one.velocity[k]) for one in (played, truth))
-    for what, (is_, ought) in {"spin": spins, "speed": tuple(speeds)}.items():
-        # of a disk without spin or speed in the exact answer there is no share
-        change = np.where(scene.static | (ought == 0), 0.0, is_ / np.where(ought, ought, 1.0) - 1)
+    motions = {
+        "spin": [np.abs(one.angular_velocity) for one in (played, truth)],
+        "speed": [laws.lengths(one.velocity) for one in (played, truth)],
+    }
+    for what, (mine, exact) in motions.items():
+        is_, ought, most = mine[k], exact[k], exact.max()
+        # of a disk with hardly any spin or speed in the exact answer a share means nothing
+        slow = scene.static | (ought <= SEEN * most)
+        change = np.where(slow, 0.0, is_ / np.where(slow, 1.0, ought) - 1)
         worst = float(change[np.abs(change).argmax()])
         if isfinite(worst) and abs(worst) > SEEN:
             effects.append(

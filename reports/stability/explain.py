@@ -33,12 +33,14 @@ def with_replays(search: LimitSearch, limit: Limit) -> Limit:
     the mechanisms that are enough to produce it, or another intervention that removes it.
 
     A reason from the table whose predicted limit fits needs no more; otherwise only an ablation can
-    confirm it. In a scene of somebody's own the settings come first: they say what to do.
+    confirm it. In a scene of somebody's own, and as shipped in a case of one thing, the settings
+    come first: they say what to do.
     """
     reason = reason_of(limit)
     if reason is not None and reason.predicts is not None and brackets(limit, reason.predicts):
         return limit
-    if own := reason is None and limit.case not in CASES:
+    alone = limit.engine.endswith(":shipped") and not limit.case.startswith("dt_")
+    if own := reason is None and (alone or limit.case not in CASES):
         limit = replace(limit, intervention=intervention_of(search, limit, FIRST))
         limit = limit if limit.intervention else with_settings(search, limit)
         if limit.intervention or limit.settings_help:

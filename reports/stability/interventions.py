@@ -18,6 +18,7 @@ from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from reports.stability.cases_collisions import BULLETS
 from reports.stability.limits import NOT_KNOWN, Limit
 from reports.stability.predicates import judge
+from reports.stability.predicates_usable import GHOST
 from reports.stability.search import LimitSearch
 from reports.stability.variants import DrivenEngine, play_as
 from reports.stability.vary import similar
@@ -87,8 +88,7 @@ INTERVENTIONS = {
     "joined": Intervention(
         "*",
         "*",
-        "a ghost collision: the disk hits the end of the next wall of its floor; join them into one"
-        " wall",
+        "the walls of one floor act as several; join them into one wall",
         "on a floor of one wall",
         joined,
     ),
@@ -175,11 +175,14 @@ def with_settings(search: LimitSearch, limit: Limit) -> Limit:
         finer = replace(scenario, substeps=(scenario.substeps[0] * steps,))
         judged, run = search.case.play(driven, finer)
         reading = judge(predicate, judged, run)
-        return reading.value / (predicate.bound or 1.0) if reading.failed else 0.0
+        share = abs(reading.value) / (predicate.bound or 1.0)
+        if reading.failed:
+            return share if share > 1.0 else np.inf
+        return float(np.fmin(share, 1.0))  # nan: there is nothing to judge
 
     dt = scenario.dt(scenario.substeps[0])
-    remedy = find_remedy(settings_of(search.engine, scenario.scene, dt), error, bound=0.0)
-    helps = bool(remedy.settings) and remedy.after == 0.0
+    remedy = find_remedy(settings_of(search.engine, scenario.scene, dt), error, bound=1.0)
+    helps = bool(remedy.settings) and remedy.after <= 1.0
     words = remedy.sentence(search.engine) if helps else remedy._replace(settings=()).sentence("")
     return replace(limit, settings=words, settings_help=helps)
 
@@ -195,7 +198,8 @@ def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
     if limit.mechanisms:
         return reason_by_ablation(limit)
     if intervention := INTERVENTIONS.get(limit.intervention):
-        return intervention.reason, "", f"works {intervention.how}"
+        words = f"a {GHOST}: " * (failing.broken == GHOST) + intervention.reason
+        return words, "", f"works {intervention.how}"
     if failing.broken == "refused":
         return "the engine refuses it", "", SAYS_SO
     tried = dict.fromkeys(

@@ -13,6 +13,7 @@ from reports.stability.predicates import Predicate, Reading, largest
 from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
 from scenarios.no_truth import answered
 
+GHOST = "ghost collision"
 LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding
 STEADY = 1e-9  # of a velocity; a smaller change between two samples is the rounding of the answer
 
@@ -149,7 +150,7 @@ def _thrown(scenario: Scenario, played: Trajectory) -> Reading | None:
         return None
     value, at, disk, wall = thrown_off(played, true, scenario.scene)
     event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
-    return Reading(value, at, event, "ghost collision", disk=disk)
+    return Reading(value, at, event, GHOST, disk=disk)
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:

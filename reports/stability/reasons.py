@@ -17,10 +17,7 @@ from adapters.mechanisms.table import (
 )
 from reports.stability.ablations import (
     B2_SETTINGS,
-    B2_TYPES,
     END_OF_STEP,
-    OF_PYMUNK,
-    PRODUCT,
     THRESHOLD,
     THRESHOLDS,
 )
@@ -99,7 +96,6 @@ FORESEEN = (
     "; a contact is foreseen within four slops, 20 mm, and where a step ends with a gap that a"
     " substep would close, the substeps have taken only a part of m v"
 )
-ROUGH_PRODUCT = "the frictions of the two shapes are multiplied: mu on every shape gives mu²"
 IN_TURN = (
     "the contacts of a step are solved once, one after the other: the second wall brings back slip"
     " at the first"
@@ -149,40 +145,10 @@ REASONS = (
         GEOMETRY,
         mechanism=END_OF_STEP,
     ),
-    Reason(
-        "near_miss",
-        "box2d_v3:*",
-        "a contact begins at a gap of four slops, with a normal fixed before the step",
-        B3_CONSTANTS + "B2_SPECULATIVE_DISTANCE",
-        variant="box2d_v3:matched",
-        mechanism=IMPULSE,
-    ),
-    Reason(
-        "near_miss",
-        "rapier2d:*",
-        "a contact begins at a gap of the prediction distance",
-        "Rapier IntegrationParameters: normalizedPredictionDistance",
-        variant="rapier2d:matched",
-        mechanism=IMPULSE,
-    ),
-    *(
-        Reason(case, f"{box}:shipped", THRESHOLD, source, limit, f"{box}:matched", RESTITUTION)
-        for case, limit in (("slow_collision", 1.0), ("scale_down", 0.25))
-        for box, source in THRESHOLDS.items()
-    ),
-    Reason(
-        "restitution",
-        "pymunk:shipped",
-        PRODUCT,
-        OF_PYMUNK,
-        1 - (1 + sqrt(1 - 0.04)) / 2,
-        "pymunk:matched",
-        RESTITUTION,
-    ),
     # One disk, or two.
     Reason(
         "bounce_drift",
-        "pymunk:shipped pymunk:matched+position_correction",
+        "pymunk:matched+position_correction",
         "the position correction at the floor adds height",
         "Munk2D src/cpSpaceStep.c, collision_bias",
         variant="pymunk:matched",
@@ -227,23 +193,6 @@ REASONS = (
         B3_SOLVER + ", soft step",
         variant="box2d_v3:matched+16_substeps",
         mechanism=IMPULSE,
-    ),
-    Reason(
-        "scale_up",
-        "box2d:shipped",
-        "displacement is limited to 2 units a step: the velocity is reduced",
-        B2_SETTINGS + "b2_maxTranslation",
-        30.0,
-        "box2d:matched",
-        IMPULSE,
-    ),
-    Reason(
-        "scale_up",
-        "box2d_v3:shipped",
-        "speed is limited to 400 m/s: the velocity is reduced",
-        B2_TYPES + "maximumLinearSpeed",
-        100.0,
-        "box2d_v3:matched",
     ),
     Reason(
         "far_from_origin",
@@ -324,18 +273,6 @@ REASONS = (
         mechanism=FRICTION,
     ),
     *(
-        Reason(cases, "pymunk:shipped", ROUGH_PRODUCT, OF_PYMUNK, limit, "pymunk:matched", FRICTION)
-        for cases, limit in (
-            ("friction_in_bounce slide_to_roll", None),
-            # e² for e, too: mu² 1.25 v = 0.9 of the impulse that sticks, a third of 3 m/s
-            ("strong_friction", sqrt(0.9 / 1.25 / 4.0)),
-            # mu² v = 0.9 r w / 3
-            ("spin_in_bounce", 0.25 * 4.0 * 3 / 0.9 / 0.25 * (0.05 * 0.25 / 4.0)),
-            # tan(angle) = 3 mu²
-            ("critical_slope", 0.75),
-        )
-    ),
-    *(
         Reason(case, engine, text, source, limit)
         for engine, most, text, source in (
             ("box2d:*", pi / 2, QUARTER, B2_ROTATION),
@@ -394,31 +331,6 @@ REASONS = (
         "*",
         "every contact may keep an overlap of a slop, and soft contacts yield as the load grows",
         "Box2D, b2_linearSlop; contact softness in 3.1",
-        mechanism=POSITION_CORRECTION,
-    ),
-    Reason(
-        "overlap_recovery",
-        "pymunk:shipped",
-        "overlaps up to a slop of 0.1 m, here 0.4 radii, are left",
-        "Munk2D src/cpSpace.c, collisionSlop",
-        0.02,
-        "pymunk:matched",
-        POSITION_CORRECTION,
-    ),
-    Reason(
-        "overlap_recovery",
-        "box2d:shipped",
-        "overlaps up to a slop of 5 mm, here 0.02 radii, are left",
-        B2_SETTINGS + "b2_linearSlop",
-        0.02,
-        "box2d:matched",
-        POSITION_CORRECTION,
-    ),
-    Reason(
-        "overlap_*",
-        "*",
-        "an overlap is corrected by a share per step",
-        "the engine's position correction",
         mechanism=POSITION_CORRECTION,
     ),
     Reason(

@@ -249,7 +249,7 @@ def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
 
     assert (
         alone
-        == "No engine that counts was played to its end in a scene with an exact answer, so none is"
-        " scored."
+        == "No engine is ranked: none keeps the laws and plays a scene with an exact answer to its"
+        " end."
     )
     assert without.startswith("No scene here has an exact answer")

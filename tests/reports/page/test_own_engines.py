@@ -19,7 +19,7 @@ from adapters.own_solver.process import processes_reused
 from reports.page.own_engines import WORDS, is_lawless, own_engine_sentences
 from tests.reports.terminal.command_line import crosscheck
 
-PROBES = (*LAWS, "load_forgets", "static_stays", "pair_momentum")
+PROBES = (*LAWS, "order_and_shapes", "load_forgets", "static_stays", "pair_momentum")
 # As a stranger writes one: disks and gravity alone, no rotation, no walls, no list of collisions.
 BARE = """
 const models = "disks gravity";
@@ -110,6 +110,32 @@ FAULTS: dict[str, tuple[str, list[Change], str]] = {
         [("  const impulse", "  if (j < 0) { a.u *= -world.e; a.v *= -world.e; return; }\n$&")],
         "a collision with a wall changes the tangential velocity.",
     ),
+    "all speeds damped at walls": (
+        TEMPLATE,
+        [("  const impulse", "  if (j < 0) { a.u *= 0.9; a.v *= 0.9; world.e = 1; }\n$&")],
+        "a collision with a wall changes the tangential velocity.",
+    ),
+    "atan for atan2": (
+        BARE,
+        [("const nx = (c.x - a.x) / d, ny = (c.y - a.y) / d", "const way = Math.atan((c.y - a.y) /"
+          " ((c.x - a.x) || 1e-9)), nx = Math.cos(way), ny = Math.sin(way)")],
+        "disks pass through each other.",
+    ),
+    "a cap on speed": (
+        BARE,
+        [("a.x += a.u", "a.u = Math.max(-8, Math.min(8, a.u)); $&")],
+        "a free disk of 10 m/s does not keep its speed and ends at 8 m/s.",
+    ),
+    "slow disks are stopped": (
+        BARE,
+        [("a.x += a.u", "if (Math.hypot(a.u, a.v) < 0.2) a.u = a.v = 0; $&")],
+        "gravity does not act on a disk at rest.",
+    ),
+    "read upside down": (
+        BARE,
+        [("[a.x, a.y])", "[a.x, -a.y])")],
+        "before the first step, read differs from the scene: position of disk ",
+    ),
     "half of an overlap each": (
         TEMPLATE,
         [("nx * overlap * d.light / light", "nx * overlap / 2"),
@@ -187,6 +213,23 @@ def test_a_threshold_is_named_and_breaks_no_law(tmp_path: Path):
     assert own_engine_sentences(findings) == [
         "mine.js: at 0.1 m/s e is 0 where 0.5 is stated; at 0.5 m/s e is 0 where 0.5 is stated."
     ]
+
+
+@pytest.mark.slow
+def test_an_engine_for_boxes_breaks_no_law_and_is_told_of_single_walls(tmp_path: Path):
+    """Its bounds are the outermost coordinates of the walls."""
+    bounds = (
+        "walls.forEach((wall, w) => collide(world, a, nearest(wall, a), -1 - w))",
+        "[['x', 'u', 0], ['y', 'v', 1]].forEach(([x, u, k]) => { const c = walls.flat().map((p) =>"
+        " p[k]); if (a[x] < Math.min(...c) + a.radius) { a[x] = Math.min(...c) + a.radius; a[u] *="
+        " -world.e; } if (a[x] > Math.max(...c) - a.radius) { a[x] = Math.max(...c) - a.radius;"
+        " a[u] *= -world.e; } })",
+    )
+    findings = probed(written(tmp_path, TEMPLATE, [bounds]), *LAWS, "restitution_wall")
+
+    assert not is_lawless(findings)
+    [sentence] = own_engine_sentences(findings)
+    assert sentence.startswith("mine.js: off a wall that is not one of a box e is ")
 
 
 @pytest.mark.slow

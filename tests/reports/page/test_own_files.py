@@ -46,7 +46,7 @@ def test_who_is_not_counted_is_named_with_the_probe_that_it_missed():
     }
 
     assert not_counted({"a.js:own": how_broken(row)}) == [
-        "Not counted: a.js:own breaks the protocol of the harness. Where does a used engine differ"
+        "Not counted: a.js breaks the protocol of the harness. Where does a used engine differ"
         " from a fresh one after load? Position after 10 steps; expected: nowhere."
     ]
     assert not_counted({}) == []

@@ -312,13 +312,13 @@ def test_one_scene_is_described_without_counts_of_scenes():
         " reference:exercise (0.1), then pymunk:matched (0.2), box2d:shipped (0.3), last"
         " box2d:matched (2)."
     )
-    assert findings.worth_of_settings(engines) == (
+    assert findings.worth_of_settings(engines) == [
         "In a the matched settings bring pymunk closer to the exact answer, take box2d"
         " farther from it and make no difference of more than 1 % to box2d_v3."
-    )
-    assert findings.worth_of_settings(engines[["box2d:shipped", "box2d:matched"]]) == (
+    ]
+    assert findings.worth_of_settings(engines[["box2d:shipped", "box2d:matched"]]) == [
         "In a the matched settings take box2d farther from the exact answer."
-    )
+    ]
     assert findings.where_it_fails(engines, ["ok"]) == (
         "More than one radius off, or failed: box2d:matched; every cell was played to its end."
     )

@@ -128,6 +128,18 @@ def test_a_cap_on_spin_is_named_where_it_bites(tmp_path: Path):
     assert "`B2_MAX_ROTATION` 0.785 rad a step, compiled in; take steps of 5.56 ms" in said
 
 
+def test_a_cause_is_judged_over_the_whole_scene(tmp_path: Path):
+    """Not up to where the errors are small: by then no disk has struck the wall."""
+    path = tmp_path / "wall.toml"
+    path.write_text(
+        'name = "wall"\nasks = "Where is it?"\nduration = 0.3\nsample_interval = 0.0166666666666\n'
+        "substeps = [1, 2, 4]\nrestitution = 1.0\n[[disk]]\nposition = [0.0, 0.0]\n"
+        "velocity = [40.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
+        "[[wall]]\nstart = [5.07, -2.0]\nend = [5.07, 2.0]\n"
+    )
+    assert cause(path, "pymunk:matched", tmp_path, 4).startswith(f"{LATE}: without it 0 of")
+
+
 def test_where_no_setting_helps_what_was_tried_is_named(tmp_path: Path):
     """A collision is found late, or foreseen early, whatever is set."""
     said = cause("half", "box2d_v3:shipped", tmp_path)

@@ -261,17 +261,17 @@ def test_a_limit_comes_back_from_the_journal_as_it_was():
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     """A prediction outside the bracket, or a variant that gets no farther, tests nothing."""
-    slow = LimitSearch(CASES["slow_collision"], "box2d:shipped", QUICK).limit()
-    free = LimitSearch(CASES["slow_collision"], "box2d:matched", QUICK).limit()
-    elsewhere = replace(slow, works_at=4.0, fails_at=3.9)
+    slow = LimitSearch(CASES["tunnelling_head_on"], "box2d:matched", QUICK).limit()
+    free = LimitSearch(CASES["tunnelling_head_on"], "box2d:matched+bullets", QUICK).limit()
+    elsewhere = replace(slow, works_at=3.9, fails_at=4.0)
     [both, _], [alone], [wrong, _] = (
         explained([slow, free]),
         explained([slow]),
         explained([elsewhere, slow]),
     )
 
-    assert both.tested == "predicts 1; box2d:matched gets farther"
-    assert alone.tested == "predicts 1"
+    assert both.tested == "predicts 2; box2d:matched+bullets gets farther"
+    assert alone.tested == "predicts 2"
     assert wrong.tested == ""
     assert row_of(wrong)["reason"].startswith("likely: ")
 
