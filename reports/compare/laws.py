@@ -166,9 +166,7 @@ def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, in
         last = np.maximum.accumulate(np.where(tells, number, 0), axis=0)[:-1]
         start, end = np.take_along_axis(x, last[..., None], axis=0), x[1:]
         way = nearer_way(end - start, scene)
-        parts = [(start, end)]
-        if scene.wrap is not None:  # it leaves at one edge, and arrives from the other
-            parts = [(start, start + way), (end - way, end)]
+        parts = [(start, end)] if scene.wrap is None else [(start, start + way), (end - way, end)]
         for first, second in parts:
             sides = cross(first - a, b - a) * cross(second - a, b - a)
             ends = cross(a - first, way) * cross(b - first, way)

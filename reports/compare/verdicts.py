@@ -6,8 +6,8 @@
   had the time to go round the end of a wall, or round the other disk, did not pass through it.
 - Energy or overlap of one or two samples only: inside a collision an engine may overlap, and read
   velocity and position of different instants.
-- On a torus, two disks that pass through each other in an interval in which one may be set onto
-  the opposite edge, an overlap that begins so, and a wall before a disk that moves half of the box.
+- On a torus, two disks that pass through each other in an interval in which one is set onto the
+  opposite edge, an overlap that begins so, and a wall before a disk that moves half of the box.
 - The part of a scene without exact answer in which disks come to rest: there only what jitters in
   place is seen, and what sinks into something.
 
@@ -195,10 +195,9 @@ class Judge:
     @cached_property
     def speed(self) -> Array:
         """(k,) m/s, the largest of any disk at the sample before, at and after."""
-        speed = laws.lengths(self.played.velocity).max(axis=1)
-        nearby = [speed, np.append(speed[1:], 0.0), np.append(0.0, speed[:-1])]
-        fastest: Array = np.maximum.reduce(nearby)
-        return fastest
+        speed: Array = laws.lengths(self.played.velocity).max(axis=1)
+        speed = np.maximum.reduce([speed, np.append(speed[1:], 0.0), np.append(0.0, speed[:-1])])
+        return speed
 
     @cached_property
     def reach(self) -> Array:
@@ -210,15 +209,10 @@ class Judge:
 
     @cached_property
     def jumps(self) -> NDArray[np.bool_]:
-        """(k - 1, n), where a disk may have been set onto the opposite edge."""
-        x, v, wrap = self.played.position, np.abs(self.played.velocity), self.scenario.scene.wrap
-        if wrap is None:
-            return np.zeros(x[1:, :, 0].shape, bool)
-        way = np.maximum(v[1:], v[:-1]) * self.interval + self.g * self.interval**2
-        way = np.maximum(way, np.abs(laws.nearer_way(np.diff(x, axis=0), self.scenario.scene)))
-        way *= 1 + 1e-9  # more than rounding: a sample may lie on the edge itself
-        jumps: NDArray[np.bool_] = ((x[:-1] - way < wrap[0]) | (x[:-1] + way > wrap[1])).any(axis=2)
-        return jumps
+        """(k - 1, n), where a disk is set onto the opposite edge."""
+        wrap, moved = self.scenario.scene.wrap, np.abs(np.diff(self.played.position, axis=0))
+        half = np.array([np.inf, np.inf]) if wrap is None else (wrap[1] - wrap[0]) / 2
+        return np.asarray((moved > half).any(axis=2))
 
     @cached_property
     def pairs(self) -> list[Pair]:
@@ -394,11 +388,8 @@ class Judge:
         """
         scenario, scene, played = self.scenario, self.scenario.scene, self.played
         held, falls = len(scene.walls) or scene.static.any(), self.g and not scene.static.all()
-        if (
-            not (held and falls and scene.restitution < 1)
-            or scenario.thrusts
-            or scene.wrap is not None
-        ):
+        settles = held and falls and scene.restitution < 1 and not scenario.thrusts
+        if not settles or scene.wrap is not None:
             return
         unit, intervals = own_speed(scenario), len(played) - 1
         step = self.g * self.dt / (1 - scene.restitution) / unit
