@@ -193,12 +193,13 @@ def summary(
             name in fails or (name in each and not refused_by_file(name, each))
             for each, fails in zip(failed, broken)
         ]
+        count = sum(name in fails for fails in broken)
+        failure = "fails" if count else "not played"
         cells = [
-            pool(metric, name, comparisons, found, lost, scored)
+            pool(metric, name, comparisons, found, lost, scored, failure)
             for metric in SUMMARY
             if metric not in COUNTED
         ]
-        count = sum(name in fails for fails in broken)
         played = sum(name not in each for each in failed)
         cells.append(OverviewCell(f"{count} of {played}", failed=count > 0, value=count))
         if name in untrusted:
@@ -276,6 +277,7 @@ def pool(
     found: Sequence[Found],
     lost: Sequence[bool],
     scored: Set[str],
+    failure: str,
 ) -> OverviewCell:
     """Median and worst of a metric over the scenarios in which it is judged, and their number.
 
@@ -305,15 +307,16 @@ def pool(
     if not totals:
         return OverviewCell(number(np.nan), remark)
     value, worst_in = float(np.median(list(totals.values()))), max(totals, key=totals.__getitem__)
-    worst = in_text(totals[worst_in]) if totals[worst_in] else ""
+    worst = totals[worst_in]
+    text, worst_text = (failure if np.isinf(each) else number(each) for each in (value, worst))
     return OverviewCell(
-        in_text(value), remark, value=value, worst=worst, worst_in=worst_in, scenes=len(totals)
+        text,
+        remark,
+        value=value,
+        worst=worst_text if worst else "",
+        worst_in=worst_in,
+        scenes=len(totals),
     )
-
-
-def in_text(value: float) -> str:
-    """A number of a table of errors; an infinite one is that of a run that failed."""
-    return "fails" if np.isinf(value) else number(value)
 
 
 def heat_map(
