@@ -112,7 +112,8 @@ FAULTS: dict[str, tuple[str, list[Change], str]] = {
     ),
     "all speeds damped at walls": (
         TEMPLATE,
-        [("  const impulse", "  if (j < 0) { a.u *= 0.9; a.v *= 0.9; world.e = 1; }\n$&")],
+        [("  const impulse", "  if (j < 0) { a.u = world.e * (a.u - 2 * closing * nx);"
+          " a.v = world.e * (a.v - 2 * closing * ny); return; }\n$&")],
         "a collision with a wall changes the tangential velocity.",
     ),
     "atan for atan2": (
