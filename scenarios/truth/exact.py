@@ -18,7 +18,7 @@ from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, ha
 from scenarios.truth.oracle.path import Path
 from scenarios.truth.oracle.resting import FOR_SERIES
 from scenarios.truth.oracle.work import TimeLimit, WorkLimit
-from scenarios.truth.record import TruthRecord, last_time, record_of
+from scenarios.truth.record import CERTIFIED, TWO_PRECISIONS, TruthRecord, last_time, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # the tie is 2^-(bits / 2), below the eps of float64
 LEAST_GAIN = 1.05  # 1.5 times the bits must reach 1.05 times as far, else more bits do not help
@@ -133,7 +133,7 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
             )
             error, reached = spread(path, until), until
             if error < accuracy and not clock.expired:
-                return record_of(scenario, path, error, bits, "certified")
+                return record_of(scenario, path, error, bits, CERTIFIED)
         except Undecided as doubt:
             path, reached = replace(doubt.path, end=doubt.t), doubt.t
         attempts.append((path, bits))
@@ -164,7 +164,7 @@ def farthest(
     (end, error), path, bits = max(found, key=lambda one: one[0][0])
     if end < path.end or not path.reason:
         path = path.cut(end, f"{clock.reason} at t = {end:.9g} s")
-    return record_of(scenario, path, error, bits, "certified")
+    return record_of(scenario, path, error, bits, CERTIFIED)
 
 
 def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float]:
@@ -241,7 +241,7 @@ def two_precisions(
         if clock.expired
         else attempts[-1]
     )
-    return record_of(scenario, *best, "two-precision")
+    return record_of(scenario, *best, TWO_PRECISIONS)
 
 
 def _out_of_scale(scenario: Scenario) -> str:

@@ -11,7 +11,8 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Thrust
 from scenarios.truth.exact import computed
 from scenarios.truth.oracle.clusters import collapse, complementary
-from scenarios.truth.oracle.numbers import mpfr
+from scenarios.truth.oracle.numbers import has_balls, mpfr
+from scenarios.truth.record import CERTIFIED, SEARCHED
 from tests.scenarios.test_oracle import asked, states
 
 FLOOR = [[[-9, 0], [9, 0]]]
@@ -52,6 +53,17 @@ def test_a_column_falls_to_rest(mass: list[float], restitution: float, friction:
         truth.position[-1, :, 1], 0.5 + np.arange(len(mass)), rtol=0, atol=1e-13
     )
     assert not truth.velocity[-1].any()
+
+
+@pytest.mark.skipif(not has_balls(), reason="without python-flint no answer is certified")
+@pytest.mark.parametrize(
+    ("restitution", "duration", "method"),
+    [(0.0, 6.0, CERTIFIED), (0.1, 6.0, SEARCHED), (0.1, 0.2, CERTIFIED)],
+)
+def test_an_answer_that_rests_on_a_search_says_so(restitution: float, duration: float, method: str):
+    """The collapse of four disks at e = 0.1 is searched; at e = 0, or before it, nothing is."""
+    scene = column([1, 2, 3, 4], [0.1, 0.4, 0.4, 0.4], restitution)
+    assert computed(asked(scene, duration)).method == method
 
 
 def test_a_disk_beside_the_top_of_another_one_is_refused_by_name():

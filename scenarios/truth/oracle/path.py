@@ -70,6 +70,7 @@ class Path:
         outcomes: the possible outcomes at the end, if they are known.
         named: the collisions of each outcome: disk, other disk or -1 - wall.
         few_bits: whether it ends because its numbers have too few bits.
+        searched: s, from when on it rests on a search, see `TieOutcome`.
     """
 
     legs: list[list[Leg]]
@@ -80,10 +81,11 @@ class Path:
     outcomes: list[TieOutcome] = field(default_factory=list)
     named: list[list[tuple[int, int]]] = field(default_factory=list)
     few_bits: bool = False
+    searched: float = np.inf
 
     def cut(self, end: float, reason: str) -> Path:
         """The motion up to an earlier end, for another reason."""
-        return Path(self.legs, self.events, end, reason)
+        return Path(self.legs, self.events, end, reason, searched=self.searched)
 
 
 class RecentCollisions:
