@@ -143,11 +143,13 @@ class RecentCollisions:
         a wedge may bounce to its rest on one wall between two bounces on the other one."""
         contacts, waiting = dict[tuple[object, ...], Contact](), [i]
         for disk in waiting:
-            latest = [c for at, c in self.collisions[disk] if t - at <= self.instant]
-            count = Counter(map(key, latest))
+            count = Counter(c for at, c in self.collisions[disk] if t - at <= self.instant)
             shortly = [c for at, c in self.closed[disk] if t - at <= self.instant]
-            for contact in [*latest, *shortly]:
-                if contact in shortly or count[key(contact)] >= OFTEN:
+            often = Counter[tuple[object, ...]]()
+            for contact in count:
+                often[key(contact)] += count[contact]
+            for contact in dict.fromkeys([*count, *shortly]):
+                if contact in shortly or often[key(contact)] >= OFTEN:
                     contacts.setdefault(key(contact), contact)
                     more = {j for j in contact.disks if j < len(self.collisions)}
                     waiting += sorted(more - {*waiting})
