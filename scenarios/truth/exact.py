@@ -28,6 +28,7 @@ MOST_DISKS = 200
 # steps of the event loop for one attempt, about twenty seconds; few attempts need so many
 WORK = 40_000
 HEAVY = 4096  # bits at which a step takes twice the time of one with few bits
+SHORTEST = 1e-9  # m, of a wall, as in scene files; the square of a tiny one is 0 in float64
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
 # share of the remaining time for the coarser of two precisions; the finer one takes a little longer
@@ -253,6 +254,8 @@ def _out_of_scale(scenario: Scenario) -> str:
             f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a"
             " collision from a contact without approach"
         )
+    if (length := np.hypot(*(scene.walls[:, 1] - scene.walls[:, 0]).T).min(initial=1.0)) < SHORTEST:
+        return f"a wall of {length:g} m is below {SHORTEST:g} m: too short to follow exactly"
     sizes = {
         "radius": scene.radius,
         "position": scene.position,
