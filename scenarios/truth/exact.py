@@ -237,12 +237,12 @@ def two_precisions(
             SPARE * bits * until / max(diverged, until * bits / MOST_BITS)
         )
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
-    best = (
-        max(attempts, key=lambda attempt: min(attempt[0].end, until))
-        if clock.expired
-        else attempts[-1]
-    )
-    return record_of(scenario, *best, TWO_PRECISIONS)
+    path, error, bits = attempts[-1]
+    if clock.expired:
+        path, error, bits = max(attempts, key=lambda attempt: min(attempt[0].end, until))
+        if path.few_bits:  # more of them were tried, and the time ran out
+            path = path.cut(path.end, f"{clock.reason} at t = {path.end:.9g} s")
+    return record_of(scenario, path, error, bits, TWO_PRECISIONS)
 
 
 def _out_of_scale(scenario: Scenario) -> str:

@@ -12,6 +12,7 @@ from scenarios.model import Thrust
 from scenarios.truth.exact import computed
 from scenarios.truth.oracle.clusters import collapse, complementary
 from scenarios.truth.oracle.numbers import has_balls, mpfr
+from scenarios.truth.oracle.work import TimeLimit
 from scenarios.truth.record import CERTIFIED, SEARCHED
 from tests.scenarios.random_scenes import random_scenario
 from tests.scenarios.test_oracle import asked, states
@@ -201,3 +202,11 @@ def test_disks_of_a_random_pile_never_pass_through_each_other():
 
     assert record.reason == ""
     assert (apart - touch)[:, ~np.eye(one.scene.n, dtype=bool)].min() > -1e-12
+
+
+@pytest.mark.slow
+def test_where_the_time_ran_out_over_more_bits_the_reason_is_the_time():
+    """Not that the collisions accumulate: they do, to 256 bits, and to 1024 the answer goes on."""
+    scene = column([0.48, 5.43, 0.93, 1.1], [0.1] * 4, 0.9)
+    record = computed(asked(scene, 3.0), None, TimeLimit(2.0, "no time"))
+    assert record.reason.startswith("no time at t = ")
