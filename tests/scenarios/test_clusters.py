@@ -11,8 +11,8 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Thrust
 from scenarios.truth.exact import computed
 from scenarios.truth.oracle.clusters import collapse, complementary
-from scenarios.truth.oracle.numbers import has_balls, mpfr
-from scenarios.truth.oracle.work import TimeLimit
+from scenarios.truth.oracle.numbers import digits, has_balls, mpfr
+from scenarios.truth.oracle.work import TimeLimit, WorkLimit
 from scenarios.truth.record import CERTIFIED, SEARCHED
 from tests.scenarios.random_scenes import random_scenario
 from tests.scenarios.test_oracle import asked, states
@@ -205,8 +205,21 @@ def test_disks_of_a_random_pile_never_pass_through_each_other():
 
 
 @pytest.mark.slow
-def test_where_the_time_ran_out_over_more_bits_the_reason_is_the_time():
-    """Not that the collisions accumulate: they do, to 256 bits, and to 1024 the answer goes on."""
+def test_where_the_time_ran_out_over_more_bits_the_reason_is_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Not that the collisions accumulate: so they do to 256 bits, but with 1024 the answer goes on.
+    The time runs out here as soon as more bits are tried."""
+    step, clock = WorkLimit.step, TimeLimit(1000.0, "no time")
+
+    def stop_at_more_bits(limit: WorkLimit, t: float, bits: int) -> None:
+        clock.end = -np.inf if bits > 256 else clock.end
+        limit.stop = clock.end
+        step(limit, t, bits)
+
     scene = column([0.48, 5.43, 0.93, 1.1], [0.1] * 4, 0.9)
-    record = computed(asked(scene, 3.0), None, TimeLimit(2.0, "no time"))
+    monkeypatch.setattr(WorkLimit, "step", stop_at_more_bits)
+    record = computed(asked(scene, 3.0), digits, clock)
+
     assert record.reason.startswith("no time at t = ")
+    assert record.bits == 256
