@@ -24,7 +24,7 @@ from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table, print_texts
 from scenarios.model import Scenario
 from scenarios.truth.exact import CLOSED_FORM
-from scenarios.truth.record import TruthRecord
+from scenarios.truth.record import TWO_PRECISIONS, TruthRecord
 
 SHOWN = 10  # collisions at the start and at the end
 STATE = ("disk", "position_m", "velocity_m_s", "angle_rad", "angular_velocity_rad_s")
@@ -183,7 +183,7 @@ def precision(record: TruthRecord) -> str:
     if record.bits == 53:
         return "float64"
     return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (
-        record.method == "two-precision"
+        record.method == TWO_PRECISIONS
     )
 
 

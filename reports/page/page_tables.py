@@ -15,10 +15,15 @@ from reports.compare.verdicts import VERDICTS, Kind
 from reports.page import overview, situations, style
 from reports.page.style import number
 from reports.run.known_answers import MEANING
-from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, answered_by
-from scenarios.truth.oracle.numbers import has_balls
+from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, OracleTruth, answered_by
+from scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
 
 OUTCOMES = ("keeps", "not asked", "departs", "breaks")
+HOW_COMPUTED = {
+    CERTIFIED: "proven by interval arithmetic",
+    SEARCHED: "proven but for collisions that a search says never end",
+    TWO_PRECISIONS: "at two precisions that agree",
+}
 
 
 @dataclass(frozen=True)
@@ -198,19 +203,17 @@ def exact_answers(comparisons: Sequence[Comparison]) -> str:
     )
     parts = [f"{closed} of {len(models)} scenes have a closed form"] if closed else []
     if event_driven:
-        bound = max(
-            c.truth.error_bound
-            for c, m in zip(comparisons, models)
-            if m == EVENT_DRIVEN and c.truth is not None
-        )
-        how = (
-            "proven by interval arithmetic"
-            if has_balls()
-            else "computed at two precisions that agree"
-        )
+        computed = [c for c, model in zip(comparisons, models) if model == EVENT_DRIVEN]
+        bound = max(c.truth.error_bound for c in computed if c.truth is not None)
+        methods = [
+            c.scenario.truth.record().method
+            for c in computed
+            if isinstance(c.scenario.truth, OracleTruth)
+        ]
+        how = [f"{methods.count(m)} {HOW_COMPUTED[m]}" for m in HOW_COMPUTED if m in methods]
         parts.append(
             f"{event_driven} {'is' if event_driven == 1 else 'are'} computed from collision to"
-            f" collision in many digits, {how}, and off by at most {number(bound)} m"
+            f" collision in many digits ({', '.join(how)}), and off by at most {number(bound)} m"
         )
     if none:
         parts.append(

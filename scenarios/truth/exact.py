@@ -18,7 +18,7 @@ from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, ha
 from scenarios.truth.oracle.path import Path
 from scenarios.truth.oracle.resting import FOR_SERIES
 from scenarios.truth.oracle.work import TimeLimit, WorkLimit
-from scenarios.truth.record import TruthRecord, last_time, record_of
+from scenarios.truth.record import CERTIFIED, TWO_PRECISIONS, TruthRecord, last_time, record_of
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # the tie is 2^-(bits / 2), below the eps of float64
 LEAST_GAIN = 1.05  # 1.5 times the bits must reach 1.05 times as far, else more bits do not help
@@ -28,6 +28,7 @@ MOST_DISKS = 200
 # steps of the event loop for one attempt, about twenty seconds; few attempts need so many
 WORK = 40_000
 HEAVY = 4096  # bits at which a step takes twice the time of one with few bits
+SHORTEST = 1e-9  # m, of a wall, as in scene files; the square of a tiny one is 0 in float64
 LARGEST = 1e6  # of any length, speed or time, SI; and the inverse of the smallest radius
 CLOSED_FORM, EVENT_DRIVEN, NOTHING = "closed form", "event-driven, in many digits", "nothing"
 # share of the remaining time for the coarser of two precisions; the finer one takes a little longer
@@ -133,7 +134,7 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
             )
             error, reached = spread(path, until), until
             if error < accuracy and not clock.expired:
-                return record_of(scenario, path, error, bits, "certified")
+                return record_of(scenario, path, error, bits, CERTIFIED)
         except Undecided as doubt:
             path, reached = replace(doubt.path, end=doubt.t), doubt.t
         attempts.append((path, bits))
@@ -164,7 +165,7 @@ def farthest(
     (end, error), path, bits = max(found, key=lambda one: one[0][0])
     if end < path.end or not path.reason:
         path = path.cut(end, f"{clock.reason} at t = {end:.9g} s")
-    return record_of(scenario, path, error, bits, "certified")
+    return record_of(scenario, path, error, bits, CERTIFIED)
 
 
 def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float]:
@@ -236,12 +237,12 @@ def two_precisions(
             SPARE * bits * until / max(diverged, until * bits / MOST_BITS)
         )
         bits = min(max(2 * bits, needed), MOST_BITS // 2)
-    best = (
-        max(attempts, key=lambda attempt: min(attempt[0].end, until))
-        if clock.expired
-        else attempts[-1]
-    )
-    return record_of(scenario, *best, "two-precision")
+    path, error, bits = attempts[-1]
+    if clock.expired:
+        path, error, bits = max(attempts, key=lambda attempt: min(attempt[0].end, until))
+        if path.few_bits:  # more of them were tried, and the time ran out
+            path = path.cut(path.end, f"{clock.reason} at t = {path.end:.9g} s")
+    return record_of(scenario, path, error, bits, TWO_PRECISIONS)
 
 
 def _out_of_scale(scenario: Scenario) -> str:
@@ -253,6 +254,8 @@ def _out_of_scale(scenario: Scenario) -> str:
             f"a radius of {scene.radius.min():g} m is below {1 / LARGEST:g} m: too small to tell a"
             " collision from a contact without approach"
         )
+    if (length := np.hypot(*(scene.walls[:, 1] - scene.walls[:, 0]).T).min(initial=1.0)) < SHORTEST:
+        return f"a wall of {length:g} m is below {SHORTEST:g} m: too short to follow exactly"
     sizes = {
         "radius": scene.radius,
         "position": scene.position,

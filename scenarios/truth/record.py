@@ -23,6 +23,8 @@ ROUNDINGS = 4 * EPS
 # `walls.bouncing_ball_e09`
 LEAST_SHARE = 1e-5
 TOUCH = 1e-6  # m; a disk closer to a wall than this at the end may touch it
+CERTIFIED, TWO_PRECISIONS = "certified", "two-precision"
+SEARCHED = "certified but for the collapse, which is searched"  # see `clusters.collapse`
 NO_HOP, NO_TURN = (0.0,) * 4, (0.0,) * 3
 # The columns of `TruthRecord.legs`; `NORMAL`, `SPEED` and `FALL` are of the bounces, `TURN` is
 # angle, spin and its rate.
@@ -44,8 +46,8 @@ class TruthRecord:
         horizon: s; the motion is not known after it.
         error_bound: m.
         bits: precision of the numbers it was computed with.
-        method: "closed form", "two-precision" (half as many bits give the same) or "certified"
-            (interval arithmetic).
+        method: "closed form", `TWO_PRECISIONS` (half as many bits give the same), `CERTIFIED`
+            (interval arithmetic), or `SEARCHED`.
         reason: why it ends where it does.
         float64_horizon: s; up to then float64 engines are compared with it, see `order.py`.
         outcomes: (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends
@@ -168,6 +170,8 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     """The record of a path whose error is at most `error` m up to its end."""
     until, path = float64_horizon(scenario, within_float64(scenario, path, error))
     end = min(path.end, scenario.duration) if path.reason else np.inf
+    if method == CERTIFIED and path.searched < end:
+        method = SEARCHED
     legs = legs_of(path, end)
     rows = [_row(event) for event in path.events if float(event.t) < end]
     rows += [

@@ -17,6 +17,7 @@ from scenarios.model import Array, Scene
 
 BITS = 400
 LEFT = mpfr(10) ** -30  # m/s, and m: slower and nearer is at rest
+MOST_EVENTS = 100_000  # of a column, some 20 s
 
 
 class Ball(NamedTuple):
@@ -132,9 +133,13 @@ def stepped(scene: Scene, until: float, steps: int) -> tuple[float, float, float
     return float(way), float(v), float(spin)
 
 
-def column(scene: Scene, times: Array, order: np.random.Generator) -> tuple[Array, float]:
+Leg = tuple[mpfr, list[mpfr], list[mpfr], list[bool]]
+"""Of a column: from when on, s, its heights m and speeds m/s, and which disks lie."""
+
+
+def column(scene: Scene, times: Array, order: np.random.Generator) -> Array:
     """(k, n) m, the heights of disks above each other and above the floor y = 0, in order from
-    below; and s, when all of them lie.
+    below; only up to where `MOST_EVENTS` lead.
 
     Contact 0 is that of disk 0 with the floor, contact i that of the disks i - 1 and i. Of contacts
     that touch and approach at once, any may be next.
@@ -147,7 +152,7 @@ def column(scene: Scene, times: Array, order: np.random.Generator) -> tuple[Arra
         rests, now, legs = (
             [False] * n,
             mpfr(0),
-            list[tuple[mpfr, list[mpfr], list[mpfr], list[bool]]](),
+            list[Leg](),
         )
 
         def gap(i: int) -> mpfr:
@@ -167,7 +172,9 @@ def column(scene: Scene, times: Array, order: np.random.Generator) -> tuple[Arra
             return (b + gmpy2.sqrt(b * b + 2 * g * max(c, 0))) / g
 
         legs.append((now, [*y], [*v], [*rests]))
-        while not all(rests) and now < times[-1]:
+        for _ in range(MOST_EVENTS):
+            if all(rests) or now >= times[-1]:
+                break
             waits = [(s, i) for i in range(n) if (s := wait(i)) is not None]
             soonest = min(waits)[0]
             i = int(order.choice([i for s, i in waits if s == soonest]))
@@ -186,14 +193,12 @@ def column(scene: Scene, times: Array, order: np.random.Generator) -> tuple[Arra
                 lies = (k == 0 or rests[k - 1]) and abs(v[k]) < LEFT and gap(k) < LEFT
                 rests[k], v[k] = lies, mpfr(0) if lies else v[k]
             legs.append((now, [*y], [*v], [*rests]))
-        rows = []
-        for t in times:
-            at, y0, v0, lay = [leg for leg in legs if leg[0] <= t][-1]
-            s = mpfr(float(t)) - at
-            rows.append(
-                [
-                    float(a if still else a + b * s - g * s * s / 2)
-                    for a, b, still in zip(y0, v0, lay)
-                ]
-            )
-        return np.array(rows), float(now)
+        known = times if all(rests) else times[times <= float(now)]
+        return np.array([heights(legs, mpfr(float(t)), g) for t in known])
+
+
+def heights(legs: list[Leg], t: mpfr, g: mpfr) -> list[float]:
+    """(n,) m, of a column at `t` s."""
+    at, y, v, lies = [leg for leg in legs if leg[0] <= t][-1]
+    s = t - at
+    return [float(a if rests else a + b * s - g * s * s / 2) for a, b, rests in zip(y, v, lies)]

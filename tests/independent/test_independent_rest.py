@@ -12,6 +12,8 @@ from tests.independent.resting_motion import ball_on_slope, column, stepped
 pytestmark = pytest.mark.independent
 MANY = pytest.param(450, marks=pytest.mark.long)
 STEP = 1e-4  # s
+# in the reason of an answer that ends
+UNKNOWN = ("order of", "orders than", "do not end", "used up their digits")
 
 
 def slope_scene(seed: int) -> tuple[Scene, float]:
@@ -101,22 +103,26 @@ def test_balls_on_slopes_in_small_steps_are_as_near_as_their_step(count: int):
         assert abs(spin[0, 0] - w) * scene.radius[0] < c * STEP * 4 + 12 * g * STEP, seed
 
 
-@pytest.mark.parametrize("count", [20])
+@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.long)])
 def test_columns_come_to_rest_as_in_the_plain_motion(count: int):
     """Heights to 1e-11 m up to the horizon. An answer ends only where the order of collisions may
-    decide, or is not known not to; four of five last to the end."""
-    ended = 0
+    decide, or is not known not to; four of five last to the end.
+
+    The plain motion does not get past a collapse in flight: at most 1 column in 50 has one.
+    """
+    ended, cut_short = 0, list[int]()
     for seed in range(count):
         scene = column_scene(seed)
         one = asked(scene, 2.5)
         record = computed(one)
-        unknown = any(words in record.reason for words in ("order of", "orders than", "do not end"))
-        assert record.reason == "" or unknown, (seed, record.reason)
+        assert record.reason == "" or any(words in record.reason for words in UNKNOWN), seed
         ended += record.reason == ""
         times = one.times[one.times < min(record.horizon, one.duration)]
         (position, _), _ = record.motion(scene, [], times)
-        expected, _ = column(scene, times, np.random.default_rng(seed))
+        expected = column(scene, times, np.random.default_rng(seed))
+        cut_short += [seed] * (len(expected) < len(times))
         np.testing.assert_allclose(
-            position[:, :, 1], expected, rtol=0, atol=1e-11, err_msg=str(seed)
+            position[: len(expected), :, 1], expected, rtol=0, atol=1e-11, err_msg=str(seed)
         )
     assert ended >= 0.8 * count
+    assert len(cut_short) <= 0.02 * count, cut_short

@@ -11,7 +11,10 @@ from scenarios.families.placing import lay_out
 from scenarios.model import Thrust
 from scenarios.truth.exact import computed
 from scenarios.truth.oracle.clusters import collapse, complementary
-from scenarios.truth.oracle.numbers import mpfr
+from scenarios.truth.oracle.numbers import digits, has_balls, mpfr
+from scenarios.truth.oracle.work import TimeLimit, WorkLimit
+from scenarios.truth.record import CERTIFIED, SEARCHED
+from tests.scenarios.random_scenes import random_scenario
 from tests.scenarios.test_oracle import asked, states
 
 FLOOR = [[[-9, 0], [9, 0]]]
@@ -52,6 +55,17 @@ def test_a_column_falls_to_rest(mass: list[float], restitution: float, friction:
         truth.position[-1, :, 1], 0.5 + np.arange(len(mass)), rtol=0, atol=1e-13
     )
     assert not truth.velocity[-1].any()
+
+
+@pytest.mark.skipif(not has_balls(), reason="without python-flint no answer is certified")
+@pytest.mark.parametrize(
+    ("restitution", "duration", "method"),
+    [(0.0, 6.0, CERTIFIED), (0.1, 6.0, SEARCHED), (0.1, 0.2, CERTIFIED)],
+)
+def test_an_answer_that_rests_on_a_search_says_so(restitution: float, duration: float, method: str):
+    """The collapse of four disks at e = 0.1 is searched; at e = 0, or before it, nothing is."""
+    scene = column([1, 2, 3, 4], [0.1, 0.4, 0.4, 0.4], restitution)
+    assert computed(asked(scene, duration)).method == method
 
 
 def test_a_disk_beside_the_top_of_another_one_is_refused_by_name():
@@ -174,3 +188,38 @@ def test_a_disk_that_lies_on_a_static_one_between_others_stays():
     record = computed(one)
     assert record.reason == ""
     assert (states(one, record).position == scene.position).all()
+
+
+def test_disks_of_a_random_pile_never_pass_through_each_other():
+    """Six disks at e = 0.5 with friction. One stayed in the air when the one below was pushed away,
+    so that two came to the same place, which the order of collisions divided by."""
+    one = random_scenario(7, 1)
+    one = replace(one, scene=replace(one.scene, friction=0.3))
+    record = computed(one)
+    (position, _), _ = record.motion(one.scene, [], np.linspace(0.0, one.duration, 400))
+    apart = np.linalg.norm(position[:, :, None] - position[:, None], axis=-1)
+    touch = one.scene.radius[:, None] + one.scene.radius
+
+    assert record.reason == ""
+    assert (apart - touch)[:, ~np.eye(one.scene.n, dtype=bool)].min() > -1e-12
+
+
+@pytest.mark.slow
+def test_where_the_time_ran_out_over_more_bits_the_reason_is_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Not that the collisions accumulate: so they do to 256 bits, but with 1024 the answer goes on.
+    The time runs out here as soon as more bits are tried."""
+    step, clock = WorkLimit.step, TimeLimit(1000.0, "no time")
+
+    def stop_at_more_bits(limit: WorkLimit, t: float, bits: int) -> None:
+        clock.end = -np.inf if bits > 256 else clock.end
+        limit.stop = clock.end
+        step(limit, t, bits)
+
+    scene = column([0.48, 5.43, 0.93, 1.1], [0.1] * 4, 0.9)
+    monkeypatch.setattr(WorkLimit, "step", stop_at_more_bits)
+    record = computed(asked(scene, 3.0), digits, clock)
+
+    assert record.reason.startswith("no time at t = ")
+    assert record.bits == 256

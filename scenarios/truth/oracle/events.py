@@ -414,6 +414,8 @@ class Motion:
         rolls_on: the wall on which its disk has exactly no slip now.
         """
         bodies = self.bodies
+        if outcome.searched:
+            self.path.searched = min(self.path.searched, float(self.now))
         members, still_keys = self.ungroup(touched) - touched, {key(c) for c in outcome.still}
         velocities, in_step = in_step_after(self.finder, outcome, touches)
         for i in sorted(touched):

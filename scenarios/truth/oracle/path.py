@@ -70,6 +70,7 @@ class Path:
         outcomes: the possible outcomes at the end, if they are known.
         named: the collisions of each outcome: disk, other disk or -1 - wall.
         few_bits: whether it ends because its numbers have too few bits.
+        searched: s, from when on it rests on a search, see `TieOutcome`.
     """
 
     legs: list[list[Leg]]
@@ -80,10 +81,11 @@ class Path:
     outcomes: list[TieOutcome] = field(default_factory=list)
     named: list[list[tuple[int, int]]] = field(default_factory=list)
     few_bits: bool = False
+    searched: float = np.inf
 
     def cut(self, end: float, reason: str) -> Path:
         """The motion up to an earlier end, for another reason."""
-        return Path(self.legs, self.events, end, reason)
+        return Path(self.legs, self.events, end, reason, searched=self.searched)
 
 
 class RecentCollisions:
@@ -141,11 +143,13 @@ class RecentCollisions:
         a wedge may bounce to its rest on one wall between two bounces on the other one."""
         contacts, waiting = dict[tuple[object, ...], Contact](), [i]
         for disk in waiting:
-            latest = [c for at, c in self.collisions[disk] if t - at <= self.instant]
-            count = Counter(map(key, latest))
+            count = Counter(c for at, c in self.collisions[disk] if t - at <= self.instant)
             shortly = [c for at, c in self.closed[disk] if t - at <= self.instant]
-            for contact in [*latest, *shortly]:
-                if contact in shortly or count[key(contact)] >= OFTEN:
+            often = Counter[tuple[object, ...]]()
+            for contact in count:
+                often[key(contact)] += count[contact]
+            for contact in dict.fromkeys([*count, *shortly]):
+                if contact in shortly or often[key(contact)] >= OFTEN:
                     contacts.setdefault(key(contact), contact)
                     more = {j for j in contact.disks if j < len(self.collisions)}
                     waiting += sorted(more - {*waiting})

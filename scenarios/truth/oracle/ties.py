@@ -77,12 +77,14 @@ class TieOutcome(NamedTuple):
     contacts with exactly no speed along their normal (`still`).
 
     unresolved: `ENDLESS` or `TOO_MANY` for orders that were not followed to an outcome; "" else.
+    searched: whether a search, no proof, says that the contacts close.
     """
 
     velocities: Velocities
     collisions: list[Collision]
     still: frozenset[Contact]
     unresolved: str = ""
+    searched: bool = False
 
 
 @dataclass(frozen=True)
@@ -196,7 +198,7 @@ class CollisionLaw:
         for tried in range(MOST_ORDERS):
             if not waiting:
                 return ends, tried
-            now, collisions, still, _ = waiting.pop()
+            now, collisions, still = waiting.pop()[:3]
             speeds = [(touch, self.approach(touch, now)) for touch in touches]
             closing = [
                 (touch, speed)
@@ -282,7 +284,8 @@ class CollisionLaw:
         impulses = complementary(k, matrix, q)
         if impulses is None or (not self.sticks and not self.collapses(matrix, impulses, e)):
             return None
-        return self.close(touches, v, still, impulses)
+        end = self.close(touches, v, still, impulses)
+        return end and end._replace(searched=not self.sticks)
 
     def collapses(
         self, matrix: Sequence[Sequence[Number]], impulses: Mapping[int, Number], e: float

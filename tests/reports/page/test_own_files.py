@@ -18,10 +18,12 @@ from reports.page.charts import ChartLine, Drawing, figure_of
 from reports.page.findings import early_ends, not_counted, refusals, unranked_sentence
 from reports.page.first_screen import failed
 from reports.page.own_solvers import with_lines
-from reports.page.page_tables import conformance_matrix
+from reports.page.page_tables import conformance_matrix, exact_answers
 from reports.page.pooled import with_marks
 from reports.page.report import how_broken
 from scenarios.catalogue import scenario
+from scenarios.truth.exact import OracleTruth
+from scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
 from tests.reports.page.browsing import overhang
 
 
@@ -114,6 +116,20 @@ def test_the_end_of_the_exact_answer_to_a_scene_of_ones_own_is_said():
         "The exact answer of my-falling_box ends at 0.409 s of 2 s, and no error after that counts:"
         " beyond it the rounding of float64 makes any engine diverge."
     ]
+
+
+def test_each_exact_answer_is_counted_by_its_own_method():
+    """Two proven ones, one that rests on a search, and one at two precisions."""
+    one = scenario("falling_box")
+    record = OracleTruth(one).record()
+    methods = [CERTIFIED, SEARCHED, CERTIFIED, TWO_PRECISIONS]
+    answers = [
+        replace(one, truth=OracleTruth(one, replace(record, method=method))) for method in methods
+    ]
+    text = exact_answers([compare(answer, []) for answer in answers])
+
+    assert "4 are computed from collision to collision in many digits (2 proven by" in text
+    assert ", 1 proven but for collisions that a search says never end, 1 at two prec" in text
 
 
 def test_a_refusal_in_the_table_of_probes_is_not_asked():
