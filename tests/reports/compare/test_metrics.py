@@ -230,7 +230,7 @@ def test_to_refuse_a_scene_does_not_help_in_the_ranking():
     ]
 
     assert "2 scenes: reference:exercise" in findings(tables, set())[0]
-    assert "pymunk:matched in 1" in findings(tables, set())[2]
+    assert any("pymunk:matched in 1" in sentence for sentence in findings(tables, set()))
 
 
 def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
