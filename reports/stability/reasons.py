@@ -283,10 +283,10 @@ REASONS = (
         # the disk rolls at 2/3 of its initial speed
         for case, limit in (("spin_in_bounce", most), ("slide_to_roll", 1.5 * most))
     ),
-    Reason("creep_at_rest", "reference:*", IN_TURN, "reference_impl/coulomb.py"),
+    Reason("creep_at_rest", "reference:coulomb", IN_TURN, "reference_impl/coulomb.py"),
     # Stacks.
     Reason(
-        "column heavy_on_light pile_comes_to_rest dt_*",
+        "pile_comes_to_rest dt_*",
         "reference:ordered",
         "the number of collisions a step is limited, and unresolved ones show as overlap",
         "reference_impl/ordered.py",
