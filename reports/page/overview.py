@@ -201,7 +201,11 @@ def summary(
             if metric not in COUNTED
         ]
         played = sum(name not in each for each in failed)
-        cells.append(OverviewCell(f"{count} of {played}", failed=count > 0, value=count))
+        cells.append(
+            OverviewCell(f"{count} of {played}", failed=count > 0, value=count)
+            if played
+            else OverviewCell("–", "no scene was played")
+        )
         if name in untrusted:
             untested = OverviewCell(
                 "breaks", "breaks the protocol or a law: not scored", failed=True

@@ -25,8 +25,8 @@ from scenarios.truth.oracle.work import TimeLimit
 from scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"
-# share of the time limit; computing the horizon takes up to three quarters as long as the events
-FOR_EVENTS = 0.5
+# share of the time limit; computing the horizon takes up to as long as the events
+FOR_EVENTS = 0.4
 SAID = "answer.json"  # the member of an .npz file that holds the rest of the `ExactAnswer`
 
 

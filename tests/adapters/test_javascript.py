@@ -95,7 +95,9 @@ KNOWN: dict[str, dict[str, tuple[float, float] | str]] = {
         "dt_is_obeyed": "the air",
         "gravity_is_stated": "the air",
         **dict.fromkeys(("pair_keeps_e", "wall_keeps_e"), "the air, for 64 steps"),
-        "off_centre_is_normal": "the air and the friction of 0.1",
+        **dict.fromkeys(
+            ("off_centre_is_normal", "wall_is_normal"), "the air and the friction of 0.1"
+        ),
         "restitution_0.01": "the polygons, inside of their circles, have not met yet",
         "restitution_0.1": "as at 0.01 m/s",
         "restitution_0.5": "below the resting threshold of 1.2 m/s",

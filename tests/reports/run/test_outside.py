@@ -106,7 +106,7 @@ def test_a_failure_says_whether_it_lies_outside_what_was_done(task: Any, outside
 @pytest.mark.usefixtures("fresh_workers")
 def test_a_worker_that_cannot_start_is_not_the_fault_of_its_task(monkeypatch: pytest.MonkeyPatch):
     """A Python that ends at once."""
-    monkeypatch.setattr(worker.sys, "executable", shutil.which("false"))
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
     ended = one(fails)
 
     assert ended == Failure("crashed", "its worker could not start: exit status 1", outside=True)
@@ -119,7 +119,7 @@ def test_a_worker_that_does_not_come_up_is_not_the_fault_of_its_task(
     """A Python that says nothing."""
     (tmp_path / "python").write_text("#!/bin/sh\nexec sleep 1000\n")
     (tmp_path / "python").chmod(0o755)
-    monkeypatch.setattr(worker.sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
     monkeypatch.setattr(worker, "STARTING", 1.0)
     ended = one(fails)
 
