@@ -92,7 +92,7 @@ class EngineRow:
             ranked separately.
         departs: a probe of the protocol that it fails because of its physics, not its adapter ->
             the cause.
-        package: the npm package, pinned in adapters/javascript/package.json, that it uses and that
+        package: the npm package, pinned in adapters/host/package.json, that it uses and that
             is fetched once; "": it needs none.
         source: a hash of a solver's file, which changes when the file is saved with another text;
             "" for an engine of this program.

@@ -37,14 +37,14 @@ def _searched(module: str) -> Searched:
 
 
 def _javascript_searched(name: str) -> Searched:
-    from adapters.javascript.searched import SEARCHED
+    from adapters.host.searched import SEARCHED
 
     return SEARCHED[name]
 
 
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
     package = FETCHED[f"{name}:{profile}"].package
-    return _made("adapters.javascript.engine.JavaScriptEngine", name, package, profile, **settings)
+    return _made("adapters.host.engine.PackageEngine", name, package, profile, **settings)
 
 
 def _what_moves_is_a_bullet(engine: Any) -> None:
@@ -325,7 +325,7 @@ def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
 def read_row(name: str) -> EngineRow:
     """The row of a solver's file, `PATH:own`, read again; later calls of `row_of` return it. Raises
     `NotASolver`."""
-    from adapters.own_engine.engine import row_of_file
+    from adapters.host.engine import row_of_file
 
     _read[name] = row = row_of_file(Path(name.removesuffix(OWN)))
     return row

@@ -1,5 +1,5 @@
 """Fetches the JavaScript engines, and the gl-matrix of solvers' files, once into the user's cache,
-and reads no file but those that javascript/package.json names by version and SHA-512.
+and reads no file but those that host/package.json names by version and SHA-512.
 
 No engine's source is in this repository. npm comes with the extra `js`; what `npm ci` fetches is
 held to the hashes of package-lock.json by npm, and the one file of a package that is played to that
@@ -22,7 +22,7 @@ from typing import Any
 
 from adapters.engine import Unsupported
 
-HERE = Path(__file__).parent / "javascript"
+HERE = Path(__file__).parent / "host"
 PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
 HOW = "uv run --extra js crosscheck ..."
 ABSENT = f"not installed: {HOW}"

@@ -11,7 +11,7 @@ def forget_stale(folder: Path, *imported: Path) -> None:
     """Delete the kernels kept in a folder if a source file there, or in a folder that its kernels
     import, is newer: numba compares a kernel with its own file only."""
     sources = [source for each in (folder, *imported) for source in each.glob("*.py")]
-    newest = max(source.stat().st_mtime_ns for source in sources)
+    newest = max((source.stat().st_mtime_ns for source in sources), default=0)
     for kept in (folder / "__pycache__").glob("*.nb[ic]"):
         with suppress(OSError):  # another process deletes it, too, or the folder is read-only
             if kept.stat().st_mtime_ns < newest:

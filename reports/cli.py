@@ -332,16 +332,39 @@ def check(
             help="Write an autograder to DIR, and check nothing.",
         ),
     ] = "",
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Numbers of the questions.  [default: 0 for a file, random for a class]",
+        ),
+    ] = None,
+    packages: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--package",
+            metavar="NAME",
+            help="An installed package that a solver.py may import beside numpy. Repeatable.",
+        ),
+    ] = None,
+    unprotected: Annotated[
+        bool,
+        typer.Option(
+            "--unprotected",
+            help="Check a folder with Python files even where no sandbox works.",
+        ),
+    ] = False,
 ) -> None:
     """Check a hand-written solver of the exercise.
 
     Says what is right, what is wrong, and what likely causes each fault, and gives points.
 
-    A solver.py runs with all your permissions. It may import installed packages, and modules beside
-    it that are not named like one of those.
+    A solver.py runs in a sandbox where one works, which is said. It may import numpy, Python's own
+    modules, and modules beside it that are not named like one of those.
     """
+    from reports.check.command import Asking, grading_of, outputs_of
     from reports.check.command import check as check_and_say
-    from reports.check.command import grading_of, outputs_of
 
     grading = grading_of(points, id_pattern, hints)
     if scaffold:
@@ -349,7 +372,8 @@ def check(
 
         write_scaffold(scaffold, path, points, hints)
         return
-    check_and_say(path, page, outputs_of(as_json, junit, formats or [], outs or []), grading)
+    outputs = outputs_of(as_json, junit, formats or [], outs or [])
+    check_and_say(path, page, outputs, grading, Asking(seed, packages or (), unprotected))
 
 
 @app.command()

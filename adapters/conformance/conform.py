@@ -11,7 +11,7 @@ from adapters.conformance.physics import PHYSICS
 from adapters.conformance.probe import Probe, ProbeReading
 from adapters.engine import NotLoaded, Unsupported
 from adapters.engine_row import EngineRow
-from adapters.own_solver.process import processes_reused
+from adapters.host.process import processes_reused
 
 PROBES: dict[str, Probe] = CONTRACT | PHYSICS | LAWS
 

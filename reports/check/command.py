@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import secrets
 import sys
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from unicodedata import combining, normalize
 
-from adapters.own_solver.file import (
+from adapters.host.file import (
     KINDS,
     NotASolver,
     SolverFailed,
@@ -25,8 +26,10 @@ from adapters.own_solver.file import (
     printable,
     read_solver,
 )
-from adapters.own_solver.gl_matrix import HANDED_OUT
-from adapters.own_solver.process import SolverProcess, keep_processes
+from adapters.host.gl_matrix import HANDED_OUT
+from adapters.host.process import SolverProcess, protection
+from adapters.host.sandbox import Level
+from adapters.host.sandbox import files_of as files_of_packages
 from reports.check.formats import FORMATS, show
 from reports.check.functions import keeps_state
 from reports.check.marks import Marked, id_of, matched, place_of
@@ -77,7 +80,27 @@ class Grading(NamedTuple):
     low: bool
 
 
-def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Grading) -> None:
+class Asking(NamedTuple):
+    """How files are asked.
+
+    Attributes:
+        seed: of the numbers of the questions; None: 0 for a file, a random one for a class.
+        packages: what a solver.py may import beside numpy.
+        unprotected: check a folder with Python files even where nothing protects the machine.
+    """
+
+    seed: int | None = None
+    packages: Sequence[str] = ()
+    unprotected: bool = False
+
+
+def check(
+    path: Path,
+    page: Path | None,
+    outputs: Sequence[Output],
+    grading: Grading,
+    asking: Asking = Asking(),  # noqa: B008 - a tuple
+) -> None:
     """Check the file or folder `path` and print the result; exits 0, 1 (a fault was found) or 2
     (nothing to check)."""
     single = any(FORMATS[one.format].single for one in outputs)
@@ -86,7 +109,11 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     if page is None and not path.is_dir() and all(one.option == "--junit" for one in outputs):
         page = Path("check.html")
     places_for(page, outputs)
-    checks = checked(files)
+    say_protection(files, several, asking)
+    seed = asking.seed
+    if seed is None:
+        seed = secrets.randbelow(10**6) + 1 if several else 0
+    checks = checked(files, seed, asking.packages)
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
     if single and files[0].is_dir() and len(solvers_below(path)) > 1:
@@ -97,6 +124,7 @@ def check(path: Path, page: Path | None, outputs: Sequence[Output], grading: Gra
     not_read = [*others_in(path, files), *places] if several else []
     scenes = scenes_of(checks[0]) if page is not None and not several else []
     marked = marks_of(path, checks, grading, not_read, beside, scenes)
+    marked = [replace(one, seed=seed) for one in marked]
     printed = next((one.format for one in outputs if one.path is None), "")
     if printed:
         sys.stdout.write(FORMATS[printed].text(marked))
@@ -337,13 +365,36 @@ def place_for(option: str, path: Path, mark: bytes, what: str, seals: bool = Tru
         refuse([f"{option} {path}: {fault.strerror or fault}; name another file"])
 
 
-def checked(files: Sequence[Path]) -> list[FileCheck]:
+def say_protection(files: Sequence[Path], several: bool, asking: Asking) -> None:
+    """Say what keeps Python files from the machine; exits 2 if nothing does, for a folder."""
+    for name in asking.packages:
+        if name not in files_of_packages((name,)):
+            refuse([f"--package {name}: is not installed, or is a part of this program"])
+    if not any(file.suffix.lower() == ".py" for file in files):
+        return
+    level = protection()
+    if several and level == Level.NONE and not asking.unprotected:
+        refuse([f"{UNPROTECTED}; --unprotected checks them with all your permissions"])
+    say(PROTECTED[level])
+
+
+UNPROTECTED = "nothing here keeps the Python files of others from this machine"
+PROTECTED = {
+    Level.BUBBLEWRAP: "Python files run in a sandbox (bubblewrap)",
+    Level.USER: "Python files run as another user, without a sandbox: they can read what all may",
+    Level.NONE: f"{UNPROTECTED}: they run with all your permissions",
+}
+
+
+def checked(files: Sequence[Path], seed: int = 0, packages: Sequence[str] = ()) -> list[FileCheck]:
     """The checks in order, one worker per core, which can always be stopped. Files with the same
     text are judged once."""
     alike: dict[Hashable, list[Path]] = {}
     for file in files:
         alike.setdefault(identity_of(file), []).append(file)
-    tasks: dict[Hashable, Any] = {k: partial(check_here, same[0]) for k, same in alike.items()}
+    tasks: dict[Hashable, Any] = {
+        k: partial(check_here, same[0], seed, tuple(packages)) for k, same in alike.items()
+    }
     done: dict[Path, FileCheck] = {}
     results = run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)
     with closing(results), Progress() as progress:
@@ -359,10 +410,9 @@ def checked(files: Sequence[Path]) -> list[FileCheck]:
     return [done[file] for file in files]
 
 
-def check_here(file: Path) -> FileCheck:
-    """In a worker: the check of a file, in the process of the previous file if possible."""
-    keep_processes()
-    return refused_folder(file) if file.is_dir() else check_file(file)
+def check_here(file: Path, seed: int, packages: Sequence[str]) -> FileCheck:
+    """In a worker: the check of a file."""
+    return refused_folder(file) if file.is_dir() else check_file(file, seed, packages)
 
 
 def identity_of(file: Path) -> Hashable:

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from adapters.own_solver.restitution import code_of
+from adapters.host.restitution import code_of
 from reports.check.functions import failed_calls
 from reports.check.questions import Ball, SolverAnswer
 from reports.check.rows import CheckRow, judged, near, shown

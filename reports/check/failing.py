@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import SolverFailed
+from adapters.host.process import SolverProcess
 from reports.check import impulse, projection
 from reports.check.detection import detection_rows
 from reports.check.functions import arguments, failed_calls, failure

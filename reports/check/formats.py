@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from adapters.own_solver.file import printable
+from adapters.host.file import printable
 from reports.check.evidence import evidence
 from reports.check.marks import Marked, number
 from reports.check.outcomes import OUTCOMES
@@ -75,7 +75,7 @@ def csv_text(marked: Sequence[Marked]) -> str:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(
         ["id", *(f"task {task}" for task in tasks), "total", "of", *Tally._fields]
-        + ["not judged", "begin with", "seconds", "file"]
+        + ["not judged", "begin with", "seconds", "seed", "file"]
     )
     for one in marked:
         points = {mark.task: number(mark.points) for mark in one.tasks}
@@ -83,7 +83,7 @@ def csv_text(marked: Sequence[Marked]) -> str:
             [cell(one.id), *(points.get(task, "0") for task in tasks)]
             + [number(one.points), number(one.most), *one.check.tally()]
             + [number(one.not_judged), cell(one.brief)]
-            + [f"{one.check.seconds:.2f}", cell(str(one.check.path))]
+            + [f"{one.check.seconds:.2f}", str(one.seed), cell(str(one.check.path))]
         )
     return text.getvalue()
 
@@ -97,7 +97,7 @@ def gradescope_text(marked: Sequence[Marked]) -> str:
     """results.json of Gradescope: a test for each task, whose scores it adds up."""
     (one,) = marked
     results = {
-        "extra_data": {"crosscheck": version("crosscheck2d"), "id": one.id},
+        "extra_data": {"crosscheck": version("crosscheck2d"), "id": one.id, "seed": one.seed},
         "score": one.points,
         "execution_time": round(one.check.seconds, 3),
         "output": one.summary,

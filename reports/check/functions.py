@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
-from adapters.own_solver.restitution import code_of
+from adapters.host.restitution import code_of
 from reports.check.questions import Ball, SolverAnswer, was_stopped
 from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 

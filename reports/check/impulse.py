@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from adapters.own_solver.restitution import EXERCISE
+from adapters.host.restitution import EXERCISE
 from reports.check.collisions import PairCollision, outcome
 from reports.check.impacts import (
     IMPULSES,

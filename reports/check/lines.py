@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of
+from adapters.host.process import SolverProcess
+from adapters.host.restitution import code_of
 from reports.check.accesses import (
     LOOPS,
     Access,

@@ -9,8 +9,8 @@ from itertools import combinations
 
 import numpy as np
 
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import SolverFailed
+from adapters.host.process import SolverProcess
 from reports.check.questions import (
     LIMIT,
     Ball,
@@ -39,7 +39,7 @@ def loop_rows(process: SolverProcess, faulty: bool, kicks_apart: bool) -> list[C
     that move apart get an impulse.
     """
     has = process.functions
-    if not has["step"]:
+    if not has["simulate"]:
         return [not_asked("step", "loop", "the file has no function performSimStep")]
     start, no_scene = scene_of(process)
     if no_scene and not has["begin"]:

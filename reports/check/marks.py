@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from adapters.own_solver.file import printable
+from adapters.host.file import printable
 from reports.check.evidence import lines_and_formula
 from reports.check.outcomes import OUTCOMES, Status
 from reports.check.points import Points
@@ -64,6 +64,7 @@ class Marked:
         not_read: what lies in `root` without a row.
         scenes: the smallest that show its faults, if a format has them.
         beside: other solvers in the student's folder, which are not judged.
+        seed: of the numbers of its questions.
         label: what tables call it, the id that a pattern took out of the path; "" for its place in
             `root`.
     """
@@ -77,6 +78,13 @@ class Marked:
     scenes: Sequence[Smallest] = ()
     beside: Sequence[str] = ()
     label: str = ""
+    seed: int = 0
+
+    @property
+    def command(self) -> str:
+        """The command that asks the same questions again."""
+        seed = f" --seed {self.seed}" if self.seed else ""
+        return f"crosscheck check {printable(self.root.name)}{seed}"
 
     @property
     def name(self) -> str:

@@ -74,6 +74,7 @@ def write_page(path: Path, marked: Marked) -> None:
         styles=["check/check.css"],
         looks=looks,
         name=check.path.name,
+        command=marked.command,
         check=check,
         points={mark.task: points_of(mark) for mark in marked.tasks},
         total=marked.total,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.own_solver.restitution import EXERCISE
+from adapters.host.restitution import EXERCISE
 from reports.check.collisions import changes
 from reports.check.impacts import (
     BACKWARDS,

@@ -38,7 +38,7 @@ class SolverFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """A test for each row."""
-        from adapters.own_solver.file import NotASolver
+        from adapters.host.file import NotASolver
         from reports.check.solver import check_solver
 
         try:

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.own_solver.engine import BEGIN_LIMIT
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import Request, SolverProcess
+from adapters.host.engine import BEGIN_LIMIT
+from adapters.host.file import SolverFailed
+from adapters.host.process import Request, SolverProcess
 from reports.check.rows import TOLERANCE
 from scenarios.model import Array
 
@@ -208,6 +208,42 @@ def questions() -> dict[str, Question]:
 
 
 QUESTIONS = questions()
+# Their exact numbers are what they are about: a distance, or a speed at a threshold.
+EXACT = ("touch", "same centre", "slow", "even", "fast")
+MOTION = ("force", "coast", "turned")  # questions on one sphere, which are compared
+
+
+def vary(name: str, question: Question, seed: int) -> Question:
+    """A question with other numbers for the same situation: the pair elsewhere, and masses, speeds
+    and forces larger by up to a tenth. Distances, angles and the signs of all numbers stay."""
+    alike = "motion" if name.startswith(MOTION) else name.removeprefix("swapped/")
+    draws = np.random.default_rng([seed, *alike.removeprefix("collision/").encode()])
+    dx, dy = map(float, draws.uniform(-0.5, 0.5, 2))
+    v, F, w, torque, m, MoI = map(float, draws.uniform(1.0, 1.1, 6))
+    return question._replace(
+        balls=tuple(
+            b._replace(
+                x=(b.x[0] + dx, b.x[1] + dy),
+                v=(v * b.v[0], v * b.v[1]),
+                F=(F * b.F[0], F * b.F[1]),
+                w=w * b.w,
+                torque=torque * b.torque,
+                m=m * b.m,
+                MoI=MoI * b.MoI,
+            )
+            for b in question.balls
+        )
+    )
+
+
+def use_seed(seed: int) -> None:
+    """Ask with the numbers of a seed from now on; 0: those above. A recording of the answers to
+    one seed is worth nothing at another."""
+    for name, question in questions().items():
+        fixed = not seed or name in EXACT
+        QUESTIONS[name] = question if fixed else vary(name, question, seed)
+    for name in ON_COLLISIONS:
+        CLOSER[name], APART[name] = closer(QUESTIONS[name], 0.35), closer(QUESTIONS[name], 1.5)
 
 
 def closer(question: Question, share: float) -> Question:
@@ -320,7 +356,7 @@ def answered(reply: dict[str, Any] | SolverFailed, asked: Question) -> SolverAns
     """The answer from a reply of the worker."""
     if isinstance(reply, SolverFailed):
         return SolverAnswer([], failed=reply, asked=asked)
-    failed = None if reply["error"] is None else SolverFailed(**reply["error"])
+    failed = reply["error"]
     balls = [[ball(numbers) for numbers in state] for state in reply["states"]]
     return SolverAnswer(
         balls,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adapters.own_solver.restitution import (
+from adapters.host.restitution import (
     EXERCISE,
     NAMED,
     OwnRestitution,

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.own_solver.engine import spheres_of
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
+from adapters.host.engine import scene_message
+from adapters.host.file import SolverFailed
+from adapters.host.process import SolverProcess
 from reports.check.functions import keeps_state
 from reports.check.questions import fresh_world
 from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
@@ -58,30 +58,27 @@ def play_scene(
     for thrust in scenario.thrusts:
         forces[thrust.disk] += [*thrust.force, thrust.torque]
     step = {"count": count, "forces": forces.tolist() if forces.any() else None, "held": True}
-    start: dict[str, Any] = {
-        "spheres": spheres_of(scene),
-        "dt": dt,
-        "gravity": [0.0, 0.0],
-        "wrap": None,
-    }
+    start = scene_message(scene, dt, by_functions=True)
+    start |= {"gravity": [0.0, 0.0], "wrap": None}
     before = fresh_world(process) if afresh else []
     requests = [
         *before,
         ("load", start, LIMIT),
-        ("samples", {"step": step, "count": scenario.intervals}, LIMIT),
+        ("samples", {"step": step, "times": scenario.intervals}, LIMIT),
         ("contacts", None, LIMIT),
     ]
-    answers = process.request(requests, SCENE_LIMIT)[len(before) :]
+    answers: list[Any] = process.request(requests, SCENE_LIMIT)[len(before) :]
     for answer in answers:
         if isinstance(answer, SolverFailed):
             raise answer
     _, samples, contacts = answers
-    rows = np.array(samples, float)
+    numbers = samples["numbers"][: samples["readings"] * scene.n * 6]
+    rows = numbers.reshape(samples["readings"], scene.n, 6)
     return SceneAnswer(
         rows[..., 0:2],
         rows[..., 2:4],
-        rows[..., 6],
-        rows[..., 7],
+        rows[..., 4],
+        rows[..., 5],
         np.array(contacts, float).reshape(-1, 19),
     )
 

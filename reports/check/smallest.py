@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from hypothesis.configuration import set_hypothesis_home_dir
 from hypothesis.errors import Flaky, NoSuchExample
 
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import SolverFailed
+from adapters.host.process import SolverProcess
 from reports.check.rows import SAME_AGAIN, TOLERANCE, CheckRow, near, shown
 from reports.check.scenes import SceneAnswer, first_wrong, play_scene, scene_of, truth_of
 from reports.check.smallest_scene import DT, Smallest

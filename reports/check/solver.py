@@ -6,9 +6,9 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from adapters.own_solver.file import SolverFailed, SolverText, read_solver
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of, own_text, with_restitution
+from adapters.host.file import NotASolver, SolverFailed, SolverText, read_solver
+from adapters.host.process import SolverProcess
+from adapters.host.restitution import code_of, own_text, with_restitution
 from reports.check.consequences import with_consequences
 from reports.check.detection import WRONG_WAY, detection_rows
 from reports.check.failing import rows_until_failure
@@ -64,6 +64,10 @@ def examine(solver: SolverText) -> tuple[list[CheckRow], float | None]:
     try:
         process = SolverProcess(solver)
     except SolverFailed as failure:
+        if failure.kind == "unavailable":
+            raise NotASolver(
+                f"{solver.path}: cannot be judged: {failure}; a teacher allows it by --package"
+            ) from None
         row = judged("loads", "file", LOADS, f"no: {failure}", "yes", False, str(failure))
         return [replace(row, lines=named_line(row.cause, solver.text))], None
     try:

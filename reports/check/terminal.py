@@ -10,7 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from adapters.own_solver.file import KINDS, printable
+from adapters.host.file import KINDS, printable
 from reports.check.marks import Marked, TaskMark, number
 from reports.check.outcomes import OUTCOMES
 from reports.check.rows import TASKS, CheckRow

@@ -10,11 +10,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-from adapters.own_engine.surface import is_engine
-from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
-from adapters.own_solver.gl_matrix import lacks_gl_matrix
-from adapters.own_solver.restitution import code_of
+from adapters.host.file import NotASolver, SolverText, printable, read_solver
+from adapters.host.gl_matrix import lacks_gl_matrix
+from adapters.host.restitution import code_of
+from adapters.host.surface import is_engine
 from reports.check.functions import FUNCTIONS
+from reports.check.questions import use_seed
 from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
 from reports.check.solver import examine
 
@@ -193,18 +194,22 @@ def task_title(task: str) -> str:
     return f"Task {TASKS[task]}" if task[0] in "12" else TASKS[task][0].upper() + TASKS[task][1:]
 
 
-def check_file(path: Path) -> FileCheck:
-    """The check of one file, with its duration; a folder is refused."""
+def check_file(path: Path, seed: int = 0, packages: Sequence[str] = ()) -> FileCheck:
+    """The check of one file, with its duration; a folder is refused.
+
+    seed: of the numbers of its questions; packages: what it may import beside numpy.
+    """
     began = perf_counter()
-    return replace(check_of(path), seconds=perf_counter() - began)
+    use_seed(seed)
+    return replace(check_of(path, packages), seconds=perf_counter() - began)
 
 
-def check_of(path: Path) -> FileCheck:
+def check_of(path: Path, packages: Sequence[str]) -> FileCheck:
     """The check of one file, without its duration."""
     if path.is_dir():
         return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:
-        solver = read_solver(path)
+        solver = replace(read_solver(path), packages=tuple(packages))
         if is_engine(solver):
             raise NotASolver(f"{path}: {ENGINE}; {RUN_INSTEAD} {shlex.quote(str(path))}")
         rows, restitution = examine(solver)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from adapters.own_engine.engine import TEMPLATES
-from adapters.own_solver.file import KINDS
+from adapters.host.engine import TEMPLATES
+from adapters.host.file import KINDS
 from reports.run.arguments import faults_of_file
 from reports.terminal.console import Console
 from reports.terminal.exits import refuse

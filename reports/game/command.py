@@ -10,10 +10,9 @@ from typing import cast
 
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, OWN
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.engine import OwnSolver
-from adapters.own_solver.file import KINDS
-from adapters.own_solver.restitution import EXERCISE
+from adapters.host.engine import GuestEngine, row_of_file
+from adapters.host.file import KINDS
+from adapters.host.restitution import EXERCISE
 from reports.game.flight import FRAME, field_scenario
 from reports.game.messages import MOST_ENGINES
 from reports.game.server import Game
@@ -55,7 +54,7 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
     for name in names:
         path = Path(name.removesuffix(OWN))
         rows[name] = row_of_file(path, PATIENCE, collected=True)
-        with closing(cast(OwnSolver, rows[name].make())) as engine:
+        with closing(cast(GuestEngine, rows[name].make())) as engine:
             try:
                 restitutions.append(engine.own_restitution)
                 engine.load(field_scenario(asteroids=1, restitution=restitutions[-1]).scene, FRAME)

@@ -15,7 +15,7 @@ from adapters.advance import advance
 from adapters.engine import Engine
 from adapters.engines import ENGINES
 from adapters.first_collisions import weight_impulse
-from adapters.own_solver.engine import OwnSolver
+from adapters.host.engine import GuestEngine
 from adapters.runaway import RUNAWAY, fault_of, reach
 from reports.compare.laws import nearer_way
 from reports.game.divergence import (
@@ -201,10 +201,10 @@ class Flight:
     def fly_all(self, flyers: Sequence[Flyer]) -> None:
         """One frame of every engine; those in processes of their own fly side by side, and beside
         the others."""
-        elsewhere = [flyer for flyer in flyers if isinstance(flyer.engine, OwnSolver)]
+        elsewhere = [flyer for flyer in flyers if isinstance(flyer.engine, GuestEngine)]
         waiting = [self.threads.submit(self.fly, flyer, self.steered) for flyer in elsewhere]
         for flyer in flyers:
-            if not isinstance(flyer.engine, OwnSolver):
+            if not isinstance(flyer.engine, GuestEngine):
                 self.fly(flyer, self.steered)
         for each in waiting:
             each.result()

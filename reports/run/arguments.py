@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
+from adapters.host.file import KINDS, NotASolver
 from adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
-from adapters.own_solver.file import KINDS, NotASolver
 from reports.run.scenes import open_scene, with_steps
 from reports.terminal.console import Console
 from reports.terminal.exits import FolderTaken, refuse

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from adapters.conformance.conform import Finding, conform
 from adapters.conformance.probe import loaded, plain
 from adapters.engine_row import EngineRow
-from adapters.own_solver.process import keep_processes
+from adapters.host.process import keep_processes
 from adapters.play import play_once, unwatched
 from adapters.run import Run
 from reports.run.cells import Cell, source_hash, versions

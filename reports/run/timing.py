@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.own_solver.process import processes_reused
+from adapters.host.process import processes_reused
 from reports.run.stepping import Spent
 from scenarios.model import Array
 

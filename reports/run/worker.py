@@ -27,7 +27,7 @@ OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # signals that a fault of an en
 PRINTED = 65536
 WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
 # the calls that wait for what a solver's file answers
-ASKING = ("own_solver/process.py", "adapters/system.py")
+ASKING = ("host/process.py", "adapters/system.py")
 # of the thread that got the signal, which is the one that plays; other threads only watch
 INNERMOST = re.compile(
     r'Current thread [^\n]*most recent call first\):\s*File "([^"]+)", line (\d+) in (\S+)'

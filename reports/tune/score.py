@@ -13,7 +13,7 @@ import numpy as np
 
 from adapters.advance import advance
 from adapters.engine import Engine
-from adapters.javascript.engine import JavaScriptEngine
+from adapters.host.engine import PackageEngine
 from adapters.play import play_once
 from reports.compare import laws, scales
 from reports.compare.collisions import match
@@ -181,4 +181,4 @@ def spent(make: Make, scenario: Scenario) -> float:
         advance(
             engine, scenario, 0, scenario.intervals * TIMED_SUBSTEPS, scenario.dt(TIMED_SUBSTEPS)
         )
-        return engine.inside if isinstance(engine, JavaScriptEngine) else thread_time() - started
+        return engine.inside if isinstance(engine, PackageEngine) else thread_time() - started

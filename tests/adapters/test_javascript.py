@@ -25,13 +25,13 @@ from adapters.conformance.conform import ask, conform
 from adapters.conformance.probe import history, loaded, plain, scene_of
 from adapters.engine import Unsupported
 from adapters.engines import ENGINES, FETCHED, UNASKED
-from adapters.javascript.engine import IDLE, JavaScriptEngine
+from adapters.host import gl_matrix
+from adapters.host.engine import PackageEngine
+from adapters.host.file import read_solver
+from adapters.host.process import SolverProcess, waiting
 from adapters.mechanisms import table as mechanisms
 from adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
-from adapters.own_solver import gl_matrix
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
 from adapters.play import play_once
 from reports.run import arguments
 from reports.speed.budget import RESIDUAL, TOTAL, budget_of
@@ -195,11 +195,11 @@ def test_planck_differs_from_box2d_by_float32_alone():
 def test_a_process_that_has_played_gives_the_bits_of_a_new_one(name):
     """What is left in it of the engine before does not count: a process is used again."""
     row = FETCHED[name]
-    IDLE.clear()
+    waiting.clear()
     seen = []
     for _ in range(2):
         with loaded(row, plain()) as engine:
-            seen.append((history(engine), engine.process))
+            seen.append((history(engine), engine.process.process.pid))
         with loaded(row, replace(plain(), restitution=1.0), dt=1 / 64) as engine:
             engine.step(40)
     assert seen[0] == seen[1]
@@ -289,17 +289,17 @@ def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
 @fetched
 def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
     """The status of the run, and its process is not used again."""
-    monkeypatch.setattr("adapters.javascript.engine.STEP_LIMIT", 0.05)
-    IDLE.clear()
+    monkeypatch.setattr("adapters.host.engine.STEP_LIMIT", 0.025)
+    waiting.clear()
     one = scenario("head_on_equal_e09")
     run = play_once(
-        lambda: JavaScriptEngine("planck", "planck", "matched", velocity_iterations=10**9),
+        lambda: PackageEngine("planck", "planck", "matched", velocity_iterations=10**9),
         "planck:matched",
         one,
         one.dt(1),
     )
     assert (run.status, "0.05 s" in run.reason) == ("timeout", True)
-    assert not IDLE
+    assert not waiting
 
 
 # What their errors are made of.
@@ -463,7 +463,7 @@ def test_without_the_extra_a_row_says_how_it_is_installed(empty):
     """In the list, as the reason of a cell, and as one sentence where it is asked for."""
     listed = crosscheck("list", "engines", cwd=empty)
     assert " ".join(listed.stdout.split()).count("not installed: uv run --extra js") == len(FETCHED)
-    IDLE.clear()
+    waiting.clear()
     one = scenario("free_fall")
     run = play_once(FETCHED["planck:matched"].make, "planck:matched", one, one.dt(1))
     assert (run.status, "not installed: uv run --extra js" in run.reason) == ("unsupported", True)

@@ -15,10 +15,10 @@ import pytest
 
 from adapters.conformance.conform import ask, conform
 from adapters.engine_row import EngineRow
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_engine.features import FEATURES
-from adapters.own_solver.file import NotASolver
-from adapters.own_solver.process import SolverProcess
+from adapters.host.engine import TEMPLATES, row_of_file
+from adapters.host.features import FEATURES
+from adapters.host.file import NotASolver
+from adapters.host.process import SolverProcess
 from adapters.play import play, play_once
 from adapters.run import Run
 from reports.compare.comparison import compare
@@ -192,42 +192,42 @@ FAULTS = [  # language, what is written instead, status, what the sentence says
         "d.x += d.u * dt",
         "d.x = 0 / 0",
         "diverged",
-        'read returned ["NaN","NaN"] as position of disk 0; asked are finite numbers',
+        'read returned ["NaN","NaN"] as position of disk 0; expected are finite numbers',
     ),
     (
         PY,
         "d.x += d.u * dt",
         "d.x = float('nan')",
         "diverged",
-        "read returned [nan, nan] as position of disk 0; asked are finite numbers",
+        "read returned [nan, nan] as position of disk 0; expected are finite numbers",
     ),
     (
         JS,
         "disks.map((d) => [d.u, d.v])",
         "[[0, 0]]",
         "error",
-        "read returned [[0,0]] as velocity; asked is [x, y] for each of 2 disks",
+        "read returned [[0,0]] as velocity; expected is [x, y] for each of 2 disks",
     ),
     (
         PY,
         "[[d.u, d.v] for d in world.disks]",
         "[[0, 0]]",
         "error",
-        "read returned [[0, 0]] as velocity; asked is [x, y] for each of 2 disks",
+        "read returned [[0, 0]] as velocity; expected is [x, y] for each of 2 disks",
     ),
     (
         JS,
         "disks.map((d) => [d.u, d.v])",
         "disks.map((d) => [d.u])",
         "error",
-        "as velocity of disk 0; asked is [x, y] for each of 2 disks",
+        "as velocity of disk 0; expected is [x, y] for each of 2 disks",
     ),
     (
         PY,
         "[[d.u, d.v] for d in world.disks]",
         "[[1.0], [1.0, 2.0]]",
         "error",
-        "read returned [[1.0], [1.0, 2.0]] as velocity; asked is",
+        "read returned [[1.0], [1.0, 2.0]] as velocity; expected is",
     ),
     (
         JS,
@@ -248,21 +248,21 @@ FAULTS = [  # language, what is written instead, status, what the sentence says
         "velocity: disks.map((d) => [d.u, d.v]),",
         "",
         "error",
-        "it has no velocity; asked is [x, y] for each of 2 disks",
+        "it has no velocity; expected is [x, y] for each of 2 disks",
     ),
     (
         PY,
         '"velocity": [[d.u, d.v] for d in world.disks],',
         "",
         "error",
-        "it has no velocity; asked is [x, y] for each of 2 disks",
+        "it has no velocity; expected is [x, y] for each of 2 disks",
     ),
     (
         JS,
         "function step(",
         "async function step(",
         "error",
-        "step returned a Promise; asked is a plain function",
+        "step returned a Promise; expected is a plain function",
     ),
     (
         PY,
@@ -325,10 +325,16 @@ FAULTS = [  # language, what is written instead, status, what the sentence says
         "world.heard.append([a.i, j, impulse])",
         "world.heard.append(impulse)",
         "error",
-        "; asked are rows [i, j] or [i, j, impulse]",
+        "; expected are rows [i, j] or [i, j, impulse]",
     ),
-    (JS, "return world.heard", "return 3", "error", "collisions returned 3; asked are rows"),
-    (PY, "return world.heard", "return None", "error", "collisions returned None; asked are rows"),
+    (JS, "return world.heard", "return 3", "error", "collisions returned 3; expected are rows"),
+    (
+        PY,
+        "return world.heard",
+        "return None",
+        "error",
+        "collisions returned None; expected are rows",
+    ),
     (
         JS,
         '"disks walls gravity',

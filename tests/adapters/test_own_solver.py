@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from adapters.conformance.conform import ask, conform
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import own_restitution
+from adapters.host.engine import row_of_file
+from adapters.host.process import SolverProcess
+from adapters.host.restitution import own_restitution
 from adapters.play import play
 from scenarios.catalogue import scenario
 from scenarios.families.exercise import asteroid_field
@@ -52,7 +52,7 @@ def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
 
     def noted(self: SolverProcess, verb: str, what: Any, *limit: float) -> Any:
         if verb == "play":
-            heard.extend((each["count"], bool(each["forces"])) for each in what["steps"])
+            heard.extend((each["count"], bool(each["forces"])) for each in what)
         return do(self, verb, what, *limit)
 
     do = SolverProcess.do

@@ -16,8 +16,8 @@ import psutil
 import pytest
 
 from adapters import system
-from adapters.own_solver.file import SolverFailed, read_solver
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import SolverFailed, read_solver
+from adapters.host.process import SolverProcess
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
 PORTABLE = os.environ | {"CROSSCHECK_SYSTEM": "portable"}

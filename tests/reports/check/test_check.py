@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.own_solver import gl_matrix
-from adapters.own_solver.file import SolverFailed, read_solver
-from adapters.own_solver.process import SolverProcess
+from adapters.host import gl_matrix
+from adapters.host.file import SolverFailed, read_solver
+from adapters.host.process import SolverProcess
 from reports.check.functions import is_read
 from reports.check.loop import left_out, loop_rows
 from reports.check.questions import QUESTIONS, Ball, SolverAnswer, ask

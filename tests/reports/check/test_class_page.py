@@ -11,7 +11,7 @@ from time import perf_counter
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.own_solver.file import SolverText
+from adapters.host.file import SolverText
 from reports.check.class_page import NOTHING, bars, causes, distribution, write_class_page
 from reports.check.formats import csv_text
 from reports.check.marks import Marked

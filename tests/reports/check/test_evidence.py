@@ -11,8 +11,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import read_solver
+from adapters.host.process import SolverProcess
 from reports.check.accesses import Access, accesses_of, part_of
 from reports.check.consequences import with_consequences
 from reports.check.formats import SCHEMA, as_json

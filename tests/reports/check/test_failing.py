@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from adapters.own_solver.file import SolverFailed
+from adapters.host.file import SolverFailed
 from reports.check.accesses import Access, part_of
 from reports.check.failing import FAR, doubtful
 from reports.check.page import write_page

@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from adapters.own_solver import process as solver_process
-from adapters.own_solver.file import LONGEST, NotASolver, SolverFailed, read_solver
-from adapters.own_solver.process import SolverProcess
+from adapters.host import process as solver_process
+from adapters.host.file import LONGEST, NotASolver, SolverFailed, read_solver
+from adapters.host.process import SolverProcess
 from adapters.system import Pieces
 from reports.check.formats import as_junit
 from reports.check.verdict import FileCheck

@@ -10,7 +10,7 @@ from time import monotonic
 
 import pytest
 
-from adapters.own_solver.file import NotASolver
+from adapters.host.file import NotASolver
 from reports.check.rows import CheckRow
 from reports.check.solver import check_solver
 from reports.check.verdict import FileCheck

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import read_solver
+from adapters.host.process import SolverProcess
 from reports.check import command
 from reports.check.formats import FORMATS, SCHEMA
 from reports.check.rows import CheckRow

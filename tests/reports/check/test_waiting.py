@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from time import process_time
 from unittest import mock
@@ -15,16 +16,16 @@ from unittest import mock
 import pytest
 from py_mini_racer import JSTimeoutException
 
-from adapters.own_solver.file import PATIENCE, NotASolver, SolverFailed, read_solver
-from adapters.own_solver.javascript import JavaScriptSolver
-from adapters.own_solver.process import GRACE, WORK, SolverProcess
-from adapters.own_solver.worker import HERE
-from adapters.safe_path import python
+from adapters.host.file import PATIENCE, NotASolver, SolverFailed, read_solver
+from adapters.host.process import GRACE, SolverProcess
+from adapters.host.sandbox import GUEST, Level, start
 from reports.check.lines import Source
 from reports.check.rows import judged
 from reports.check.solver import with_lines
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
+sys.path.append(str(GUEST))
+v8 = import_module("v8")
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
 
 
@@ -45,16 +46,16 @@ def test_a_call_that_a_busy_machine_has_kept_waiting_is_asked_again_and_an_endle
     (tmp_path / "Exercise.js").write_text(JS)
     # V8 takes no time limit in a thread with an event loop, as this one has once a browser is open.
     with ThreadPoolExecutor(1) as pool:
-        solver = pool.submit(JavaScriptSolver, read_solver(tmp_path / "Exercise.js")).result()
+        solver = pool.submit(v8.V8Guest, read_solver(tmp_path / "Exercise.js").order).result()
 
     for spent, may_repeat, answer in ((0.0, True, "7"), (0.2, True, None), (0.0, False, None)):
         solver.v8 = mock.Mock()
         solver.v8.eval.side_effect = busy(spent)
         if answer is None:
             with pytest.raises(JSTimeoutException):
-                solver.evaluated("code", 0.2, may_repeat)
+                solver.evaluate("code", 0.2, may_repeat)
         else:
-            assert solver.evaluated("code", 0.2, may_repeat) == answer
+            assert solver.evaluate("code", 0.2, may_repeat) == answer
 
 
 @pytest.mark.parametrize("fails", ["", "while (true) {}"], ids=["none", "one is endless"])
@@ -84,6 +85,9 @@ def test_questions_put_together_are_answered_as_one_by_one(tmp_path: Path, fails
     assert str(together[4]) == str(together[3] if fails else together[0])
 
 
+FAILED = {"failed": {"kind": "error", "what": "", "line": 0, "column": 0}}
+
+
 def test_both_functions_may_be_endless_on_a_busy_machine(tmp_path: Path):
     """Each may have to be asked again, so that the process has the time of two."""
     (tmp_path / "Exercise.js").write_text(JS)
@@ -93,15 +97,15 @@ def test_both_functions_may_be_endless_on_a_busy_machine(tmp_path: Path):
         for call in (["integrate", 0, 0.1], ["integrate", 1, 0.1], ["collide", 0, 1])
     ]
     with SolverProcess(read_solver(tmp_path / "Exercise.js")) as process:
-        given = mock.Mock(side_effect=lambda asked, _: [{"done": None}] * len(asked))
+        given = mock.Mock(side_effect=lambda asked, _: {"done": [FAILED] * len(asked["do"])})
         process.exchange = given  # type: ignore[method-assign]
         process.request(ask)
         process.request(ask[:2])
         process.request([("left", None, 1.0)])
     both, one, left = (call.args[1] for call in given.call_args_list)
 
-    assert both == 2 * PATIENCE + GRACE
-    assert one == left == PATIENCE + GRACE
+    assert both == 2 * 2 * PATIENCE + GRACE
+    assert one == left == 2 * PATIENCE + GRACE
 
 
 def test_a_process_that_was_stopped_fails_again_when_it_is_asked(tmp_path: Path):
@@ -120,18 +124,21 @@ def test_a_worker_whose_parent_is_gone_ends_in_an_endless_loop_too(tmp_path: Pat
     """V8 stops the loop after its limit; nobody is there to hear it, and no process is left
     behind."""
     (tmp_path / "Exercise.js").write_text("while (true) {}")
+    how = start(Level.NONE, "javascript", (), None, False)
     worker = subprocess.Popen(
-        python(WORK),
+        how.command,
+        env=how.environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
     assert worker.stdin is not None
     assert worker.stdout is not None
-    assert json.loads(worker.stdout.readline()) == HERE
+    assert json.loads(worker.stdout.readline())["here"]
     worker.stdout.close()
-    solver = pickle.dumps((read_solver(tmp_path / "Exercise.js"), None)).hex()
-    worker.stdin.write(json.dumps(solver).encode() + b"\n")
+    request = {"id": "1", "open": read_solver(tmp_path / "Exercise.js").order}
+    worker.stdin.write(json.dumps(request).encode() + b"\n")
     worker.stdin.close()
     try:
         worker.wait(SECONDS)

@@ -19,7 +19,7 @@ from adapters.engine import ContactImpulse, Unsupported
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES
 from adapters.first_collisions import first_collisions
-from adapters.own_solver.engine import OwnSolver
+from adapters.host.engine import OwnSolver
 from adapters.play import play
 from reports.game.divergence import (
     NEVER,

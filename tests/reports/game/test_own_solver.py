@@ -20,8 +20,8 @@ from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
 
 from adapters.engines import ENGINES
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_solver.process import SolverProcess
+from adapters.host.engine import TEMPLATES, row_of_file
+from adapters.host.process import SolverProcess
 from reports.check.verdict import check_file
 from reports.commands.own_solvers import checked
 from reports.commands.serve import application

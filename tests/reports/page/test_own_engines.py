@@ -14,8 +14,8 @@ from adapters.conformance.conform import ask
 from adapters.conformance.laws import LAWS
 from adapters.conformance.probe import Departure
 from adapters.engines import ENGINES
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_solver.process import processes_reused
+from adapters.host.engine import TEMPLATES, row_of_file
+from adapters.host.process import processes_reused
 from reports.page.own_engines import WORDS, is_lawless, own_engine_sentences
 from tests.reports.terminal.command_line import crosscheck
 

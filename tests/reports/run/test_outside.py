@@ -6,7 +6,6 @@ from __future__ import annotations
 import ctypes
 import json
 import os
-import pickle
 import resource
 import shutil
 import subprocess
@@ -21,12 +20,10 @@ import pytest
 
 from adapters import safe_path
 from adapters.engine import NotStarted
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import WORK
-from adapters.own_solver.worker import HERE, MEMORY
+from adapters.host.engine import row_of_file
+from adapters.host.file import read_solver
+from adapters.host.sandbox import MEMORY, Level, start
 from adapters.play import play
-from adapters.safe_path import python
 from reports.run import runner, worker
 from reports.run.archive import Archive
 from reports.run.cells import Cell
@@ -238,8 +235,10 @@ def little_memory() -> None:
 
 def test_a_worker_with_little_memory_can_still_start_a_solver():
     """A limit that is lower than the solver's own stays as it is: nobody but root may raise it."""
+    how = start(Level.NONE, "python", (), None, False)
     with subprocess.Popen(
-        python(WORK),
+        how.command,
+        env=how.environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         preexec_fn=little_memory,
@@ -247,8 +246,8 @@ def test_a_worker_with_little_memory_can_still_start_a_solver():
     ) as process:
         assert process.stdin is not None
         assert process.stdout is not None
-        solver = json.dumps(pickle.dumps((read_solver(RIGHT), None)).hex())
-        process.stdin.write(solver.encode() + b"\n")
+        request = {"id": "1", "open": read_solver(RIGHT).order | {"folder": None}}
+        process.stdin.write(json.dumps(request).encode() + b"\n")
         process.stdin.flush()
-        assert json.loads(process.stdout.readline()) == HERE
-        assert json.loads(process.stdout.readline())["surface"] == "exercise"
+        assert json.loads(process.stdout.readline())["here"]
+        assert json.loads(process.stdout.readline())["functions"]["integrate"]

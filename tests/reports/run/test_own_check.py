@@ -10,7 +10,7 @@ from typing import cast
 
 import pytest
 
-from adapters.own_engine.engine import row_of_file
+from adapters.host.engine import row_of_file
 from reports.check.verdict import check_file
 from reports.commands.own_solvers import checked, checks_of, lines
 from reports.run.archive import LINES

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver import process as solver_process
-from adapters.own_solver.file import LARGEST, NotASolver, read_solver
+from adapters.host import process as solver_process
+from adapters.host.engine import row_of_file
+from adapters.host.file import LARGEST, NotASolver, read_solver
 from adapters.play import play
 from adapters.run import Run
 from reports.check.command import make_page, scenes_of
@@ -148,13 +148,12 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
 ):
     """Though one process plays both: a file that moves a sphere by the number of its calls so far
     plays the same twice."""
-    monkeypatch.setattr(solver_process, "waiting", None)  # of other tests
     started = Counter()
     begin = solver_process.SolverProcess.begin
     monkeypatch.setattr(
         solver_process.SolverProcess,
         "begin",
-        lambda self, settings: (started.update([file]), begin(self, settings)),
+        lambda self: (started.update([file]), begin(self)),
     )
     (tmp_path / file).write_text(COUNTS[file])
     row = row_of_file(tmp_path / file)

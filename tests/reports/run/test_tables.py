@@ -295,7 +295,7 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
     ("file", "hashed"),
     [
         ("adapters/pymunk.py", cells.source_hash),
-        ("adapters/own_solver/driver.js", cells.source_hash),
+        ("adapters/host/guest/driver.js", cells.source_hash),
         ("reference_impl/ordered.py", cells.source_hash),
         ("reports/compare/metrics.py", scene_tables.judge_hash),
         ("scenarios/truth/oracle/events.py", scene_tables.judge_hash),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from adapters.own_engine.engine import TEMPLATES, row_of_file
+from adapters.host.engine import TEMPLATES, row_of_file
 from reports.run.stepping import CALL, EMPTY, READ
 from reports.speed.ladder import times_of
 

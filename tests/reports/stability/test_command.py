@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from adapters.engines import ENGINES, read_row
-from adapters.own_engine.engine import TEMPLATES
+from adapters.host.engine import TEMPLATES
 from reports import cli
 from reports.page.links import PAGES
 from reports.run.folders import RUN, begun

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from adapters import safe_path
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
+from adapters.host.file import read_solver
+from adapters.host.process import SolverProcess
 from reports.run import worker
 from reports.run.cells import Cell
 from reports.run.playing import play_here

@@ -325,8 +325,8 @@ def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: st
     (tmp_path / name).write_text(text)
     question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
     asks = (
-        "from pathlib import Path; from adapters.own_solver.file import read_solver; "
-        "from adapters.own_solver.process import SolverProcess; "
+        "from pathlib import Path; from adapters.host.file import read_solver; "
+        "from adapters.host.process import SolverProcess; "
         f"SolverProcess(read_solver(Path({str(tmp_path / name)!r}))).do('ask', {question}, 60.0)"
     )
     asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)

@@ -27,11 +27,11 @@
   }
 
   // The settings are of the library, not of a world: every world sets all of them.
-  function set(scene, chosen) {
+  function set(scene, dt, chosen) {
     const settings = { ...DEFAULTS, baumgarte: chosen.baumgarte };
     if (chosen.matched) {
       const least = chosen.length_unit * Math.min(...scene.radius);
-      const unit = Math.max(least, chosen.step_unit * fastest(scene) * scene.dt);
+      const unit = Math.max(least, chosen.step_unit * fastest(scene) * dt);
       for (const name of ["linearSlop", "maxLinearCorrection", "aabbExtension"]) settings[name] *= unit;
       settings.velocityThreshold = unit / chosen.time_unit;
       settings.maxTranslation = settings.maxRotation = 1e9;
@@ -40,9 +40,11 @@
     Object.assign(planck.Settings, settings);
   }
 
-  function world(scene, chosen, hear) {
-    set(scene, chosen);
-    const { dt, restitution } = scene;
+  globalThis.models = "disks walls gravity static forces rotation friction wrap";
+  globalThis.create = (scene, dt) => {
+    const chosen = { ...profiles[scene.profile], ...scene.changed }, { restitution } = scene, heard = [];
+    const fixed = (i) => scene.mass[i] === Infinity;
+    set(scene, dt, chosen);
     const elastic = restitution === 1 && !scene.gravity.some((g) => g) ? "elastic_" : "";
     const continuous = chosen[elastic + "continuous"], bullet = chosen[elastic + "bullet"];
     const iterations = restitution === 1 ? chosen.elastic_position_iterations : chosen.position_iterations;
@@ -56,13 +58,13 @@
     const surface = { restitution, density: 1, ...(friction === null ? {} : { friction }) };
     const bodies = scene.position.map((position, i) => {
       const body = space.createBody({
-        type: scene.fixed[i] ? "static" : "dynamic", position: vector(position), angle: scene.angle[i], bullet,
-        linearVelocity: vector(scene.velocity[i]), angularVelocity: scene.spin[i], userData: i,
+        type: fixed(i) ? "static" : "dynamic", position: vector(position), angle: scene.angle[i], bullet,
+        linearVelocity: vector(scene.velocity[i]), angularVelocity: scene.angular_velocity[i], userData: i,
       });
       body.createFixture({ shape: new planck.Circle(scene.radius[i]), ...surface });
       // After the fixture: adding one computes mass and inertia from its density.
-      const I = chosen.turning ? scene.inertia[i] : 0;
-      if (!scene.fixed[i]) body.setMassData({ mass: scene.mass[i], center: { x: 0, y: 0 }, I });
+      const I = chosen.turning ? finite(scene.inertia[i]) : 0;
+      if (!fixed(i)) body.setMassData({ mass: scene.mass[i], center: { x: 0, y: 0 }, I });
       return body;
     });
     const walls = scene.walls.map(([start, end], w) => {
@@ -72,47 +74,64 @@
       body.createFixture({ shape, ...surface });
       return body;
     });
-    if (hear) {
+    if (scene.listening) {
       space.on("post-solve", (contact, { normalImpulses }) => {
         const of = (fixture) => fixture.getBody().getUserData();
-        hear(of(contact.getFixtureA()), of(contact.getFixtureB()), normalImpulses[0]);
+        heard.push([of(contact.getFixtureA()), of(contact.getFixtureB()), normalImpulses[0]]);
       });
     }
     // A transform keeps the angle only up to whole turns.
     const turns = scene.angle.map((angle, i) => whole(angle - bodies[i].getAngle()));
-    const angle = (i) => bodies[i].getAngle() + turns[i];
-    return {
-      step: () => space.step(dt, chosen.velocity_iterations, iterations),
-      force(i, x, y, torque) {
-        bodies[i].applyForceToCenter({ x, y }, true);
-        bodies[i].applyTorque(torque, true);
-      },
-      read(i) {
-        const { x, y } = bodies[i].getPosition(), v = bodies[i].getLinearVelocity();
-        return [x, y, v.x, v.y, angle(i), bodies[i].getAngularVelocity()];
-      },
-      place(i, x, y) {
-        const before = angle(i);
-        bodies[i].setTransform({ x, y }, bodies[i].getAngle());
-        turns[i] = whole(before - bodies[i].getAngle());
-      },
-      settings: () => [
-        ...Object.keys(DEFAULTS).map((name) => [name, chosen.matched ? planck.Settings[name] : null, planck.Settings[name]]),
-        ["speed cap in m/s", null, planck.Settings.maxTranslation / dt],
-        ["baumgarte", chosen.matched ? chosen.baumgarte : null, planck.Settings.baumgarte],
-        ["wall skin in m", chosen.skin ? null : 0, walls.length ? walls[0].getFixtureList().getShape().getRadius() : "no wall"],
-        ["friction", friction, bodies[0].getFixtureList().getFriction()],
-        ["restitution", restitution, bodies[0].getFixtureList().getRestitution()],
-        ["sleeping", chosen.matched ? chosen.sleeping : null, space.getAllowSleeping()],
-        ["continuous collision", chosen.matched ? continuous : null, space.getContinuousPhysics()],
-        ["continuous collision between disks", chosen.matched ? bullet : null, bodies.some((body) => body.isBullet())],
-        ["warm starting", chosen.matched ? chosen.warm_starting : null, space.getWarmStarting()],
-        ["velocity, position iterations", `${chosen.velocity_iterations}, ${iterations}`, "passed with every step"],
-      ],
-    };
-  }
+    return { chosen, space, bodies, walls, turns, heard, friction, restitution, continuous, bullet, iterations, dt };
+  };
+
+  const angle = ({ bodies, turns }, i) => bodies[i].getAngle() + turns[i];
+
+  globalThis.step = ({ space, bodies, heard, chosen, iterations }, dt, forces) => {
+    heard.length = 0;
+    forces.forEach(([x, y, torque], i) => {
+      if (!x && !y && !torque) return;
+      bodies[i].applyForceToCenter({ x, y }, true);
+      bodies[i].applyTorque(torque, true);
+    });
+    space.step(dt, chosen.velocity_iterations, iterations);
+  };
+
+  globalThis.read = (world) => ({
+    position: world.bodies.map((body) => pair(body.getPosition())),
+    velocity: world.bodies.map((body) => pair(body.getLinearVelocity())),
+    angle: world.bodies.map((_, i) => angle(world, i)),
+    angular_velocity: world.bodies.map((body) => body.getAngularVelocity()),
+  });
+
+  globalThis.collisions = ({ heard }) => heard;
+
+  globalThis.place = (world, i, x, y) => {
+    const before = angle(world, i), body = world.bodies[i];
+    body.setTransform({ x, y }, body.getAngle());
+    world.turns[i] = whole(before - body.getAngle());
+  };
+
+  globalThis.settings = (world) => {
+    const { chosen, space, bodies, walls, friction, restitution, continuous, bullet, iterations, dt } = world;
+    return [
+      ...Object.keys(DEFAULTS).map((name) => [name, chosen.matched ? planck.Settings[name] : null, planck.Settings[name]]),
+      ["speed cap in m/s", null, planck.Settings.maxTranslation / dt],
+      ["baumgarte", chosen.matched ? chosen.baumgarte : null, planck.Settings.baumgarte],
+      ["wall skin in m", chosen.skin ? null : 0, walls.length ? walls[0].getFixtureList().getShape().getRadius() : "no wall"],
+      ["friction", friction, bodies[0].getFixtureList().getFriction()],
+      ["restitution", restitution, bodies[0].getFixtureList().getRestitution()],
+      ["sleeping", chosen.matched ? chosen.sleeping : null, space.getAllowSleeping()],
+      ["continuous collision", chosen.matched ? continuous : null, space.getContinuousPhysics()],
+      ["continuous collision between disks", chosen.matched ? bullet : null, bodies.some((body) => body.isBullet())],
+      ["warm starting", chosen.matched ? chosen.warm_starting : null, space.getWarmStarting()],
+      ["velocity, position iterations", `${chosen.velocity_iterations}, ${iterations}`, "passed with every step"],
+    ];
+  };
 
   const whole = (angle) => 2 * Math.PI * Math.round(angle / (2 * Math.PI));
   const vector = ([x, y]) => ({ x, y });
-  play({ shipped, matched, world });
+  const pair = ({ x, y }) => [x, y];
+  const finite = (I) => (I < Infinity ? I : 1);
+  const profiles = { shipped, matched };
 }

@@ -9,16 +9,11 @@ run time are not covered.
 from __future__ import annotations
 
 import ast
-import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from importlib.abc import MetaPathFinder, SourceLoader
-from importlib.machinery import ModuleSpec, PathFinder
-from importlib.util import spec_from_file_location
+from collections.abc import Callable, Iterator, Sequence
+from importlib.machinery import PathFinder
 from pathlib import Path
-from types import CodeType
-from typing import Any
 
 from adapters.safe_path import PACKAGES
 
@@ -39,6 +34,20 @@ def modules_beside(
             module = read(file)
             names |= imported_by(module)
             yield file.relative_to(folder).as_posix(), module
+
+
+REFERENCE = Path(__file__).parents[2] / "reference_impl"
+
+
+def reference_modules(text: str) -> dict[str, str]:
+    """File -> text of the two modules that a changed copy of the exercise's solver imports, by both
+    of their names; none if it imports nothing of reference_impl."""
+    if not imported_by(text) & {"reference_impl", "crosscheck2d"}:
+        return {}
+    files = ("__init__.py", "state.py", "compiled.py")
+    texts = {file: (REFERENCE / file).read_text(encoding="utf-8") for file in files[1:]}
+    folders = ("reference_impl", "crosscheck2d/reference_impl")
+    return {f"{folder}/{file}": texts.get(file, "") for folder in folders for file in files}
 
 
 def imported_by(text: str) -> set[str]:
@@ -81,49 +90,3 @@ def files_of(folder: Path, name: str) -> Sequence[Path]:
     if module.exists() and not (package / "__init__.py").exists():
         return [module]
     return sorted(package.rglob("*.py"))
-
-
-class Neighbours(SourceLoader, MetaPathFinder):
-    """Imports the neighbours of a solver from their texts, whether or not the files still exist."""
-
-    def __init__(self, folder: Path, texts: Mapping[str, str], copies: Path) -> None:
-        """`texts`: from `modules_beside` of `folder`; their code objects name files in `copies`."""
-        self.folder, self.texts, self.copies = folder, texts, copies
-
-    def find_spec(self, fullname: str, *_: Any) -> ModuleSpec | None:
-        """As Python finds it in the folder: a package, a module, or a namespace package."""
-        place = fullname.replace(".", "/")
-        for file, within in (
-            (f"{place}/__init__.py", [str(self.folder / place)]),
-            (f"{place}.py", None),
-        ):
-            if file in self.texts:
-                return spec_from_file_location(
-                    fullname, self.folder / file, loader=self, submodule_search_locations=within
-                )
-        inside = any(file.startswith(f"{place}/") for file in self.texts)
-        return ModuleSpec(fullname, None, is_package=True) if inside else None
-
-    def get_filename(self, fullname: str) -> str:
-        """The path of a module's file."""
-        spec = self.find_spec(fullname)
-        if spec is None or spec.origin is None:
-            raise ImportError(f"{fullname} is no module beside the solver", name=fullname)
-        return spec.origin
-
-    def get_data(self, path: str | bytes) -> bytes:
-        """The text of a file; raises `OSError` for other files, such as compiled code."""
-        file = Path(os.fsdecode(path)).relative_to(self.folder).as_posix()
-        if file not in self.texts:
-            raise OSError(f"{file} was not read with the solver")
-        return self.texts[file].encode()
-
-    def source_to_code(self, data: Any, path: Any = "<string>") -> CodeType:  # type: ignore[override]
-        """The code of a module; compiled from decoded text, to which the encoding in its first line
-        no longer applies."""
-        return compile(
-            data.decode(),
-            str(self.copies / Path(path).relative_to(self.folder)),
-            "exec",
-            dont_inherit=True,
-        )

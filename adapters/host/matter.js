@@ -18,8 +18,10 @@
     ...common, matched: true, pixels_in_radius: 1e5, friction_air: 0, friction_static: null, sides: 200,
   };
 
-  function world(scene, chosen, hear) {
-    const { dt, restitution } = scene;
+  globalThis.models = "disks walls gravity static forces rotation friction wrap";
+  globalThis.create = (scene, dt) => {
+    const chosen = { ...profiles[scene.profile], ...scene.changed }, { restitution } = scene, heard = [];
+    const fixed = (i) => scene.mass[i] === Infinity;
     const scale = chosen.matched ? chosen.pixels_in_radius / Math.min(...scene.radius) : chosen.pixels;
     const speed = scale * BASE / 1000, spin = BASE / 1000, force = scale * 1e-6;
     Matter.Resolver._restingThresh = chosen.resting;
@@ -38,16 +40,16 @@
     });
     const index = new Map();
     const bodies = scene.position.map(([x, y], i) => {
-      const options = { ...surface(), isStatic: scene.fixed[i] };
+      const options = { ...surface(), isStatic: fixed(i) };
       const body = Matter.Bodies.circle(x * scale, y * scale, scene.radius[i] * scale, options, chosen.sides);
       index.set(body.id, i);
       Matter.Body.setAngle(body, scene.angle[i]);
-      if (scene.fixed[i]) return body;
+      if (fixed(i)) return body;
       Matter.Body.setMass(body, scene.mass[i]);
-      Matter.Body.setInertia(body, chosen.turning ? scene.inertia[i] * scale ** 2 : Infinity);
+      Matter.Body.setInertia(body, chosen.turning ? finite(scene.inertia[i]) * scale ** 2 : Infinity);
       body.deltaTime = dt * 1000;  // so that its first step is as long as the others
       Matter.Body.setVelocity(body, { x: scene.velocity[i][0] * speed, y: scene.velocity[i][1] * speed });
-      Matter.Body.setAngularVelocity(body, scene.spin[i] * spin);
+      Matter.Body.setAngularVelocity(body, scene.angular_velocity[i] * spin);
       return body;
     });
     const walls = scene.walls.map(([[x0, y0], [x1, y1]], w) => {
@@ -58,42 +60,53 @@
       return body;
     });
     Matter.Composite.add(engine.world, [...bodies, ...walls]);
-    if (hear) {
+    if (scene.listening) {
       // Its events tell who meets whom, and no impulse.
       Matter.Events.on(engine, "collisionStart", ({ pairs }) => {
-        for (const { bodyA, bodyB } of pairs) hear(index.get(bodyA.id), index.get(bodyB.id), NaN);
+        for (const { bodyA, bodyB } of pairs) heard.push([index.get(bodyA.id), index.get(bodyB.id), NaN]);
       });
     }
-    return {
-      step: () => Matter.Engine.update(engine, dt * 1000),
-      force(i, x, y, torque) {
-        bodies[i].force.x += x * force;
-        bodies[i].force.y += y * force;
-        bodies[i].torque += torque * scale * force;
-      },
-      read(i) {
-        const body = bodies[i], v = Matter.Body.getVelocity(body);
-        return [
-          body.position.x / scale, body.position.y / scale, v.x / speed, v.y / speed, body.angle,
-          Matter.Body.getAngularVelocity(body) / spin,
-        ];
-      },
-      place: (i, x, y) => Matter.Body.setPosition(bodies[i], { x: x * scale, y: y * scale }),
-      settings: () => [
-        ["pixels in a metre", scale, "kept by the adapter"],
-        ["resting threshold in m/s, at this dt", null, Matter.Resolver._restingThresh / speed],
-        ["slop in m", null, bodies[0].slop / scale],
-        ["sides of the polygon of a disk", chosen.matched ? chosen.sides : null, bodies[0].vertices.length],
-        ["thickness of a wall in m", THIN / scale, "kept by the adapter"],
-        ["friction", friction, bodies[0].friction],
-        ["static friction", chosen.friction_static, bodies[0].frictionStatic],
-        ["friction of the air", chosen.friction_air, bodies[0].frictionAir],
-        ["restitution", restitution, bodies[0].restitution],
-        ["sleeping", chosen.matched ? chosen.sleeping : null, engine.enableSleeping],
-        ["velocity, position iterations", null, `${engine.velocityIterations}, ${engine.positionIterations}`],
-      ],
-    };
-  }
+    return { chosen, engine, bodies, heard, scale, speed, spin, force, friction, restitution };
+  };
 
-  play({ shipped, matched, world });
+  globalThis.step = ({ engine, bodies, heard, scale, force }, dt, forces) => {
+    heard.length = 0;
+    forces.forEach(([x, y, torque], i) => {
+      bodies[i].force.x += x * force;
+      bodies[i].force.y += y * force;
+      bodies[i].torque += torque * scale * force;
+    });
+    Matter.Engine.update(engine, dt * 1000);
+  };
+
+  globalThis.read = ({ bodies, scale, speed, spin }) => ({
+    position: bodies.map(({ position }) => [position.x / scale, position.y / scale]),
+    velocity: bodies.map((body) => {
+      const v = Matter.Body.getVelocity(body);
+      return [v.x / speed, v.y / speed];
+    }),
+    angle: bodies.map((body) => body.angle),
+    angular_velocity: bodies.map((body) => Matter.Body.getAngularVelocity(body) / spin),
+  });
+
+  globalThis.collisions = ({ heard }) => heard;
+
+  globalThis.place = ({ bodies, scale }, i, x, y) => Matter.Body.setPosition(bodies[i], { x: x * scale, y: y * scale });
+
+  globalThis.settings = ({ chosen, engine, bodies, scale, speed, friction, restitution }) => [
+    ["pixels in a metre", scale, "kept by the adapter"],
+    ["resting threshold in m/s, at this dt", null, Matter.Resolver._restingThresh / speed],
+    ["slop in m", null, bodies[0].slop / scale],
+    ["sides of the polygon of a disk", chosen.matched ? chosen.sides : null, bodies[0].vertices.length],
+    ["thickness of a wall in m", THIN / scale, "kept by the adapter"],
+    ["friction", friction, bodies[0].friction],
+    ["static friction", chosen.friction_static, bodies[0].frictionStatic],
+    ["friction of the air", chosen.friction_air, bodies[0].frictionAir],
+    ["restitution", restitution, bodies[0].restitution],
+    ["sleeping", chosen.matched ? chosen.sleeping : null, engine.enableSleeping],
+    ["velocity, position iterations", null, `${engine.velocityIterations}, ${engine.positionIterations}`],
+  ];
+
+  const finite = (I) => (I < Infinity ? I : 1);
+  const profiles = { shipped, matched };
 }

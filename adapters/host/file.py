@@ -1,4 +1,4 @@
-"""Reads a solver's file as text, and says in a sentence why it cannot be one.
+"""Reads a guest's file as text, and says in a sentence why it cannot be one.
 
 A file is read once. This text is played, checked and hashed; what is saved later does not matter.
 """
@@ -9,11 +9,12 @@ import codecs
 import hashlib
 import re
 import stat
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any
 
-from adapters.own_solver.beside import modules_beside
+from adapters.host.beside import modules_beside, reference_modules
 
 LARGEST = 2**20  # bytes; the exercise's file has about 5000
 # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
@@ -37,9 +38,9 @@ class SolverFailed(Exception):
     """A solver cannot be loaded, or did not return from a call.
 
     Attributes:
-        kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine of
-            adapters/javascript; "diverged" if `read` of an engine's file returns numbers that are
-            not finite.
+        kind: "error" (threw), "timeout", "memory" or "crashed"; "refused" by an engine;
+            "unavailable": imports what is not there, or what it may not; "diverged"
+            if `read` of an engine returns numbers that are not finite.
         what: the end of the sentence "it ..."; control characters are escaped, and text beyond
             `LONGEST` characters is cut.
         line, column: the place in the solver's file, from 1; 0 if it is not known.
@@ -67,21 +68,9 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-class Loadable(Protocol):
-    """Something other than a solver's file that a process can load; it is sent there pickled."""
-
-    @property
-    def kind(self) -> str:
-        """It is `packaged`."""
-
-    def load(self) -> Any:
-        """The object that answers the commands of a solver, in that process; raises
-        `SolverFailed`."""
-
-
 @dataclass(frozen=True)
 class SolverText:
-    """A solver's file as read, with all that is needed to play it on any machine.
+    """A guest's file as read, with all that is needed to play it on any machine.
 
     Attributes:
         path: where it was.
@@ -90,21 +79,42 @@ class SolverText:
         digest: 16 hex digits of SHA-256 over the file's bytes, as sha256sum gives them.
         imported: the modules that it imports from its own folder, or the gl-matrix that it calls:
             file, relative to the folder or to the one above with its node_modules, -> text.
-        engine: for an engine's file its `EngineText` of adapters/own_engine, which loads itself.
+        engine: it has create, step and read; else it is a solver of the exercise.
+        packages: the installed packages that it may import, beside numpy.
+        package: the text of the npm package that it drives, with its `versions`; else None.
     """
-
-    engine: ClassVar[bool] = False
 
     path: Path
     kind: str
     text: str
     digest: str
     imported: tuple[tuple[str, str], ...] = ()
+    engine: bool = False
+    packages: tuple[str, ...] = ()
+    package: str | None = field(default=None, repr=False)
+    versions: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def source(self) -> str:
         """16 hex digits of a hash over every text that affects its behaviour."""
         return hashlib.sha256(repr((self.digest, self.imported)).encode()).hexdigest()[:16]
+
+    @property
+    def reference(self) -> dict[str, str]:
+        """The modules of this program that it is given."""
+        return reference_modules(self.text) if self.kind == "python" else {}
+
+    @property
+    def order(self) -> dict[str, Any]:
+        """What its process is told, which does not tell where the file is."""
+        return {
+            "kind": self.kind,
+            "name": self.path.name,
+            "text": self.text,
+            "imported": (*self.imported, *self.reference.items()),
+            "engine": self.engine,
+            "package": self.package,
+        }
 
 
 PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
@@ -156,7 +166,7 @@ def read_library(path: Path, text: str) -> dict[str, str]:
     """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
     `NotASolver`."""
     # it imports numpy, which --help does not need
-    from adapters.own_solver.gl_matrix import gl_matrix_of, where_to
+    from adapters.host.gl_matrix import gl_matrix_of, where_to
 
     found = gl_matrix_of(path, text)
     return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], where_to()))}

@@ -13,7 +13,7 @@ from adapters.npm_packages import HOW, file_of, missing
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
-# what V8, or javascript.py, says of a file whose gl-matrix is missing, or is none
+# what V8, or its guest, says of a file whose gl-matrix is missing, or is none
 LACKING = re.compile(
     rf"ReferenceError: (?:{'|'.join(NAMES)}) is not defined|calls \S+, which cannot be loaded \("
 )
@@ -21,13 +21,6 @@ HANDED_OUT = "gl-matrix*.js"
 BESIDE = "put the gl-matrix.js that the exercise hands out beside the file"
 # 2.x, then 3.x
 BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")
-# Up to version 2 vec2, mat4 ... are globals; from version 3 on they are inside glMatrix, and are
-# taken out of it.
-TAKE_OUT = f"""if (typeof glMatrix === "object") {{
-  for (const name of {json.dumps(NAMES)}) {{
-    if (!(name in globalThis) && name in glMatrix) globalThis[name] = glMatrix[name];
-  }}
-}}"""
 
 
 def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
@@ -57,6 +50,11 @@ def lacks_gl_matrix(said: str) -> bool:
     """Whether a failure says that the gl-matrix that a file calls is missing, which is no fault of
     the file."""
     return bool(LACKING.search(said))
+
+
+def with_hint(what: str) -> str:
+    """A failure, with what to do if it says that gl-matrix is missing, or is none."""
+    return f"{what}: {where_to()}" if LACKING.match(what) else what
 
 
 def where_to() -> str:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from adapters.engine import Unsupported
 from adapters.friction import Frictionless
-from adapters.own_solver.file import SolverFailed
+from adapters.host.file import SolverFailed
 from scenarios.model import Scene
 
 # Word in the line -> its name in a sentence.

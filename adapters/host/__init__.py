@@ -1,0 +1,1 @@
+"""Code of others, in processes of its own."""

@@ -1,0 +1,459 @@
+"""A guest behind the protocol of an engine: an npm package, an engine of somebody's own, a solver
+of the exercise; each is driven in a process of its own, by the same messages."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.advance import Foreseen
+from adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsupported
+from adapters.engine_row import FLOAT64, EngineRow
+from adapters.float32 import must_fit, rounding
+from adapters.friction import must_be_frictionless
+from adapters.host.beside import imported_by
+from adapters.host.features import features_of, must_model, refusal
+from adapters.host.file import LONGEST, SolverFailed, SolverText, printable, read_solver
+from adapters.host.process import SolverProcess
+from adapters.host.restitution import EXERCISE, restitution_of
+from adapters.host.surface import ENGINE, HOW, is_engine, must_be_either
+from adapters.npm_packages import NotInstalled, text_of, version_of
+from scenarios.model import Array, Scene, State
+
+HERE = Path(__file__).parent
+TEMPLATES = {"javascript": HERE / "template.js", "python": HERE / "template.py"}
+STEP_LIMIT = 30.0  # s that one call for several steps may take; twice that for a package
+CREATE_LIMIT = 10.0  # s that `create` may take
+BEGIN_LIMIT = 2.0  # s that initScene may take
+# The relative rounding that the probes allow: that of an engine that stores a velocity as the
+# difference of two positions some 1e-4 m apart.
+ROUNDING = 2.0**-36
+NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
+CALLED = {"load": "create", "step": "step", "play": "step or read"}
+
+
+def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
+    """A scene as every guest gets it: plain lists in SI units, with None for infinite numbers (mass
+    and inertia of a static disk)."""
+
+    def plain(values: Array) -> list[float | None]:
+        return [float(x) if np.isfinite(x) else None for x in values]
+
+    return {
+        "n": scene.n,
+        "dt": dt,
+        "position": scene.position.tolist(),
+        "velocity": scene.velocity.tolist(),
+        "radius": scene.radius.tolist(),
+        "mass": plain(scene.mass),
+        "inertia": plain(scene.inertia),
+        "angle": scene.angle.tolist(),
+        "angular_velocity": scene.angular_velocity.tolist(),
+        "walls": scene.walls.tolist(),
+        "gravity": scene.gravity.tolist(),
+        "restitution": scene.restitution,
+        "friction": scene.friction,
+        "wrap": None if scene.wrap is None else scene.wrap.tolist(),
+        "listening": True,
+        **more,
+    }
+
+
+class GuestEngine:
+    """Plays the text of a guest in a separate process; later changes of the file do not matter.
+
+    patience: s that a call for some steps may take after the first, in which a file may still be
+        compiled.
+    collected: steps are requested together with the next `read`: a frame under thrust is one
+        exchange with the process instead of one per step.
+    """
+
+    listening, wrapping = True, 0.0
+    load_limit = CREATE_LIMIT
+    own_restitution = EXERCISE  # of the exercise's game: any file but a solver's takes any
+
+    def __init__(
+        self, solver: SolverText, patience: float = STEP_LIMIT, collected: bool = False
+    ) -> None:
+        self.solver, self.path = solver, solver.path
+        self.patience, self.limit, self.collected = patience, STEP_LIMIT, collected
+        self.started: SolverProcess | None = None
+
+    @property
+    def process(self) -> SolverProcess:
+        """The process, started when first needed; raises `NotLoaded` if the file cannot be
+        loaded."""
+        if self.started is None:
+            try:
+                self.started = SolverProcess(self.solver, compiled=True)
+                self.learn(self.started)
+            except SolverFailed as failure:
+                raise NotLoaded(f"{self.path.name} {failure}") from None
+        return self.started
+
+    def learn(self, process: SolverProcess) -> None:
+        """What has to be known of the file before a scene."""
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Build a new world; raises `Unsupported` if the guest cannot play the scene."""
+        assert self.process  # it is started, and known
+        self.refuse(scene)
+        self.scene, self.forces = scene, np.zeros((scene.n, 3))
+        self.requested: list[dict[str, Any]] = []
+        self.log: list[ContactImpulse] = []
+        self.rows: Array | None = None
+        self.steps = 0
+        self.resolved = self.do("load", self.message(scene, dt), self.load_limit)
+
+    def refuse(self, scene: Scene) -> None:
+        """Raise `Unsupported` for a scene that the guest cannot play."""
+
+    def message(self, scene: Scene, dt: float) -> dict[str, Any]:
+        """The scene as the guest gets it."""
+        return scene_message(scene, dt, listening=self.listening)
+
+    def do(self, command: str, argument: Any, limit: float) -> Any:
+        """One request to the process; raises `SolverFailed`."""
+        return self.process.do(command, argument, limit)
+
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
+        """Add to the force and torque of the next step; nothing moves a static disk."""
+        if not self.scene.static[disk]:
+            self.forces[disk] += [*force, torque]
+
+    def step(self, count: int = 1) -> None:
+        """One request for all the steps, at once or, if `collected`, with the next `read`."""
+        forces = self.forces.tolist() if self.forces.any() else None
+        single = forces is not None and count == 1
+        last = self.requested[-1] if self.requested else {}
+        if single and last.get("held") and last["forces"] == forces:
+            last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
+        else:
+            self.requested.append({"count": count, "forces": forces, "held": single})
+        self.forces[:] = 0.0
+        self.steps += count
+        self.rows = None
+        if not self.collected:
+            for steps in self.take():
+                self.do("step", steps, self.limit)
+            self.limit = self.patience
+
+    def take(self) -> list[dict[str, Any]]:
+        """Return the steps not yet requested, and mark them as requested."""
+        requested, self.requested = self.requested, []
+        return requested
+
+    def look(self) -> Array:
+        """(n, 6) x, y, u, v, angle, spin; also records collisions."""
+        if self.rows is None:
+            self.rows = self.readings(self.do("play", self.take(), self.limit))[0]
+            self.limit = self.patience
+        return self.rows
+
+    def readings(self, answer: dict[str, Any]) -> Array:
+        """(readings, n, 6) of an answer; the collisions behind them are noted."""
+        numbers, shape = answer["numbers"], (answer["readings"], self.scene.n, 6)
+        rows, heard = np.split(numbers, [np.prod(shape)])
+        self.log += [
+            ContactImpulse(int(step), int(i), int(j), float(impulse))
+            for step, i, j, impulse in heard.reshape(-1, 4)
+        ]
+        return rows.reshape(shape)
+
+    def read(self) -> State:
+        """All disks in one exchange."""
+        rows = self.look()
+        return State(*(rows[:, part].copy() for part in (slice(0, 2), slice(2, 4), 4, 5)))
+
+    def collisions(self) -> list[ContactImpulse]:
+        """What the guest reported, and for a solver of the exercise every call of the collision
+        function that changed a velocity."""
+        self.look()
+        return [collision for collision in self.log if collision.step < self.steps]
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """As the guest reads them back."""
+        return {name: (wanted, value) for name, wanted, value in self.resolved}
+
+    def of_file(self) -> dict[str, tuple[Any, Any]]:
+        """The file, and the modules that it imports from its folder."""
+        files = ", ".join(file for file, _ in self.solver.imported)
+        which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
+        if not files:
+            return which
+        return which | {"from beside it": (None, f"{files}; sha256 of all {self.solver.source}")}
+
+    def versions(self) -> dict[str, str]:
+        """The versions of the language's engine, and of a package."""
+        return self.process.versions
+
+    def close(self) -> None:
+        """End the process."""
+        if self.started is not None:
+            self.started.close()
+            self.started = None
+
+
+class PackageEngine(GuestEngine):
+    """planck, matter or Rapier: `NAME.js` of this folder, which drives an npm package.
+
+    Its file says what the profiles choose; `changed` are keys of that choice. The driver does the
+    wrap, and its time is in that of `step`.
+
+    Attributes:
+        inside: s that V8 took for the steps so far, of the time of `step`: the rest is the exchange
+            with the process.
+    """
+
+    load_limit = 2 * STEP_LIMIT
+
+    def __init__(
+        self, name: str, package: str, profile: str, *, float32: bool = False, **changed: Any
+    ) -> None:
+        self.package, self.profile, self.changed = package, profile, changed
+        self.float32, self.inside = float32, 0.0
+        file = HERE / f"{name}.js"
+        text = file.read_text(encoding="utf-8")
+        super().__init__(SolverText(file, "javascript", text, "", engine=True))
+        self.limit = self.patience = 2 * STEP_LIMIT
+
+    @property
+    def process(self) -> SolverProcess:
+        """The process, with the package's text; raises `NotLoaded` if it is not installed."""
+        if self.started is None:
+            name = self.package
+            try:
+                versions = {name: version_of(name)}
+                self.solver = replace(self.solver, package=text_of(name), versions=versions)
+            except NotInstalled as reason:
+                raise NotLoaded(f"{name}: {reason}") from None
+        return super().process
+
+    def learn(self, process: SolverProcess) -> None:
+        """Its disks turn."""
+        process.do("turns", True)
+
+    def refuse(self, scene: Scene) -> None:
+        """A number of the scene overflows in float32, where the engine computes in it."""
+        if self.float32:
+            must_fit(scene)
+        self.expected, self.thrown = (0, 0), None
+        self.ahead = deque[Array]()
+
+    def message(self, scene: Scene, dt: float) -> dict[str, Any]:
+        """The scene, the profile and its changes."""
+        return super().message(scene, dt) | {"profile": self.profile, "changed": self.changed}
+
+    def do(self, command: str, argument: Any, limit: float) -> Any:
+        """The answer of the process; raises `Unsupported` where the engine's file refuses."""
+        try:
+            answer = super().do(command, argument, limit)
+        except SolverFailed as failure:
+            raise refused(failure) from None
+        if command == "step":
+            self.inside += answer
+        return answer
+
+    def expect(self, count: int, times: int, thrusts: Sequence[Foreseen] = ()) -> None:
+        """The next `times` calls are `step(count)`, each followed by `read`, and only `thrusts`
+        act: all of them are played in as few exchanges as can be, of some tenths of a second
+        each."""
+        acting = [thrust for thrust in thrusts if not self.scene.static[thrust.disk]]
+        self.expected, self.thrusts = (count, times), sorted(acting, key=lambda row: row.step)
+
+    def step(self, count: int = 1) -> None:
+        """One exchange with the process for all the steps, or none if they have been played ahead.
+
+        Raises:
+            ValueError: other steps were expected, and have been played.
+        """
+        if self.expected[1] and self.expected[0] == count and not self.forces.any():
+            self.steps += count
+            self.rows = self.next_expected()
+            return
+        if self.ahead:
+            raise ValueError("steps were expected that have been played, and do not come")
+        self.expected = (0, 0)
+        super().step(count)
+
+    def next_expected(self) -> Array:
+        """The reading after the steps that come next, which are played now or have been."""
+        count, times = self.expected
+        if not self.ahead and self.thrown is None:
+            argument = {"count": count, "times": times, "thrusts": self.thrusts}
+            answer = self.do("ahead", argument, self.limit)
+            self.inside += answer["seconds"]
+            self.ahead.extend(self.readings(answer))
+            self.thrown = answer["thrown"]
+        if not self.ahead:
+            assert self.thrown is not None
+            raise refused(self.thrown)
+        self.expected = (count, times - 1)
+        return self.ahead.popleft()
+
+    def read(self) -> State:
+        """All disks in one exchange; static disks stay as the scene states them."""
+        state, scene = super().read(), self.scene
+        still = scene.static
+        return State(
+            np.where(still[:, None], scene.position, state.position),
+            np.where(still[:, None], 0.0, state.velocity),
+            np.where(still, scene.angle, state.angle),
+            np.where(still, scene.angular_velocity, state.angular_velocity),
+        )
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """As the engine's file reads them back."""
+        rows = super().settings()
+        if self.float32:
+            rows["float32 rounding of the start in m"] = (None, rounding(self.scene))
+        return rows
+
+
+def refused(failure: SolverFailed) -> Exception:
+    """What a failure of an engine is: `Unsupported` if it refuses the scene."""
+    return Unsupported(failure.what) if failure.kind == "refused" else failure
+
+
+class OwnEngine(GuestEngine):
+    """Plays an engine's file; a scene that needs more than its line `models` is refused, naming
+    what is missing.
+
+    A fault of the file is a `SolverFailed` that names file, function, what was returned and what is
+    expected. A number that is not finite ends a run as "diverged".
+    """
+
+    def learn(self, process: SolverProcess) -> None:
+        """What it models; it lacks no function."""
+        if missing := [name for name in ENGINE if not process.functions[name]]:
+            raise SolverFailed("error", f"has no function {' and no '.join(missing)}; {HOW}")
+        self.models = features_of(process.functions["models"])
+        process.do("turns", "rotation" in self.models)
+
+    def refuse(self, scene: Scene) -> None:
+        """What the scene has, and the file does not model."""
+        must_model(scene, self.models, self.path.name)
+
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
+        """Add to the forces of the next step; raises `Unsupported` if the file does not model
+        forces."""
+        needed = ["forces", "rotation"] if torque else ["forces"]
+        if missing := [word for word in needed if word not in self.models]:
+            raise Unsupported(refusal(self.path.name, missing))
+        super().apply_force(disk, force, torque)
+
+    def do(self, command: str, argument: Any, limit: float) -> Any:
+        """The answer of the process; a failure names the file and the function."""
+        try:
+            return super().do(command, argument, limit)
+        except SolverFailed as failure:
+            if failure.kind == "refused":
+                what = printable(failure.what[:LONGEST])
+                raise Unsupported(f"{self.path.name} refuses the scene: {what}") from None
+            if failure.kind == "crashed":
+                failure.what = f"{CALLED[command]} was called: {failure.what}"
+            elif not failure.what.startswith(("create ", "step ", "read ", "collisions ")):
+                failure.what = f"{CALLED[command]} {failure.what}"  # where it was is not known
+            failure.what = f"{self.path.name}: {failure.what}"
+            raise
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """The settings that the file decides."""
+        return {
+            "models": (None, ", ".join(self.models)),
+            "restitution": (None, "the scene's"),
+            "order of a step": (None, "the file's own step"),
+            **({} if self.process.functions["collisions"] else {"collisions": (None, SILENT)}),
+            **super().settings(),
+            **self.of_file(),
+        }
+
+
+class OwnSolver(GuestEngine):
+    """Plays a solver of the exercise.
+
+    A file with `advance` is played with it, in all scenes of the reference solver. For any other
+    file `integrate` is called for all spheres, `sphereSphereCollisionHandling` for every pair i <
+    j, then the wrap; whatever they do is played. Its restitution is a constant in the file, so a
+    scene with another one is refused. So are walls and static disks, which the exercise does not
+    have, and scenes that need a function that the file lacks.
+    """
+
+    load_limit = STEP_LIMIT
+
+    def learn(self, process: SolverProcess) -> None:
+        """Its restitution, where it is a constant in the file."""
+        self.whole = process.surface == "advance"
+        if not self.whole:
+            make_globals(process)
+            self.restitution = restitution_of(self.solver, process)
+            if self.restitution.own is not None:
+                self.own_restitution = self.restitution.own
+
+    def refuse(self, scene: Scene) -> None:
+        """A missing function, friction, walls, disks that cannot move, another restitution."""
+        must_be_frictionless(scene, self.path.name)
+        if self.whole:
+            return
+        needed = NEEDED if scene.n > 1 else {"integrate": NEEDED["integrate"]}
+        missing = [name for key, name in needed.items() if not self.process.functions[key]]
+        if missing:
+            raise Unsupported(f"{self.path.name} has no function {' and no '.join(missing)}")
+        if len(scene.walls):
+            raise Unsupported("the exercise has no walls")
+        if scene.static.any():
+            raise Unsupported("the exercise has no disks that cannot move")
+        if scene.n > 1 and not self.restitution.fits(scene.restitution):
+            raise Unsupported(
+                f"the file has e = {self.restitution.own:.3g}, the scene needs"
+                f" {scene.restitution:g}"
+            )
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """The settings that the file decides."""
+        own = "the scene's" if self.whole else str(self.restitution)
+        order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
+        return {"restitution": (None, own), "order of a step": (None, order), **self.of_file()}
+
+
+def make_globals(process: SolverProcess) -> None:
+    """Let the file make its own scene, as the exercise's page does before the first step, because
+    its functions may use `ufo` or `asteroids`."""
+    if process.functions["begin"]:
+        with suppress(SolverFailed):  # a function that needs them fails with its own message
+            process.do("begin", None, BEGIN_LIMIT)
+
+
+def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
+    """The row of a file in its present state, an engine or a solver of the exercise; raises
+    `NotASolver`. Its own user plays it: it may import what is installed."""
+    solver = read_solver(path)
+    engine = is_engine(solver)
+    if not engine:
+        must_be_either(solver)
+    solver = replace(solver, engine=engine, packages=tuple(sorted(packages_named(solver))))
+    make = OwnEngine if engine else OwnSolver
+    return EngineRow(
+        partial(make, solver, patience, collected),
+        f"your own {'engine' if engine else 'solver'}, {path}",
+        nan if engine else 1.0,
+        ROUNDING if engine else FLOAT64,
+        source=solver.source,
+        exercise=not engine,
+    )
+
+
+def packages_named(solver: SolverText) -> Iterable[str]:
+    """The modules that the import statements of a Python file, and of those beside it, name."""
+    if solver.kind != "python":
+        return set()
+    texts = [solver.text, *(text for _, text in solver.imported)]
+    return set[str]().union(*map(imported_by, texts))

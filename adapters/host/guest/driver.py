@@ -1,0 +1,969 @@
+"""The process of a guest: code of others, handed a scene or questions, and asked for states.
+
+It imports nothing of this project, and holds nothing that a guest may not read: the expected
+values stay in the parent. `python -I -S driver.py SETTINGS`, with settings as JSON:
+
+packages: module -> its file, the only packages that can be imported; system: the file of
+adapters/system.py; memory: bytes; user: the number of a user to become, or null; secret: a file
+that a protected guest cannot read; preload: modules to import before the limits.
+
+A line of JSON comes in, {"id", "open": ORDER} or {"id", "do": [[command, argument, limit s]]}, and
+one goes out, {"id", "done": [{"done": ...} or {"failed": {kind, what, line, column}}]}. The
+numbers of disks are float64 in base64.
+"""
+
+from __future__ import annotations
+
+import array
+import ctypes
+import inspect
+import os
+import queue
+import random
+import re
+import signal
+import socket
+import sys
+import traceback
+from base64 import b64encode
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from importlib.abc import Loader
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import module_from_spec, spec_from_file_location
+from itertools import takewhile
+from json import dumps, loads  # before a guest can replace them
+from math import inf, isinf, nan
+from operator import index
+from threading import Thread
+from time import process_time
+from types import FrameType, ModuleType
+from typing import Any, NamedTuple
+
+PATIENCE = 3  # times its limit of processor time that a call may take by the clock
+LOAD_LIMIT = 3.0  # s; importing numba takes one
+TOGETHER = 0.2  # of a question's time: all together take milliseconds, or one is asked again
+MOST = 400  # contacts and accesses kept for the check
+SHOWN = 60  # characters of a returned value in a message
+LONGEST = 400  # characters of a message
+KEYCTL = {"x86_64": 250, "aarch64": 219}  # the number of this call of Linux
+DECIMAL_COMMA = re.compile(r"=\s*\d+,\d+\s*$", re.MULTILINE)
+COLLISION = "expected are rows [i, j] or [i, j, impulse]: disk i; disk j, or wall w as -1 - w; N s"
+EXERCISE = {
+    "integrate": "integrate",
+    "collide": "sphereSphereCollisionHandling",
+    "simulate": "performSimStep",
+    "wrap": "projectObjects",
+    "begin": "initScene",
+}
+ENGINE = ("create", "step", "read", "collisions", "settings")
+
+
+class Failed(Exception):
+    """kind, what and the place in the guest's file, from 1; 0 if it is not known."""
+
+    def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
+        self.kind, self.what, self.line, self.column = kind, what[:LONGEST], line, column
+
+
+# ---- modules ------------------------------------------------------------------------------------
+
+
+class Packages:
+    """Finds the named packages by their paths, so that no folder of packages is on the path."""
+
+    def __init__(self, files: dict[str, str]) -> None:
+        self.files = files
+
+    def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
+        """Called through `sys.meta_path`."""
+        file = self.files.get(name)
+        if file is None:
+            return None
+        return PathFinder.find_spec(name, [os.path.dirname(file.removesuffix("/__init__.py"))])
+
+
+class Neighbours(Loader):
+    """Finds the modules beside the guest's file, whose texts the parent has sent."""
+
+    def __init__(self, texts: dict[str, str], folder: str) -> None:
+        self.texts, self.folder = texts, folder
+
+    def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
+        """As Python finds it in a folder: a package, a module, or a namespace package."""
+        place = name.replace(".", "/")
+        for file, package in ((f"{place}/__init__.py", True), (f"{place}.py", False)):
+            if file in self.texts:
+                return ModuleSpec(name, self, origin=file, is_package=package)
+        inside = any(file.startswith(f"{place}/") for file in self.texts)
+        return ModuleSpec(name, None, is_package=True) if inside else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Run the text of a module."""
+        assert module.__spec__ is not None
+        file = str(module.__spec__.origin)
+        module.__file__ = os.path.join(self.folder, file)
+        code = compile(self.texts[file], module.__file__, "exec", dont_inherit=True)
+        exec(code, vars(module))
+
+
+# ---- spheres of the exercise --------------------------------------------------------------------
+
+
+class Fields:
+    """Named values that can be reached as attributes or as items: `sphere.position.x`,
+    `sphere["position"]["x"]`."""
+
+    torque: float
+
+    def __init__(self, **values: Any) -> None:
+        self.__dict__.update(values)
+
+    def __getattr__(self, name: str) -> Any:  # only called for a missing name
+        raise AttributeError(f"a sphere has no field {name!r}", name=name, obj=self)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.__dict__[name]
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        self.__dict__[name] = value
+
+
+class Traced(Fields):
+    """The same, reporting every access to a number as ("r" or "w", the sphere's field)."""
+
+    def __init__(
+        self, access: Callable[[str, str], None], values: dict[str, Any], within: str = ""
+    ) -> None:
+        self.__dict__.update(_access=access, _values=dict(values), _within=within)
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self._values:
+            return super().__getattr__(name)
+        value = self._values[name]
+        if not isinstance(value, Fields):
+            self._access("r", self._within or name)
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self._access("w", self._within or name)
+        self._values[name] = value
+
+    __getitem__ = __getattr__
+    __setitem__ = __setattr__
+
+
+def sphere_of(r: Sequence[float]) -> Fields:
+    """A sphere with the exercise's fields from its 12 numbers."""
+    names = ("alpha", "angularVelocity", "torque", "mass", "MoI", "size")
+    return Fields(
+        position=Fields(x=r[0], y=r[1]),
+        velocity=Fields(x=r[2], y=r[3]),
+        force=Fields(x=r[4], y=r[5]),
+        **dict(zip(names, r[6:])),
+    )
+
+
+NAMES = frozenset(vars(sphere_of([0.0] * 12)))
+
+
+def row_of(s: Any) -> list[float]:
+    """The 12 numbers of a sphere; NaN for a field that is not a number."""
+    try:
+        vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
+    except AttributeError:
+        raise AttributeError(
+            "a sphere is left with a position, velocity or force that has no x and y"
+        ) from None
+    return [
+        number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)
+    ]
+
+
+def number(x: Any) -> float:
+    """`x` as a float; NaN if it is not a number."""
+    try:
+        return float(x)
+    except (TypeError, ValueError):
+        return nan
+
+
+def motion(s: Any) -> tuple[float, float, float, float]:
+    """Position and velocity of a sphere."""
+    return s.position.x, s.position.y, s.velocity.x, s.velocity.y
+
+
+def seed() -> None:
+    """Seed the random numbers, the same for every question and scene."""
+    random.seed(1)
+    if "numpy" in sys.modules:
+        sys.modules["numpy"].random.seed(1)
+
+
+# ---- worlds: what plays a scene, one for each kind of file --------------------------------------
+
+
+class ExerciseWorld:
+    """A scene by the exercise's functions: integrate all, collide every pair i < j, wrap."""
+
+    def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
+        self.file, self.scene = guest.file, scene
+        self.steps, self.log, self.contacts = 0, array.array("d"), list[list[float]]()
+        names = ("angle", "angular_velocity", "mass", "inertia", "radius")
+        columns = (scene[name] for name in ("position", "velocity", *names))
+        self.spheres = [
+            sphere_of([*x, *v, 0.0, 0.0, angle, spin, 0.0, mass, inertia, radius])
+            for x, v, angle, spin, mass, inertia, radius in zip(*columns)
+        ]
+
+    def step(self, count: int, forces: Any, held: bool) -> None:
+        """Forces act in the first step, or in all if held."""
+        gx, gy = self.scene["gravity"]
+        for k in range(count):
+            for i, s in enumerate(self.spheres):
+                px, py, turn = forces[i] if forces and (held or k == 0) else (0.0, 0.0, 0.0)
+                s.force.x, s.force.y, s.torque = s.mass * gx + px, s.mass * gy + py, turn
+                self.file["integrate"](s, self.scene["dt"])
+            self.motions = [motion(s) for s in self.spheres]
+            for i in range(len(self.spheres)):
+                for j in range(i + 1, len(self.spheres)):
+                    self.collide(i, j)
+            if self.scene["wrap"]:
+                for s in self.spheres:
+                    self.wrap(s.position, *self.scene["wrap"])
+            self.steps += 1
+
+    def collide(self, i: int, j: int) -> None:
+        """Collide a pair, and record it if it overlapped or anything changed."""
+        a, b = self.spheres[i], self.spheres[j]
+        was_a, was_b = self.motions[i], self.motions[j]
+        self.file["collide"](a, b)
+        is_a, is_b = self.motions[i], self.motions[j] = motion(a), motion(b)
+        x, y, reach = was_a[0] - was_b[0], was_a[1] - was_b[1], a.size + b.size
+        changed = was_a != is_a or was_b != is_b
+        if changed and (was_a[2:] != is_a[2:] or was_b[2:] != is_b[2:]):
+            du, dv = is_a[2] - was_a[2], is_a[3] - was_a[3]
+            sign = -1.0 if du * x + dv * y < 0 else 1.0
+            impulse = number(sign * a.mass * (du * du + dv * dv) ** 0.5)
+            self.log.extend((self.steps, i, j, impulse))
+        if (changed or x * x + y * y < reach * reach) and len(self.contacts) < MOST:
+            numbers = map(number, (*was_a, *was_b, *is_a, *is_b))
+            self.contacts.append([self.steps, i, j, *numbers])
+
+    @staticmethod
+    def wrap(p: Any, low: Sequence[float], high: Sequence[float]) -> None:
+        """As projectObjects: beyond an edge of the box, onto the opposite one."""
+        p.x = high[0] if p.x < low[0] else low[0] if p.x > high[0] else p.x
+        p.y = high[1] if p.y < low[1] else low[1] if p.y > high[1] else p.y
+
+    def read(self) -> array.array[float]:
+        """x, y, u, v, angle and spin of all spheres."""
+        rows = (row_of(s) for s in self.spheres)
+        return array.array("d", [x for r in rows for x in (*r[:4], r[6], r[7])])
+
+
+class Disks(NamedTuple):
+    """What `advance` of a file like those of reference_impl works on; see its state.py."""
+
+    position: Any
+    velocity: Any
+    force: Any
+    angle: Any
+    angular_velocity: Any
+    torque: Any
+    radius: Any
+    mass: Any
+    inertia: Any
+    remainder: Any
+
+
+class World(NamedTuple):
+    """What all disks share; see state.py of reference_impl."""
+
+    restitution: float
+    gravity: Any
+    walls: Any
+    low: Any
+    high: Any
+    split: int = 0
+    approaching_only: bool = True
+    friction: float = 0.0
+
+
+def make_disks(np: Any, *columns: Any) -> Disks:
+    """Disks without force: position, velocity, radius, mass, inertia, angle, angular velocity."""
+    x, v, radius, mass, inertia, angle, spin = (np.array(c, float, order="C") for c in columns)
+    zero = np.zeros(len(radius))
+    return Disks(x, v, np.zeros_like(x), angle, spin, zero, radius, mass, inertia, np.zeros_like(x))
+
+
+class ArraysWorld:
+    """A scene by `advance(disks, world, dt, count)` on arrays, as in reference_impl."""
+
+    def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
+        self.np = np = import_module("numpy")
+        self.advance, self.dt = guest.module.advance, scene["dt"]
+        self.steps, self.log = 0, array.array("d")
+        inertia = [inf if isinf(m) else i for m, i in zip(scene["mass"], scene["inertia"])]
+        names = ("position", "velocity", "radius", "mass")
+        spins = (scene["angle"], scene["angular_velocity"])
+        self.disks = make_disks(np, *(scene[name] for name in names), inertia, *spins)
+        low, high = scene["wrap"] or ([-inf] * 2, [inf] * 2)
+        walls = np.reshape(np.array(scene["walls"], float), (-1, 2, 2))
+        vectors = (np.array(scene["gravity"], float), walls, np.array(low), np.array(high))
+        self.world = World(float(scene["restitution"]), *vectors)
+        self.advance(self.disks, self.world, self.dt, 0)  # compiles, if it is compiled
+
+    def step(self, count: int, forces: Any, held: bool) -> None:
+        """Forces act in the first step, or in all if held."""
+        for times in [1, count - 1] if forces and not held else [count]:
+            if forces:
+                self.disks.force[:] = [force[:2] for force in forces]
+                self.disks.torque[:] = [force[2] for force in forces]
+            if times:
+                for k, i, j, impulse in self.advance(self.disks, self.world, self.dt, times) or ():
+                    self.log.extend((self.steps + int(k), int(i), int(j), float(impulse)))
+            self.disks.force[:], self.disks.torque[:] = 0.0, 0.0
+            self.steps, forces = self.steps + times, None
+
+    def read(self) -> array.array[float]:
+        """x, y, u, v, angle and spin of all disks."""
+        d = self.disks
+        rows = self.np.column_stack([d.position, d.velocity, d.angle, d.angular_velocity])
+        return array.array("d", rows.ravel().tolist())
+
+
+def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
+    """The functions of the exercise on spheres, by `module.advance`.
+
+    A step of 0 s moves nothing, so it gives the collision of a pair; a step of a single disk is
+    its integration.
+    """
+    np = import_module("numpy")
+    nowhere = np.full(2, inf)
+    world = World(0.9, np.zeros(2), np.zeros((0, 2, 2)), -nowhere, nowhere)
+    boxed = world._replace(low=np.array([-5.0, -3.0]), high=np.array([5.0, 3.0]))  # the exercise's
+
+    def act(spheres: list[Any], where: World, dt: float) -> None:
+        rows = np.array([row_of(s) for s in spheres])
+        columns = (rows[:, :2], rows[:, 2:4], *rows[:, [11, 9, 10, 6, 7]].T)
+        disks = make_disks(np, *columns)
+        disks.force[:], disks.torque[:] = rows[:, 4:6], rows[:, 8]
+        try:
+            module.advance(disks, where, dt, 1)
+        finally:  # the state at a failure is judged, too
+            for k, s in enumerate(spheres):
+                s.position.x, s.position.y = map(float, disks.position[k])
+                s.velocity.x, s.velocity.y = map(float, disks.velocity[k])
+                s.force.x, s.force.y = map(float, disks.force[k])
+                s.alpha, s.angularVelocity = float(disks.angle[k]), float(disks.angular_velocity[k])
+                s.torque, s.size = float(disks.torque[k]), float(disks.radius[k])
+                s.mass, s.MoI = float(disks.mass[k]), float(disks.inertia[k])
+
+    def everybody() -> list[Any]:
+        return [module.ufo, *module.asteroids]
+
+    def begin() -> None:
+        """A ufo and 20 asteroids in a grid, as the exercise's file has them."""
+        places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
+        parked = [sphere_of([x, y, *[0.0] * 7, 1.0, 1.0, 0.1]) for x, y in places]
+        ufo = sphere_of([-3.5, 0.0, *[0.0] * 7, 1.0, 1.0, 0.3])
+        vars(module).update(ufo=ufo, asteroids=parked)
+
+    return {
+        "integrate": lambda sphere, dt: act([sphere], world, dt),
+        "collide": lambda a, b: act([a, b], world, 0.0),
+        "simulate": lambda dt: act(everybody(), boxed, dt),
+        "wrap": lambda: act(everybody(), boxed, 0.0),
+        "begin": begin,
+    }
+
+
+class EngineWorld:
+    """A scene by the functions of an engine: create, step, read, perhaps collisions."""
+
+    def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
+        self.guest, self.n, self.walls = guest, scene["n"], len(scene["walls"])
+        self.dt, self.angle = scene["dt"], list(scene["angle"])
+        self.steps, self.log = 0, array.array("d")
+        self.hears = scene["listening"] and "collisions" in guest.file
+        self.world = self.call("create", Fields(**scene), self.dt)
+        if isinstance(self.world, str):
+            raise Failed("refused", self.world or "create returned an empty text")
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Call a function of the file and return its result."""
+        self.guest.inside = name
+        return self.guest.file[name](*arguments)
+
+    def step(self, count: int, forces: Any, held: bool) -> None:
+        """Forces act in the first step, or in all if held; a step may return a new world."""
+        for k in range(count):
+            acting = forces if forces and (held or k == 0) else None
+            result = self.call(
+                "step", self.world, self.dt, acting or [[0.0] * 3 for _ in range(self.n)]
+            )
+            if result is not None:
+                self.world = result
+            if self.hears:
+                self.hear()
+            self.steps += 1
+
+    def hear(self) -> None:
+        """Record the collisions of this step."""
+        rows = self.call("collisions", self.world)
+        if not hasattr(rows, "__len__") or isinstance(rows, (str, dict)):
+            raise wrong("collisions", rows, COLLISION)
+        for row in rows:
+            try:
+                i, j, *rest = row
+                i, j, impulse = index(i), index(j), float(rest[0]) if rest else nan
+            except (TypeError, ValueError):
+                raise wrong("collisions", row, COLLISION) from None
+            if not (0 <= i < self.n and -self.walls <= j < self.n and i != j) or isinf(impulse):
+                raise wrong("collisions", row, COLLISION)
+            self.log.extend((self.steps, i, j, impulse))
+
+    def read(self) -> array.array[float]:
+        """x, y, u, v, angle and spin of all disks."""
+        state = self.call("read", self.world)
+        rows = [self.column(state, name, 2) for name in ("position", "velocity")]
+        if self.guest.turns:
+            rows += [self.column(state, name, 1) for name in ("angle", "angular_velocity")]
+        else:
+            rows += [[[x] for x in self.angle], [[0.0]] * self.n]
+        return array.array("d", [x for disk in zip(*rows) for values in disk for x in values])
+
+    def column(self, state: Any, name: str, width: int) -> list[list[float]]:
+        """The numbers of all disks from the result of `read`."""
+        wanted = f"expected is {'[x, y]' if width == 2 else 'a number'} for each of {self.n} disks"
+        value = state.get(name) if isinstance(state, dict) else getattr(state, name, None)
+        if value is None:
+            raise wrong("read", state, f"it has no {name}; {wanted}")
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        if not isinstance(value, (list, tuple)) or len(value) != self.n:
+            raise wrong("read", value, wanted, f" as {name}")
+        column = []
+        for i, disk in enumerate(value):
+            disk = disk.tolist() if hasattr(disk, "tolist") else disk
+            numbers = [disk] if width == 1 else disk
+            if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
+                raise wrong("read", value, wanted, f" as {name}")
+            try:
+                if any(isinstance(x, (str, bool, complex)) for x in numbers):
+                    raise TypeError
+                column.append([float(x) for x in numbers])
+            except (TypeError, ValueError):
+                raise wrong("read", value, wanted, f" as {name}") from None
+            if not all(abs(x) < inf for x in column[-1]):
+                where = f" as {name} of disk {i}"
+                raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+        return column
+
+
+def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "error") -> Failed:
+    """The failure for an invalid return value of a function."""
+    text = repr(value)
+    text = text if len(text) <= SHOWN else text[:SHOWN] + " ..."
+    return Failed(kind, f"{function} returned {text}{what}; {wanted}")
+
+
+# ---- a guest in Python --------------------------------------------------------------------------
+
+
+class PythonGuest:
+    """A guest's file as a module of this process; raises `Failed` if it cannot be loaded.
+
+    order: name, text; imported: file -> text of the modules beside it; folder: of copies of these
+    texts, for numba, which caches compiled code by file and content; engine: it has create, step
+    and read.
+    """
+
+    def __init__(self, order: dict[str, Any]) -> None:
+        self.order, folder = order, order["folder"] or ""
+        self.name = os.path.join(folder, order["name"])
+        self.neighbours = Neighbours(dict(order["imported"]), folder)
+        self.turns, self.inside = False, ""
+        sys.meta_path.insert(0, self.neighbours)
+        self.renew()
+
+    def renew(self) -> None:
+        """Load the file and the modules beside it again, without any state of earlier calls."""
+        for name, loaded in list(sys.modules.items()):
+            if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
+                del sys.modules[name]
+        seed()
+        self.module = module = ModuleType("solver")
+        module.__file__ = self.name
+        sys.modules["solver"] = module  # numba and dataclasses look up a function's module
+        with self.guarded(LOAD_LIMIT, "while it is loaded"):
+            exec(compile(self.order["text"], self.name, "exec", dont_inherit=True), vars(module))
+        names = vars(module)
+        if self.order["engine"]:
+            self.world_of: Any = EngineWorld
+            self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
+            for name, function in self.file.items():
+                if inspect.isgeneratorfunction(function) or inspect.iscoroutinefunction(function):
+                    raise Failed(
+                        "error", f"{name} is an async def, or has a yield: it runs nothing"
+                    )
+        elif callable(names.get("advance")):
+            self.world_of, self.file = ArraysWorld, as_functions(module)
+        else:
+            self.world_of = ExerciseWorld
+            self.file = {k: names[f] for k, f in EXERCISE.items() if callable(names.get(f))}
+        self.functions: dict[str, Any] = {k: k in self.file for k in (*EXERCISE, *ENGINE)}
+        models = names.get("models")
+        self.functions |= {"replaced": [], "models": models if isinstance(models, str) else None}
+        self.functions["advance"] = self.world_of is ArraysWorld
+
+    def run(self, command: str, argument: Any, limit: float) -> Any:
+        """The answer to a command; raises `Failed` after `limit` s, or if the file threw.
+
+        A question stopped by the clock before it had its processor time is asked once more."""
+        began = process_time()
+        try:
+            return self.run_once(command, argument, limit)
+        except Failed as failure:
+            if failure.kind != "timeout" or command != "ask" or process_time() - began > limit / 2:
+                raise
+        return self.run_once(command, argument, limit)
+
+    def run_once(self, command: str, argument: Any, limit: float) -> Any:
+        """The answer to a command."""
+        self.inside = ""
+        if command == "turns":
+            self.turns = bool(argument)
+            return None
+        with self.guarded(limit, "in one call"):
+            return getattr(self, command)(argument)
+
+    def versions(self) -> dict[str, str]:
+        """The versions that affect the numbers."""
+        return {"python": ".".join(map(str, sys.version_info[:3]))}
+
+    @contextmanager
+    def guarded(self, limit: float, when: str) -> Iterator[None]:
+        """Context that turns every exception of the file into `Failed`, and stops it after
+        `limit` s of processor time, or `PATIENCE` times as many by the clock."""
+
+        def too_late() -> Failed:
+            return Failed("timeout", f"does not come back within {limit:g} s {when}")
+
+        try:
+            with system().stopped_after(limit, PATIENCE * limit, too_late):
+                yield
+        except BaseException as error:  # SystemExit too: a guest may not end the process
+            failure = error if isinstance(error, Failed) else self.failure(error, when)
+            told = failure.kind == "refused" or failure.what.startswith(f"{self.inside} ")
+            if self.inside and not told:
+                verb = "raised " if failure.what[:1].isupper() else ""
+                failure.what = f"{self.inside} {verb}{failure.what}"
+            raise failure from None
+
+    def failure(self, error: BaseException, when: str) -> Failed:
+        """An exception, with its place in the guest's file."""
+        if isinstance(error, RecursionError):
+            what = "calls itself without end (maximum recursion depth exceeded)"
+        elif isinstance(error, MemoryError):
+            return Failed("memory", f"needs more memory than it may use {when}")
+        elif isinstance(error, SystemExit):
+            what = f"ends the process (SystemExit: {error})"
+        else:
+            words = error.msg if isinstance(error, SyntaxError) else error
+            what = f"{type(error).__name__}: {words}"
+        kind = "error"
+        if isinstance(error, ModuleNotFoundError):
+            kind = "unavailable"
+            what = f"imports {error.name}, which is not available here"
+        elif "for ^" in what:
+            what += "; a power is written **"
+        elif "'tuple'" in what and DECIMAL_COMMA.search(self.order["text"]):
+            what += "; a decimal number has a point, not a comma"
+        elif isinstance(error, EOFError):
+            what += "; input() is not available"
+        if isinstance(error, SyntaxError) and error.filename == self.name:
+            return Failed("error", what, error.lineno or 0, error.offset or 0)
+        stack = traceback.TracebackException.from_exception(error).stack
+        mine = [frame for frame in stack if frame.filename == self.name]
+        line, column = (mine[-1].lineno or 0, (mine[-1].colno or 0) + 1) if mine else (0, 0)
+        return Failed(kind, what, line, column)
+
+    # ---- questions on spheres
+
+    def begin(self, _argument: Any) -> None:
+        """Let the file make its scene."""
+        if "begin" in self.file:
+            self.file["begin"]()
+
+    def everybody(self) -> list[Any]:
+        """The file's ufo and asteroids."""
+        return [self.module.ufo, *self.module.asteroids]
+
+    def globals(self, _argument: Any = None) -> list[list[float]] | None:
+        """The numbers of the file's own spheres; None if it has none."""
+        try:
+            return [row_of(s) for s in self.everybody()]
+        except (AttributeError, TypeError):
+            return None
+
+    def ask(self, question: dict[str, Any]) -> dict[str, Any]:
+        """The answer to a question: the spheres after each call, and what was returned, changed
+        elsewhere, or failed."""
+        states: list[list[list[float]]] = []
+        returned, error = False, None
+        seed()
+        before = self.numbers()
+        self.spheres = spheres = self.placed(question)
+        calls = self.watched(spheres) if question.get("watch") else []
+        known = None if question["world"] else self.globals()
+        try:
+            for name, *arguments in question["calls"]:
+                result = self.call(name, arguments, spheres)
+                if hasattr(result, "send"):
+                    raise TypeError(
+                        f"a call of {name} runs nothing: it is an async def, or has a yield"
+                    )
+                returned = returned or isinstance(result, (Fields, dict, list, tuple))
+                returned = returned or hasattr(result, "position")
+                spheres = self.everybody() if question["world"] else spheres
+                states.append([row_of(s) for s in spheres])
+        except (Failed, system().TimeIsUp):
+            raise
+        except BaseException as raised:
+            error = vars(self.failure(raised, "in one call"))
+        fields = {name for s in spheres if isinstance(s, Fields) for name in vars(s)}
+        return {
+            "states": states,
+            "returned": returned,
+            "strayed": not question["world"] and repr(self.globals()) != repr(known),
+            "strange": sorted(map(str, fields - NAMES)),
+            "kept": [name for name, value in self.numbers().items() if before.get(name) != value],
+            "calls": list(calls),  # a later question adds to it
+            "error": error,
+        }
+
+    def left(self, _argument: Any) -> list[list[float]]:
+        """The spheres of the last question, which a failed call may have changed."""
+        return [row_of(s) for s in self.spheres]
+
+    def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
+        """Call a function of the file on some of the spheres, and return its result."""
+        on = {"integrate": 1, "collide": 2}.get(name, 0)
+        function = self.file["simulate" if name == "step" else name]
+        return function(*(spheres[i] for i in arguments[:on]), *arguments[on:])
+
+    def numbers(self) -> dict[str, str]:
+        """The file's global numbers as text; those that a call changes are its state."""
+        values = vars(self.module).items()
+        return {name: repr(x) for name, x in values if isinstance(x, (int, float, complex))}
+
+    def watched(self, spheres: list[Any]) -> list[list[Any]]:
+        """A list that gets a row for every call of the file to its own functions."""
+        calls: list[list[Any]] = []
+        place = {id(s): k for k, s in enumerate(spheres)}
+
+        def noted(name: str, called: Callable[..., Any], on: int) -> Callable[..., Any]:
+            def note(*given: Any, **named: Any) -> Any:
+                rest = [number(x) for x in given[on:]]
+                calls.append([name, *(place.get(id(s), -1) for s in given[:on]), *rest])
+                return called(*given, **named)
+
+            return note
+
+        for name, on in {"integrate": 1, "collide": 2, "wrap": 0}.items():
+            if name in self.file and EXERCISE[name] in vars(self.module):
+                vars(self.module)[EXERCISE[name]] = noted(name, self.file[name], on)
+        return calls
+
+    def trace(self, question: dict[str, Any]) -> None:
+        """Make the calls of a question on spheres that record every read and write of their
+        numbers; `accesses` then returns these, even if a call never returned."""
+        self.trail: list[tuple[str, int, str, list[int]]] = []
+        seed()
+        spheres = [self.traced(r, k) for k, r in enumerate(question["spheres"])]
+        for name, *arguments in question["calls"]:
+            self.call(name, arguments, spheres)
+
+    def accesses(self, _argument: Any) -> list[tuple[str, int, str, list[int]]]:
+        """("r" or "w", sphere, field, lines of the file, the innermost call first) of the last
+        `trace`."""
+        return self.trail
+
+    def traced(self, numbers: list[float], k: int) -> Any:
+        """Sphere `k` that records its accesses."""
+
+        def access(kind: str, field: str) -> None:
+            last = len(self.trail) > MOST  # only the latest accesses of an endless loop are kept
+            self.trail[MOST if last else len(self.trail) :] = [
+                (kind, k, field, self.lines_of(sys._getframe(2)))
+            ]
+
+        sphere = sphere_of(numbers)
+        for name, value in vars(sphere).items():
+            if isinstance(value, Fields):
+                vars(sphere)[name] = Traced(access, vars(value), name)
+        return Traced(access, vars(sphere))
+
+    def lines_of(self, frame: FrameType | None) -> list[int]:
+        """The lines of the file in the calls that led to `frame`, the innermost first."""
+        lines = []
+        while frame is not None:
+            if frame.f_code.co_filename == self.name:
+                lines.append(frame.f_lineno)
+            frame = frame.f_back
+        return lines
+
+    def placed(self, question: dict[str, Any]) -> list[Any]:
+        """The spheres of a question, new ones or the file's own."""
+        made = [sphere_of(r) for r in question["spheres"]]
+        if not question["world"]:
+            return made
+        spheres = self.everybody()
+        for mine, wanted in zip(spheres, made):
+            for name, value in vars(wanted).items():
+                if isinstance(value, Fields):
+                    vector = getattr(mine, name)
+                    vector.x, vector.y = value.x, value.y
+                else:
+                    setattr(mine, name, value)
+        return spheres
+
+    # ---- whole scenes
+
+    def load(self, scene: dict[str, Any]) -> Any:
+        """Begin a scene; the settings of an engine."""
+        seed()
+        for name in ("mass", "inertia"):
+            scene[name] = [inf if x is None else x for x in scene[name]]
+        self.heard = 0
+        # a check looks at every call of the functions, also where they are made of `advance`
+        world_of: Any = ExerciseWorld if scene.get("by_functions") else self.world_of
+        self.world = world_of(self, scene)
+        if "settings" not in self.file:
+            return []
+        return [[str(name), *pair] for name, *pair in self.file["settings"](self.world.world)]
+
+    def step(self, argument: dict[str, Any]) -> None:
+        """Some steps; forces act in the first, or in all if held."""
+        self.world.step(argument["count"], argument["forces"], argument.get("held", False))
+
+    def play(self, calls: list[dict[str, Any]]) -> dict[str, Any]:
+        """Call `step` several times, then return the state and the new collisions."""
+        for step in calls:
+            self.step(step)
+        return self.handed([self.world.read()])
+
+    def samples(self, argument: dict[str, Any]) -> dict[str, Any]:
+        """The states at the beginning and after each of `times` calls of `step`."""
+        readings = [self.world.read()]
+        for _ in range(argument["times"]):
+            self.step(argument["step"])
+            readings.append(self.world.read())
+        return self.handed(readings)
+
+    def handed(self, readings: list[array.array[float]]) -> dict[str, Any]:
+        """Readings and the collisions since the last time, as the parent takes them."""
+        numbers = array.array("d")
+        for rows in (*readings, self.world.log[self.heard :]):
+            numbers.extend(rows)
+        self.heard = len(self.world.log)
+        packed = b64encode(numbers.tobytes()).decode("ascii")
+        return {"readings": len(readings), "thrown": None, "numbers": packed, "seconds": 0.0}
+
+    def contacts(self, _argument: Any) -> list[list[float]]:
+        """The first calls of the collision function on pairs that overlap or are changed."""
+        return getattr(self.world, "contacts", [])
+
+
+# ---- the process --------------------------------------------------------------------------------
+
+_system: Any = None
+
+
+def system() -> Any:
+    """adapters/system.py, loaded by its path."""
+    return _system
+
+
+def main(settings: dict[str, Any]) -> None:
+    """Load the file in an order, report its functions, then answer requests until the end of the
+    input."""
+    global _system
+    requests, answers = private_pipes()
+    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    sys.modules["driver"] = sys.modules["__main__"]
+    _system = load_file("system", settings["system"])
+    sys.meta_path.insert(0, Packages(settings["packages"]))
+    for name in settings["preload"]:
+        with suppress(ImportError):
+            import_module(name)
+    limit(settings)
+    Thread(target=listen, args=(requests, lines), daemon=True).start()
+    tell(answers, {"here": True, "can": attempts(settings["secret"])})
+    guest: Any = None
+    while True:
+        request = loads(lines.get())
+        if "do" in request:
+            tell(answers, {"id": request["id"], "done": reply(guest, request["do"])})
+            continue
+        try:
+            order = request["open"]
+            guest = guest.renew() or guest if guest else make(order)
+            hello = {"functions": guest.functions, "versions": guest.versions()}
+            tell(answers, {"id": request["id"], **hello})
+        except Failed as failure:
+            tell(answers, {"id": request["id"], "failed": vars(failure)})
+            return
+
+
+def make(order: dict[str, Any]) -> Any:
+    """The guest of an order; raises `Failed`."""
+    if order["kind"] == "python":
+        return PythonGuest(order)
+    file = os.path.join(os.path.dirname(os.path.abspath(__file__)), "v8.py")
+    return load_file("v8", file).V8Guest(order)
+
+
+def load_file(name: str, file: str) -> Any:
+    """A module from a file, wherever it is."""
+    spec = spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def private_pipes() -> tuple[Any, int]:
+    """The two pipes to the parent; output and input of the guest itself are discarded."""
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nowhere, stream)
+    return requests, answers
+
+
+def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
+    """Pass on the lines of the parent; when it has closed the pipe, end this process and its
+    group."""
+    for line in requests:
+        lines.put(line)
+    with suppress(AttributeError, OSError):  # Windows has no groups
+        os.killpg(0, signal.SIGKILL)
+    os._exit(0)
+
+
+def limit(settings: dict[str, Any]) -> None:
+    """Bound memory, files and processes, and become another user if there is one."""
+    system().limit_memory(settings["memory"])
+    system().write_no_core()
+    if settings["protected"]:  # no key of the user's session is in the new, empty one
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).syscall(KEYCTL.get(os.uname().machine, -1), 1, None)
+    user = settings["user"]
+    if user is None:
+        return
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+    os.setgroups([])
+    os.setresgid(user, user, user)
+    # the only process of this user, so that it can start no other; V8 needs threads
+    if not settings["threads"]:
+        resource.setrlimit(resource.RLIMIT_NPROC, (2, 2))
+    os.setresuid(user, user, user)
+
+
+def attempts(secret: str) -> list[str]:
+    """What this process can still do of the things that a protected guest cannot, tried before
+    any text of a guest is there."""
+
+    def read() -> None:
+        with open(secret, "rb") as file:
+            file.read()
+
+    def signal_parent() -> None:
+        if os.getppid() in (0, 1):  # in a world of its own
+            raise PermissionError
+        os.kill(os.getppid(), 0)
+
+    def connect() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
+
+    def write() -> None:
+        with open(secret + ".guest", "wb"):
+            pass
+        os.unlink(secret + ".guest")
+
+    possible = []
+    for name, attempt in {
+        "read": read,
+        "write": write,
+        "signal": signal_parent,
+        "network": connect,
+    }.items():
+        with suppress(OSError, AttributeError):
+            attempt()
+            possible.append(name)
+    return possible
+
+
+def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
+    """An answer for every (command, argument, limit s); one that fails does not stop the others.
+
+    After a call that did not return, no question with the same call is asked.
+    """
+    answers: list[dict[str, Any]] = []
+    endless: dict[str, dict[str, Any]] = {}
+    alone = -1  # the question that stopped those after it
+    while len(answers) < len(requests):
+        k = len(answers)
+        if k != alone and not endless and (questions := questions_at(requests, k, guest)):
+            answers += guest.together(questions, requests[k][2] * TOGETHER)
+            alone = len(answers)
+            continue
+        command, argument, seconds = requests[k]
+        calls = [call[0] for call in argument["calls"]] if command == "ask" else []
+        known = next((endless[call] for call in calls if call in endless), None)
+        try:
+            if known:
+                answers.append({"failed": known})
+            elif command == "renew":
+                answers.append({"done": guest.renew()})
+            else:
+                answers.append({"done": guest.run(command, argument, seconds)})
+        except Failed as failure:
+            answers.append({"failed": vars(failure)})
+            if failure.kind in ("timeout", "memory"):
+                endless |= dict.fromkeys([*calls, "step"], vars(failure))
+    return answers
+
+
+def questions_at(requests: list[Any], k: int, guest: Any) -> list[Any]:
+    """The questions from number k on that can be asked together, if the guest takes several."""
+    if not hasattr(guest, "together"):
+        return []
+    alike = takewhile(lambda each: (each[0], each[2]) == ("ask", requests[k][2]), requests[k:])
+    questions = [argument for _, argument, _ in alike]
+    return questions if len(questions) > 1 else []
+
+
+def tell(answers: int, what: Any) -> None:
+    """One line to the parent."""
+    data = memoryview(dumps(what).encode() + b"\n")
+    while data:
+        data = data[os.write(answers, data) :]
+
+
+if __name__ == "__main__":
+    sys.dont_write_bytecode = True
+    try:
+        main(loads(sys.argv[1]))
+    finally:
+        # Without Python's own end: taking down a V8 that was stopped in an endless loop never
+        # returns.
+        os._exit(0)

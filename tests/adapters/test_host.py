@@ -1,0 +1,202 @@
+"""A guest obtains nothing that is not its own, forges no answer, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from adapters.host import process as host_process
+from adapters.host.file import SolverFailed, SolverText
+from adapters.host.process import SolverProcess
+from adapters.host.sandbox import Level, bubblewrap, levels
+from adapters.system import KERNEL
+from tests.adapters.attacks import FORBIDDEN, FORGED, LEFT_BEHIND
+
+ROOT = Path(__file__).parents[2]
+BUBBLEWRAP = pytest.mark.skipif(
+    not KERNEL or bubblewrap() is None, reason="bubblewrap is for Linux"
+)
+# Each attack is a function; `models` is a text that a loaded file hands to its parent.
+HEAD = """
+import ctypes, os, signal, sys, time
+LIBC = ctypes.CDLL(None)
+SECRET, CLASS, PARENT, PROJECT, HOST, PORT, NAME = {values!r}
+def WRITE(data):
+    for n in range(3, 64):
+        try: os.write(n, data)
+        except OSError: pass
+"""
+# What another user of the machine may still do, at the level without a sandbox.
+WEAKER = {
+    "path extended", "text opened and run", "found by numpy's place", "listing of the class",
+    "command lines", "stat of others", "write /var/tmp", "write /dev/shm", "tcp to the machine",
+    "udp to the net", "abstract socket of the parent", "by a symbolic link", "by a hard link",
+    "signal by F_SETOWN", "linker: C source beside", "exec of a shell", "own command line",
+    "fills the disk", "name of a host", "unshare a user namespace", "a device made", "own place",
+    "by the folder of the parent", "home folder", "keyctl of the session",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def values(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[object, ...]]:
+    """What the attacks are told, which they could not know: a class with a secret, a server."""
+    folder = tmp_path_factory.mktemp("class-of-2026")
+    (folder / "secret").write_text("20 of 20")
+    (folder / "secret").chmod(0o600)
+    name = f"crosscheck-{os.getpid()}"
+    with socket.create_server(("127.0.0.1", 0)) as tcp, socket.socket(socket.AF_UNIX) as unix:
+        unix.bind(f"\0{name}")
+        unix.listen()
+        port = tcp.getsockname()[1]
+        secret = str(folder / "secret")
+        yield secret, str(folder), os.getpid(), str(ROOT), "127.0.0.1", port, name
+
+
+@pytest.fixture
+def at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The level of a test, also in its guests' parent."""
+    monkeypatch.setattr(host_process, "_levels", [])
+    monkeypatch.setenv("CROSSCHECK_SANDBOX", request.param)
+    return str(request.param)
+
+
+def guest(text: str, kind: str = "python") -> SolverProcess:
+    """A guest of this text."""
+    file = Path("mine.py" if kind == "python" else "mine.js")
+    return SolverProcess(SolverText(file, kind, text, ""))
+
+
+def obtained(attacks: dict[str, str], values: tuple[object, ...]) -> dict[str, str]:
+    """Attack -> what it obtained, all in one guest."""
+    text = HEAD.format(values=values) + "results = {}\n"
+    for name, code in attacks.items():
+        body = "".join(f"    {line}\n" for line in code.split("\n"))
+        text += (
+            f"def attack():\n{body}\ntry: found = attack()\n"
+            "except BaseException as error: found = None\n"
+            f"results[{name!r}] = repr(found)[:80] if found else ''\n"
+        )
+    text += "import json\nmodels = json.dumps(results)\n"
+    with guest(text) as process:
+        results: dict[str, str] = json.loads(process.functions["models"])
+    return {name: what for name, what in results.items() if what}
+
+
+@BUBBLEWRAP
+@pytest.mark.parametrize("at", ["bubblewrap"], indirect=True)
+def test_an_attack_obtains_nothing_in_the_sandbox(at: str, values: tuple[object, ...]):
+    """All that a hand-in may try, in one guest."""
+    assert at in {level.value for level in levels()}
+    assert obtained(FORBIDDEN, values) == {}
+    assert Path(str(values[0])).read_text() == "20 of 20"
+
+
+@pytest.mark.parametrize("at", ["none"], indirect=True)
+def test_without_a_sandbox_the_same_attacks_obtain_something(at: str, values: tuple[object, ...]):
+    """The negative control: it is the sandbox that stops them."""
+    harmless = ("neighbour's file", "text opened and run", "command lines", "stat of others")
+    found = obtained({name: FORBIDDEN[name] for name in harmless}, values)
+    assert at == "none"
+    assert set(found) == set(harmless)
+
+
+@pytest.mark.skipif(not KERNEL or os.geteuid() != 0, reason="only root becomes another user")
+@pytest.mark.parametrize("at", ["another user"], indirect=True)
+def test_another_user_reads_and_signals_nothing_of_root(at: str, values: tuple[object, ...]):
+    """The level without namespaces; `WEAKER` is what SANDBOX.md says that it does not stop."""
+    if Level.USER not in levels():
+        pytest.skip("another user cannot read this Python")
+    attacks = {name: code for name, code in FORBIDDEN.items() if name not in WEAKER}
+    assert at == "another user"
+    assert obtained(attacks, values) == {}
+
+
+@BUBBLEWRAP
+@pytest.mark.parametrize("name", LEFT_BEHIND)
+def test_nothing_is_left_running(name: str, values: tuple[object, ...]):
+    """What it starts lives in a world of its own, which ends with it."""
+    before = running()
+    with guest(HEAD.format(values=values) + LEFT_BEHIND[name]) as process:
+        assert process.level == Level.BUBBLEWRAP
+    until = time.monotonic() + 10.0  # the kernel ends a world of a hundred processes
+    while running() - before and time.monotonic() < until:
+        time.sleep(0.05)
+    assert running() - before == set()
+
+
+def running() -> set[int]:
+    """The guests' processes of this machine that this process, or nobody, has started."""
+    found = set()
+    for process in psutil.process_iter(["cmdline", "ppid"]):
+        if "/host/driver.py" in (process.info["cmdline"] or ()):
+            above = {parent.pid for parent in process.parents()}
+            if os.getpid() in above or process.info["ppid"] == 1:
+                found.add(process.pid)
+    return found
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_forged_answer_ends_the_guest(name: str, values: tuple[object, ...]):
+    """What it writes in place of the driver's answer is no answer."""
+    code, said = FORGED[name]
+    with pytest.raises(SolverFailed) as failed, guest(HEAD.format(values=values) + code):
+        pass
+    assert said in str(failed.value)
+    assert str(failed.value).isprintable()
+
+
+PLAIN = (ROOT / "tests/solvers/correct/plain.py").read_text()
+BALL = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.0, 0.7, 0.8, 0.9, 1.0, 0.5]
+QUESTION = {"spheres": [BALL], "calls": [["integrate", 0, 0.1]], "world": False}
+
+
+def patched(what: str) -> str:
+    """A right solver that changes its driver, which is a module of its process."""
+    return f"{PLAIN}\nimport sys\ndriver = sys.modules['driver']\n{what}\n"
+
+
+@pytest.mark.parametrize(
+    "forged",
+    [
+        "driver.PythonGuest.ask = lambda self, question: []",
+        "driver.PythonGuest.ask = lambda self, question: {'states': 1}",
+        "driver.PythonGuest.ask = lambda self, question: None",
+        "driver.row_of = lambda sphere: ['0.5'] * 12",
+        "driver.row_of = lambda sphere: [10**400] * 12",
+        "driver.row_of = lambda sphere: [True] * 12",
+        "driver.row_of = lambda sphere: [0.5] * 11",
+        "driver.reply = lambda guest, requests: [{'failed': {'kind': 'passed', 'what': ''}}]",
+        "driver.reply = lambda guest, requests: [{'done': 1}, {'done': 1}]",
+        "tell = driver.tell\ndriver.tell = lambda a, w: (tell(a, w), tell(a, w))",
+    ],
+)
+def test_an_answer_of_another_form_is_no_answer(forged: str):
+    """The type of each field is checked; a second answer has no question."""
+    with pytest.raises(SolverFailed, match="channel"):
+        ask_twice(patched(forged))
+
+
+def ask_twice(text: str) -> None:
+    """The same question, to a new guest."""
+    with guest(text) as process:
+        for _ in range(2):
+            process.do("ask", QUESTION, 1.0)
+
+
+def test_a_sleeping_call_is_ended_by_the_clock_and_asked_once_more():
+    """Three times its limit, twice; what keeps the processor busy ends after its limit."""
+    sleeps = PLAIN.replace(
+        "def integrate(sphere, dt):\n",
+        "def integrate(sphere, dt):\n    import time; time.sleep(99)\n",
+    )
+    began = time.monotonic()
+    with guest(sleeps) as process, pytest.raises(SolverFailed, match="does not come back"):
+        process.do("ask", QUESTION, 0.1)
+    assert time.monotonic() - began >= 2 * 3 * 0.1
