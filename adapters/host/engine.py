@@ -24,7 +24,7 @@ from adapters.host.features import features_of, must_model, refusal
 from adapters.host.file import LONGEST, SolverFailed, SolverText, printable, read_solver
 from adapters.host.process import SolverProcess
 from adapters.host.restitution import EXERCISE, restitution_of
-from adapters.host.surface import ENGINE, HOW, is_engine, must_be_either
+from adapters.host.surface import ENGINE, HOW, holder_of, is_engine, must_be_either
 from adapters.npm_packages import NotInstalled, text_of, version_of
 from scenarios.model import Array, Scene, State
 
@@ -58,6 +58,7 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
         "angle": scene.angle.tolist(),
         "angular_velocity": scene.angular_velocity.tolist(),
         "walls": scene.walls.tolist(),
+        "box": box_of(scene.walls),
         "gravity": scene.gravity.tolist(),
         "restitution": scene.restitution,
         "friction": scene.friction,
@@ -65,6 +66,15 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
         "listening": True,
         **more,
     }
+
+
+def box_of(walls: Array) -> list[list[float]] | None:
+    """Low and high corner of the box that four walls make; None if they make none."""
+    low, high = (f(walls, axis=(0, 1), initial=z) for f, z in ((np.min, np.inf), (np.max, -np.inf)))
+    corners = [low.tolist(), [high[0], low[1]], high.tolist(), [low[0], high[1]]]
+    sides = {frozenset(map(tuple, side)) for side in zip(corners, corners[1:] + corners[:1])}
+    fits = len(walls) == 4 and {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides
+    return [low.tolist(), high.tolist()] if fits else None
 
 
 class GuestEngine:
@@ -436,10 +446,12 @@ def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = Fals
     """The row of a file in its present state, an engine or a solver of the exercise; raises
     `NotASolver`. Its own user plays it: it may import what is installed."""
     solver = read_solver(path)
-    engine = is_engine(solver)
+    holder = holder_of(solver)
+    engine = holder is not None or is_engine(solver)
     if not engine:
         must_be_either(solver)
-    solver = replace(solver, engine=engine, packages=tuple(sorted(packages_named(solver))))
+    solver = replace(solver, engine=engine, holder=holder)
+    solver = replace(solver, packages=tuple(sorted(packages_named(solver))))
     make = OwnEngine if engine else OwnSolver
     return EngineRow(
         partial(make, solver, patience, collected),

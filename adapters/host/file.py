@@ -80,6 +80,7 @@ class SolverText:
         imported: the modules that it imports from its own folder, or the gl-matrix that it calls:
             file, relative to the folder or to the one above with its node_modules, -> text.
         engine: it has create, step and read; else it is a solver of the exercise.
+        holder: the class that has them; None if they are functions.
         packages: the installed packages that it may import, beside numpy.
         package: the text of the npm package that it drives, with its `versions`; else None.
     """
@@ -90,6 +91,7 @@ class SolverText:
     digest: str
     imported: tuple[tuple[str, str], ...] = ()
     engine: bool = False
+    holder: str | None = None
     packages: tuple[str, ...] = ()
     package: str | None = field(default=None, repr=False)
     versions: Mapping[str, str] = field(default_factory=dict, hash=False)
@@ -113,10 +115,17 @@ class SolverText:
             "text": self.text,
             "imported": (*self.imported, *self.reference.items()),
             "engine": self.engine,
+            "holder": self.holder,
             "package": self.package,
         }
 
 
+HINTS = {
+    **dict.fromkeys((".ts", ".tsx"), "; compile it to JavaScript (tsc), and name the .js"),
+    **dict.fromkeys((".html", ".htm"), "; save the text of its script as a .js file"),
+    **dict.fromkeys((".mjs", ".cjs"), "; leave out import and export, and name it .js"),
+    ".ipynb": "; save its cells as a .py file",
+}
 PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
 
 
@@ -125,9 +134,11 @@ def read_solver(path: Path) -> SolverText:
     sentence."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
-        unpack = "; unpack it" if path.suffix.lower() in PACKED else ""
+        hint = (
+            "; unpack it" if path.suffix.lower() in PACKED else HINTS.get(path.suffix.lower(), "")
+        )
         raise NotASolver(
-            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{unpack}"
+            f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{hint}"
         )
     data = read_bytes(path, "name an Exercise.js or a solver.py")
     text = decoded(path, data)

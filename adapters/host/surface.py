@@ -35,6 +35,23 @@ def is_engine(solver: SolverText) -> bool:
     )
 
 
+def holder_of(solver: SolverText) -> str | None:
+    """The class of a file that has the functions of an engine; None if the file has them itself, or
+    no class has all."""
+    if defined_in(solver.text, solver.kind).issuperset(ENGINE):
+        return None
+    if solver.kind == "python":
+        try:
+            classes = [x for x in ast.parse(solver.text).body if isinstance(x, ast.ClassDef)]
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            return None
+        return next((c.name for c in classes if {*ENGINE} <= {*names_of(c.body)}), None)
+    code = code_of(solver.text)
+    methods = re.findall(r"^\s+(?:static\s+)?(\w+)\s*\(", code, re.MULTILINE)
+    name = re.search(r"^class\s+(\w+)", code, re.MULTILINE)
+    return name[1] if name and {*ENGINE} <= {*methods} else None
+
+
 def must_be_either(solver: SolverText) -> None:
     """Raise `NotASolver` for a file that defines names, but no function of either kind."""
     names = defined_in(solver.text, solver.kind)

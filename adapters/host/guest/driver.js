@@ -9,7 +9,7 @@ globalThis.exports = module.exports;
 globalThis.Refused = class extends Error {};
 Object.defineProperty(globalThis, "__host", { value: (() => {
   const { parse, stringify } = JSON;
-  const { keys, is, setPrototypeOf, getOwnPropertyDescriptor, defineProperty } = Object;
+  const { keys, is, getPrototypeOf, setPrototypeOf, getOwnPropertyDescriptor, defineProperty } = Object;
   const { captureStackTrace } = Error;
   const { apply, ownKeys } = Reflect;
   const { slice } = String.prototype;
@@ -30,6 +30,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   let seed = 1;
   let file;  // the guest's functions and globals, once it is loaded
   let turns = null;  // whether an engine models rotation; null for a solver of the exercise
+  let loads = 0;  // scenes so far
   let inside = "";  // the function of an engine that was called last
   let world, steps, log, numbers;  // the world being played, its steps, its new collisions; what is handed back
   let accesses = "";  // what the last traced call read and wrote
@@ -432,7 +433,10 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       const wanted = `expected is ${width === 2 ? "[x, y]" : "a number"} for each of ${n} disks`;
       const value = state[name];
       if (value === undefined || value === null) throw new Wrong(`read returned ${display(state)}; it has no ${name}; ${wanted}`);
-      if (typeof value !== "object" || value.length !== n) throw new Wrong(`read returned ${display(value)} as ${name}; ${wanted}`);
+      if (typeof value !== "object" || value.length !== n) {
+        const kept = value.length > n && loads > 1 ? "; create keeps disks of the scene before" : "";
+        throw new Wrong(`read returned ${display(value)} as ${name}; ${wanted}${kept}`);
+      }
       for (let i = 0; i < n; i++) {
         const disk = value[i];
         if (width === 2 && (typeof disk !== "object" || disk === null || disk.length !== 2)) {
@@ -480,7 +484,10 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       step(forces) {
         inside = "step";
         const result = ran(file.step(made, dt, forces || none()), "step");
-        if (typeof result === "object" && result !== null) made = this.made = result;  // a step may return a new world
+        // a step may return a new world, of the same kind
+        if (typeof result === "object" && result !== null && getPrototypeOf(result) === getPrototypeOf(made)) {
+          made = this.made = result;
+        }
         if (hears) hear();
         if (wrap && typeof file.place === "function") wrapAll();
       },
@@ -498,6 +505,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
   function load(scene) {
     seed = 1;
     steps = 0;
+    loads++;
     log = empty();
     for (let i = 0; i < scene.n; i++) {
       if (scene.mass[i] === null) scene.mass[i] = Infinity;

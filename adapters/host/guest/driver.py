@@ -404,7 +404,7 @@ class EngineWorld:
             result = self.call(
                 "step", self.world, self.dt, acting or [[0.0] * 3 for _ in range(self.n)]
             )
-            if result is not None:
+            if type(result) is type(self.world):
                 self.world = result
             if self.hears:
                 self.hear()
@@ -444,6 +444,8 @@ class EngineWorld:
         if hasattr(value, "tolist"):
             value = value.tolist()
         if not isinstance(value, (list, tuple)) or len(value) != self.n:
+            if self.guest.loads > 1 and isinstance(value, (list, tuple)) and len(value) > self.n:
+                wanted += "; create keeps disks of the scene before"
             raise wrong("read", value, wanted, f" as {name}")
         column = []
         for i, disk in enumerate(value):
@@ -485,7 +487,7 @@ class PythonGuest:
         self.order, folder = order, order["folder"] or ""
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
-        self.turns, self.inside = False, ""
+        self.turns, self.inside, self.loads = False, "", 0
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 
@@ -500,7 +502,9 @@ class PythonGuest:
         sys.modules["solver"] = module  # numba and dataclasses look up a function's module
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
             exec(compile(self.order["text"], self.name, "exec", dont_inherit=True), vars(module))
-        names = vars(module)
+        self.loads, names = 0, vars(module)
+        if self.order["holder"]:  # a class has the functions, of itself or of its instances
+            names = self.methods_of(names[self.order["holder"]], "while it is loaded")
         if self.order["engine"]:
             self.world_of: Any = EngineWorld
             self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
@@ -518,6 +522,15 @@ class PythonGuest:
         models = names.get("models")
         self.functions |= {"replaced": [], "models": models if isinstance(models, str) else None}
         self.functions["advance"] = self.world_of is ArraysWorld
+
+    def methods_of(self, holder: type, when: str) -> dict[str, Any]:
+        """The functions of an engine that is a class."""
+        own = next(iter(inspect.signature(vars(holder)["create"]).parameters), "") == "self"
+        with self.guarded(LOAD_LIMIT, when):
+            engine = holder() if own else holder
+        return {
+            name: getattr(engine, name) for name in (*ENGINE, "models") if hasattr(engine, name)
+        }
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         """The answer to a command; raises `Failed` after `limit` s, or if the file threw.
@@ -738,7 +751,7 @@ class PythonGuest:
         seed()
         for name in ("mass", "inertia"):
             scene[name] = [inf if x is None else x for x in scene[name]]
-        self.heard = 0
+        self.heard, self.loads = 0, self.loads + 1
         # a check looks at every call of the functions, also where they are made of `advance`
         world_of: Any = ExerciseWorld if scene.get("by_functions") else self.world_of
         self.world = world_of(self, scene)

@@ -38,6 +38,14 @@ FUNCTIONS = {
 VERBS = ", ".join(
     f'{verb}: typeof {name} === "undefined" ? null : {name}' for verb, name in FUNCTIONS.items()
 )
+# A class has the functions, of itself or of its instances.
+METHODS = """{{
+  const engine = "create" in {0} ? {0} : new {0}();
+  for (const name of ["create", "step", "read", "collisions"]) {{
+    if (typeof engine[name] === "function") globalThis[name] = engine[name].bind(engine);
+  }}
+  if (typeof models === "undefined") globalThis.models = engine.models;
+}}"""
 BIND = f"""__host("bind", {{ {VERBS},
   ufo: () => ufo, asteroids: () => asteroids,
   watch: (i, c, w) => {{
@@ -91,6 +99,8 @@ class V8Guest:
                 for name, text in self.order["imported"]:
                     self.load_library(name, text)
             self.v8.eval(f"{self.order['text']}\n//# sourceURL={NAME}", timeout_sec=self.load_limit)
+            if self.order["holder"]:
+                self.v8.eval(METHODS.format(self.order["holder"]), timeout_sec=self.load_limit)
             self.functions = json.loads(str(self.v8.eval(BIND, timeout_sec=self.load_limit)))
             self.wait_until_ready()
         except JSEvalException as error:
