@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-from adapters.safe_path import PACKAGES
+from crosscheck2d.adapters.safe_path import PACKAGES
 
 
 def modules_beside(

@@ -14,19 +14,25 @@ from typing import Any
 
 import numpy as np
 
-from adapters.advance import Foreseen
-from adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsupported
-from adapters.engine_row import FLOAT64, EngineRow
-from adapters.float32 import must_fit, rounding
-from adapters.friction import must_be_frictionless
-from adapters.host.beside import imported_by
-from adapters.host.features import features_of, must_model, refusal
-from adapters.host.file import LONGEST, SolverFailed, SolverText, printable, read_solver
-from adapters.host.process import SolverProcess
-from adapters.host.restitution import EXERCISE, restitution_of
-from adapters.host.surface import ENGINE, HOW, holder_of, is_engine, must_be_either
-from adapters.npm_packages import NotInstalled, text_of, version_of
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.advance import Foreseen
+from crosscheck2d.adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsupported
+from crosscheck2d.adapters.engine_row import FLOAT64, EngineRow
+from crosscheck2d.adapters.float32 import must_fit, rounding
+from crosscheck2d.adapters.friction import must_be_frictionless
+from crosscheck2d.adapters.host.beside import imported_by
+from crosscheck2d.adapters.host.features import features_of, must_model, refusal
+from crosscheck2d.adapters.host.file import (
+    LONGEST,
+    SolverFailed,
+    SolverText,
+    printable,
+    read_solver,
+)
+from crosscheck2d.adapters.host.process import SolverProcess
+from crosscheck2d.adapters.host.restitution import EXERCISE, restitution_of
+from crosscheck2d.adapters.host.surface import ENGINE, HOW, holder_of, is_engine, must_be_either
+from crosscheck2d.adapters.npm_packages import NotInstalled, text_of, version_of
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 HERE = Path(__file__).parent
 TEMPLATES = {"javascript": HERE / "template.js", "python": HERE / "template.py"}

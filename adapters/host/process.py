@@ -21,13 +21,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters import system
-from adapters.engine import NotStarted
-from adapters.host.file import PATIENCE, SolverFailed, SolverText
-from adapters.host.gl_matrix import with_hint
-from adapters.host.sandbox import ALLOWED, MEMORY, Level, levels, start
-from adapters.library_versions import version
-from scenarios.truth.cache import folder
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.engine import NotStarted
+from crosscheck2d.adapters.host.file import PATIENCE, SolverFailed, SolverText
+from crosscheck2d.adapters.host.gl_matrix import with_hint
+from crosscheck2d.adapters.host.sandbox import ALLOWED, MEMORY, Level, levels, start
+from crosscheck2d.adapters.library_versions import version
+from crosscheck2d.scenarios.truth.cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
 INTRUDED = "wrote into the channel that its answers come by"

@@ -17,8 +17,8 @@ from pathlib import Path
 from shutil import which
 from typing import NamedTuple
 
-from adapters.safe_path import PACKAGES
-from adapters.system import KERNEL
+from crosscheck2d.adapters.safe_path import PACKAGES
+from crosscheck2d.adapters.system import KERNEL
 
 GUEST = Path(__file__).parent / "guest"
 SYSTEM = Path(__file__).parents[1] / "system.py"

@@ -7,8 +7,8 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator
 
-from adapters.host.file import NotASolver, SolverText
-from adapters.host.restitution import code_of
+from crosscheck2d.adapters.host.file import NotASolver, SolverText
+from crosscheck2d.adapters.host.restitution import code_of
 
 ENGINE = ("create", "step", "read")
 # Names of the exercise: those that an engine may also use, and those that it does not.

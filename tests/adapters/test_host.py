@@ -12,11 +12,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from adapters.host import process as host_process
-from adapters.host.file import SolverFailed, SolverText
-from adapters.host.process import SolverProcess
-from adapters.host.sandbox import Level, bubblewrap, levels
-from adapters.system import KERNEL
+from crosscheck2d.adapters.host import process as host_process
+from crosscheck2d.adapters.host.file import SolverFailed, SolverText
+from crosscheck2d.adapters.host.process import SolverProcess
+from crosscheck2d.adapters.host.sandbox import Level, bubblewrap, levels
+from crosscheck2d.adapters.system import KERNEL
 from tests.adapters.attacks import FORBIDDEN, FORGED, LEFT_BEHIND
 
 ROOT = Path(__file__).parents[2]

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.host.engine import TEMPLATES, box_of, row_of_file
-from adapters.host.file import NotASolver, SolverFailed, read_solver
-from adapters.play import play_once
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.host.engine import TEMPLATES, box_of, row_of_file
+from crosscheck2d.adapters.host.file import NotASolver, SolverFailed, read_solver
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.scenarios.catalogue import scenario
 
 FLY_JS = """
   create(scene, dt) { return scene.position.map((p, i) => ({ p, v: scene.velocity[i] })); }

@@ -16,12 +16,12 @@ from unittest import mock
 import pytest
 from py_mini_racer import JSTimeoutException
 
-from adapters.host.file import PATIENCE, NotASolver, SolverFailed, read_solver
-from adapters.host.process import GRACE, SolverProcess
-from adapters.host.sandbox import GUEST, Level, start
-from reports.check.lines import Source
-from reports.check.rows import judged
-from reports.check.solver import with_lines
+from crosscheck2d.adapters.host.file import PATIENCE, NotASolver, SolverFailed, read_solver
+from crosscheck2d.adapters.host.process import GRACE, SolverProcess
+from crosscheck2d.adapters.host.sandbox import GUEST, Level, start
+from crosscheck2d.reports.check.lines import Source
+from crosscheck2d.reports.check.rows import judged
+from crosscheck2d.reports.check.solver import with_lines
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 sys.path.append(str(GUEST))
