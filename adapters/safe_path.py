@@ -22,16 +22,19 @@ PROGRAM = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # the fol
 class OwnPackages:
     """Finds this package, whatever its folder is called, and the tests in it."""
 
+    def __init__(self) -> None:
+        from importlib.machinery import PathFinder  # now: later this finder would be asked
+        from importlib.util import spec_from_file_location
+
+        self.at_place, self.finder = spec_from_file_location, PathFinder
+
     def find_spec(
         self, name: str, _path: object = None, _target: object = None
     ) -> "ModuleSpec | None":
         """Called through `sys.meta_path`."""
-        from importlib.machinery import PathFinder
-        from importlib.util import spec_from_file_location
-
         if name == PACKAGE:
-            return spec_from_file_location(name, os.path.join(PROGRAM, "__init__.py"))
-        return PathFinder.find_spec(name, [PROGRAM]) if name == TESTS else None
+            return self.at_place(name, os.path.join(PROGRAM, "__init__.py"))
+        return self.finder.find_spec(name, [PROGRAM]) if name == TESTS else None
 
 
 def keep_path_safe() -> None:

@@ -88,7 +88,7 @@ def imports_of(path: Path) -> frozenset[str]:
 
 
 def of_folder(folder: str, names: Iterable[str]) -> set[str]:
-    """What of a folder is named: `scenarios`, crosscheck2d.scenarios.truth.exact -> truth."""
+    """What of a folder is named: of scenarios/truth/exact.py it is `truth`."""
     start = folder.replace("/", ".") + "."
     return {name.removeprefix(start).split(".")[0] for name in names if name.startswith(start)}
 

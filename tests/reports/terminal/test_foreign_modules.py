@@ -245,6 +245,13 @@ def test_of_the_folder_of_the_program_only_the_package_and_its_tests_are_found()
     assert [find(name) for name in (*SOURCE, "scipy", "conftest")] == [None] * 6
 
 
+def test_a_new_process_finds_the_package_where_nothing_is_installed():
+    """Without site-packages, and so without what else finds it in a clone."""
+    words = safe_path.python("import crosscheck2d.adapters; print(crosscheck2d.__file__)")
+    done = subprocess.run([words[0], "-S", *words[1:]], capture_output=True, text=True)
+    assert done.stdout.strip() == str(ROOT / "__init__.py"), done.stderr[-500:]
+
+
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], str]]:
     """A clone of the program with modules in its root that nobody asked for, and what shows which
