@@ -9,13 +9,14 @@ run time are not covered.
 from __future__ import annotations
 
 import ast
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-from crosscheck2d.adapters.safe_path import PACKAGES
+from crosscheck2d.adapters.safe_path import PACKAGE
 
 
 def modules_beside(
@@ -36,13 +37,20 @@ def modules_beside(
             yield file.relative_to(folder).as_posix(), module
 
 
+OURS = (PACKAGE, "reference_impl")
 REFERENCE = Path(__file__).parents[2] / "reference_impl"
+
+
+USES_REFERENCE = re.compile(
+    r"^\s*(?:from|import)\s+(?:(?:crosscheck2d\.)?reference_impl\b|\.(?:state|compiled)\b)",
+    re.MULTILINE,
+)
 
 
 def reference_modules(text: str) -> dict[str, str]:
     """File -> text of the two modules that a changed copy of the exercise's solver imports, by both
     of their names; none if it imports nothing of reference_impl."""
-    if not imported_by(text) & {"reference_impl", "crosscheck2d"}:
+    if not USES_REFERENCE.search(text):
         return {}
     files = ("__init__.py", "state.py", "compiled.py")
     texts = {file: (REFERENCE / file).read_text(encoding="utf-8") for file in files[1:]}
@@ -70,7 +78,7 @@ def imported_by(text: str) -> set[str]:
 
 def is_library(name: str, folder: Path) -> bool:
     """Whether a module is found outside `folder`."""
-    if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in PACKAGES:
+    if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in OURS:
         return True
     spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
     # a folder without __init__.py is found last

@@ -54,7 +54,9 @@ def lacks_gl_matrix(said: str) -> bool:
 
 def with_hint(what: str) -> str:
     """A failure, with what to do if it says that gl-matrix is missing, or is none."""
-    return f"{what}: {where_to()}" if LACKING.match(what) else what
+    if not LACKING.match(what):
+        return what
+    return f"{what}{';' if what.endswith(')') else ':'} {where_to()}"
 
 
 def where_to() -> str:

@@ -17,7 +17,7 @@ from pathlib import Path
 from shutil import which
 from typing import NamedTuple
 
-from crosscheck2d.adapters.safe_path import PACKAGES
+from crosscheck2d.adapters.safe_path import PACKAGE, TESTS
 from crosscheck2d.adapters.system import KERNEL
 
 GUEST = Path(__file__).parent / "guest"
@@ -25,7 +25,7 @@ SYSTEM = Path(__file__).parents[1] / "system.py"
 MEMORY = 2 * 2**30  # bytes of data; V8 reserves far more address space than it uses
 NEEDED = {"python": ("numpy",), "javascript": ("py_mini_racer",)}
 INSTALLED = "python3*/*-packages"
-OURS = {*PACKAGES, "crosscheck2d", "tests"}  # what no guest is given
+OURS = {PACKAGE, TESTS}  # what no guest is given
 FIRST_USER = 2**20  # numbers of users from here on belong to nobody
 # All that a guest has of an environment: one thread for each, and text in UTF-8.
 QUIET = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}

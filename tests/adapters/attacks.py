@@ -5,16 +5,20 @@ return something if they have obtained what they wanted."""
 # folder of a class; PARENT: the process that checks; PROJECT: the folder of this project.
 FORBIDDEN: dict[str, str] = {
     # the reference, by import and by path
-    "import of the reference": "import crosscheck2d.reference_impl.exercise as e; return e.advance",
-    "import under its new name": (
+    "import of the reference": (
         "import crosscheck2d.reference_impl.exercise as e; return e.advance"
     ),
+    "import by its folder": "return __import__('reference_impl' + '.exercise').exercise.advance",
+    "import beside itself": "from .exercise import advance; return advance",
     "import of the judge": "import crosscheck2d.reports.check.motion as m; return m",
-    "import of the judge under its new name": "import crosscheck2d.reports.check as m; return m",
+    "import of the judge's folder": "return __import__('reports' + '.check')",
     "import of the adapters": "import crosscheck2d.adapters.host.process as p; return p",
-    "import by importlib": "from importlib import import_module as i; return i('crosscheck2d.reports.check')",
+    "import by importlib": (
+        "from importlib import import_module as i; return i('crosscheck2d.reports.check')"
+    ),
     "path extended": (
-        "sys.path.insert(0, PROJECT); import crosscheck2d.reference_impl.exercise as e; return e.advance"
+        "sys.path[:0] = [PROJECT, os.path.dirname(PROJECT)]\n"
+        "return __import__('reference_impl.exercise')"
     ),
     "text opened and run": "return open(PROJECT + '/reference_impl/exercise.py').read()",
     "found by numpy's place": (
@@ -24,9 +28,10 @@ FORBIDDEN: dict[str, str] = {
         "    if os.path.exists(f + '/reference_impl'): return f"
     ),
     "in sys.modules or gc": (
-        "import gc; names = ('reports', 'scenarios', 'adapters', 'crosscheck2d.reference_impl.exercise')\n"
-        "return [m for m in sys.modules if m.startswith(names)] or [\n"
-        "    o for o in gc.get_objects() if type(o).__module__.startswith(names)\n"
+        "import gc; names = ('reports', 'scenarios', 'adapters', 'exercise')\n"
+        "ours = lambda name: any(part in names for part in str(name).split('.'))\n"
+        "return [m for m in sys.modules if ours(m)] or [\n"
+        "    o for o in gc.get_objects() if ours(type(o).__module__)\n"
         "]"
     ),
     "linker: C source beside": "import linecache; return linecache.getlines(SECRET)",

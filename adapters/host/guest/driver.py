@@ -499,6 +499,8 @@ class PythonGuest:
         seed()
         self.module = module = ModuleType("solver")
         module.__file__ = self.name
+        if "reference_impl/state.py" in self.neighbours.texts:
+            module.__package__ = "reference_impl"  # where its relative imports begin
         sys.modules["solver"] = module  # numba and dataclasses look up a function's module
         with self.guarded(LOAD_LIMIT, "while it is loaded"):
             exec(compile(self.order["text"], self.name, "exec", dont_inherit=True), vars(module))
