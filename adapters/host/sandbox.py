@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import secrets
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,7 +27,7 @@ MEMORY = 2 * 2**30  # bytes of data; V8 reserves far more address space than it 
 NEEDED = {"python": ("numpy",), "javascript": ("py_mini_racer",)}
 INSTALLED = "python3*/*-packages"
 OURS = {PACKAGE, TESTS}  # what no guest is given
-FIRST_USER = 2**20  # numbers of users from here on belong to nobody
+FIRST_USER = 2**20  # numbers of users from here on belong to nobody; each guest has its own
 # All that a guest has of an environment: one thread for each, and text in UTF-8.
 QUIET = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "LC_ALL": "C.UTF-8"}
 
@@ -119,7 +120,7 @@ def start(
         else files,
         "system": "/system.py" if inner else str(SYSTEM),
         "memory": MEMORY,
-        "user": FIRST_USER + os.getpid() if level == Level.USER else None,
+        "user": FIRST_USER + secrets.randbelow(2**30) if level == Level.USER else None,
         "threads": kind == "javascript",
         "protected": level != Level.NONE,
         "secret": secret(),

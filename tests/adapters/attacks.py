@@ -56,7 +56,7 @@ FORBIDDEN: dict[str, str] = {
         "for n in range(3, 64):\n"
         "    try: name = os.readlink(f'/proc/self/fd/{n}')\n"
         "    except OSError: continue\n"
-        "    if not name.startswith(('pipe', 'anon')): return name\n"
+        "    if not name.startswith(('pipe', 'anon', '/dev/null')): return name\n"
         "return any(os.path.isdir(f'/dev/fd/{n}') for n in range(3, 64))"
     ),
     "write a file beside": "open(CLASS + '/marks.csv', 'w').write('20'); return True",
