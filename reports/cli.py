@@ -571,6 +571,21 @@ def new_engine(
     write_engine(name)
 
 
+@app.command(name="new-solver")
+def new_solver(
+    name: Annotated[
+        Path,
+        typer.Argument(
+            metavar="NAME", parser=place, help="The file to write: Exercise.js or solver.py."
+        ),
+    ],
+) -> None:
+    """Write the two functions of the exercise, to be filled in."""
+    from crosscheck2d.reports.commands.new_engine import write_solver
+
+    write_solver(name)
+
+
 @app.command(name="list")
 def list_(
     what: Annotated[

@@ -26,6 +26,8 @@ SYSTEM = Path(__file__).parents[1] / "system.py"
 MEMORY = 2 * 2**30  # bytes of data; V8 reserves far more address space than it uses
 NEEDED = {"python": ("numpy",), "javascript": ("py_mini_racer",)}
 INSTALLED = "python3*/*-packages"
+# what numpy imports when it is first used
+LAZY = ("numpy.random", "numpy.linalg", "numpy.fft")
 OURS = {PACKAGE, TESTS}  # what no guest is given
 FIRST_USER = 2**20  # numbers of users from here on belong to nobody; each guest has its own
 # All that a guest has of an environment: one thread for each, and text in UTF-8.
@@ -124,7 +126,7 @@ def start(
         "threads": kind == "javascript",
         "protected": level != Level.NONE,
         "secret": secret(),
-        "preload": NEEDED[kind] if level == Level.USER else [],
+        "preload": [*files, *LAZY] if level == Level.USER else [],
     }
     program = os.path.realpath(getattr(sys, "_base_executable", sys.executable))
     driver = "/host/driver.py" if inner else str(GUEST / "driver.py")

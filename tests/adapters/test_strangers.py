@@ -13,7 +13,9 @@ import pytest
 from crosscheck2d.adapters.host.engine import TEMPLATES, box_of, row_of_file
 from crosscheck2d.adapters.host.file import NotASolver, SolverFailed, read_solver
 from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.check.solver import check_solver
 from crosscheck2d.scenarios.catalogue import scenario
+from tests.reports.terminal.command_line import crosscheck
 
 FLY_JS = """
   create(scene, dt) { return scene.position.map((p, i) => ({ p, v: scene.velocity[i] })); }
@@ -103,6 +105,17 @@ def test_disks_of_the_scene_before_are_named(name: str, tmp_path: Path):
         engine.load(scene, 1 / 256)
         with pytest.raises(SolverFailed, match="create keeps disks of the scene before"):
             engine.read()
+
+
+@pytest.mark.parametrize("name", ["Exercise.js", "solver.py"])
+def test_new_solver_writes_two_functions_that_do_nothing(name: str, tmp_path: Path):
+    """It loads, every task can be asked, and none is right."""
+    done = crosscheck("new-solver", name, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert crosscheck("new-solver", name, cwd=tmp_path).returncode == 2
+    rows = check_solver(tmp_path / name)
+    assert {row.verdict for row in rows if row.name == "loads"} == {"right"}
+    assert {row.task for row in rows if row.verdict == "fault"} >= {"1", "2a"}
 
 
 def test_a_box_is_told_where_four_walls_make_one():

@@ -815,6 +815,10 @@ def main(settings: dict[str, Any]) -> None:
     for name in settings["preload"]:
         with suppress(ImportError):
             import_module(name)
+    if "py_mini_racer" in settings["packages"]:  # what is read now need not be readable later
+        sys.modules["v8"] = load_file("v8", os.path.join(os.path.dirname(__file__), "v8.py"))
+        if settings["user"] is not None:
+            sys.modules["v8"].MiniRacer().close()  # it reads its library
     limit(settings)
     Thread(target=listen, args=(requests, lines), daemon=True).start()
     tell(answers, {"here": True, "can": attempts(settings["secret"])})
@@ -838,8 +842,7 @@ def make(order: dict[str, Any]) -> Any:
     """The guest of an order; raises `Failed`."""
     if order["kind"] == "python":
         return PythonGuest(order)
-    file = os.path.join(os.path.dirname(os.path.abspath(__file__)), "v8.py")
-    return load_file("v8", file).V8Guest(order)
+    return sys.modules["v8"].V8Guest(order)
 
 
 def load_file(name: str, file: str) -> Any:

@@ -5,7 +5,9 @@ home=${AUTOGRADER:-/autograder}
 cd "$(dirname "$0")"
 
 command -v uv > /dev/null || python3 -m pip install uv || pip install --break-system-packages uv
+export UV_PYTHON_INSTALL_DIR="$home/python"  # not below /root: a hand-in runs as another user
 uv venv --quiet --python 3.11 "$home/venv"
 uv pip install --quiet --python "$home/venv" "$(echo crosscheck2d-*.whl)[js]"
 # gl-matrix, which students' files may call: held to its version and SHA-512
 CROSSCHECK_CACHE="$home/cache" "$home/venv/bin/python" -c "from crosscheck2d.adapters.npm_packages import fetch; fetch()"
+chmod 700 "$home/venv" "$home/source"  # so that it reads neither this program nor the points

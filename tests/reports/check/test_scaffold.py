@@ -83,4 +83,5 @@ def test_the_scaffold_fetches_gl_matrix_while_it_is_built(tmp_path: Path):
 
     assert re.search(r'"\$\(echo \S*crosscheck2d-\*\.whl\)\[js\]"', built)
     assert '-c "from crosscheck2d.adapters.npm_packages import fetch; fetch()"' in built
+    assert 'chmod 700 "$home/venv"' in built, "no hand-in reads this program"
     assert all(re.search(r'CROSSCHECK_CACHE="?\$home/cache', one) for one in (built, run_later))
