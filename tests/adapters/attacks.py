@@ -118,14 +118,20 @@ FORBIDDEN: dict[str, str] = {
     "another user": "os.setuid(4242); return True",
     "a device made": "os.mknod('/tmp/disk', 0o60666, os.makedev(8, 0)); return open('/tmp/disk')",
     "10 GB": "return bytearray(10**10)",
-    "6 GB of shared mapping filled": (
-        "import mmap; m = mmap.mmap(-1, 6 * 10**9)\n"
-        "for k in range(0, 10**9, 4096): m[k] = 1\n"
-        "return False"
+    "10 GB in pieces": "return [bytearray(10**8) for _ in range(100)]",
+    "6 GB of shared mapping": "import mmap; return mmap.mmap(-1, 6 * 10**9)",
+    "3 GB of memfd": (
+        "fd = os.memfd_create('m')\nfor _ in range(30): os.write(fd, bytes(10**8))\nreturn True"
     ),
+    "1000 files": "return [open(os.devnull) for _ in range(1000)]",
     "fills the disk": (
         "f = open('/tmp/full', 'wb')\n"
         "for _ in range(100): f.write(bytes(10**6)); f.flush()\n"
+        "return True"
+    ),
+    "1000 threads": (  # last: they need the memory of the others
+        "from threading import Thread\n"
+        "for _ in range(1000): Thread(target=time.sleep, args=(5,), daemon=True).start()\n"
         "return True"
     ),
 }

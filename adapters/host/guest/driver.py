@@ -47,6 +47,7 @@ TOGETHER = 0.2  # of a question's time: all together take milliseconds, or one i
 MOST = 400  # contacts and accesses kept for the check
 SHOWN = 60  # characters of a returned value in a message
 LONGEST = 400  # characters of a message
+FILES = 20 * 10**6  # bytes of a file that a guest may write, in a folder of its own
 KEYCTL = {"x86_64": 250, "aarch64": 219}  # the number of this call of Linux
 DECIMAL_COMMA = re.compile(r"=\s*\d+,\d+\s*$", re.MULTILINE)
 COLLISION = "expected are rows [i, j] or [i, j, impulse]: disk i; disk j, or wall w as -1 - w; N s"
@@ -878,21 +879,28 @@ def limit(settings: dict[str, Any]) -> None:
     """Bound memory, files and processes, and become another user if there is one."""
     system().limit_memory(settings["memory"])
     system().write_no_core()
-    if settings["protected"]:  # no key of the user's session is in the new, empty one
-        with suppress(OSError, AttributeError):
-            ctypes.CDLL(None).syscall(KEYCTL.get(os.uname().machine, -1), 1, None)
-    user = settings["user"]
-    if user is None:
+    if not settings["protected"]:
         return
     import resource
 
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-    os.setgroups([])
-    os.setresgid(user, user, user)
-    # the only process of this user, so that it can start no other; V8 needs threads
-    if not settings["threads"]:
-        resource.setrlimit(resource.RLIMIT_NPROC, (2, 2))
-    os.setresuid(user, user, user)
+    limits = {resource.RLIMIT_FSIZE: FILES, resource.RLIMIT_NOFILE: 256}
+    if not settings["threads"]:  # V8 reserves more addresses than it uses; Python shares memory
+        limits[resource.RLIMIT_AS] = 2 * settings["memory"]
+    with suppress(OSError, AttributeError):  # no key of the user's session is in a new, empty one
+        ctypes.CDLL(None).syscall(KEYCTL.get(os.uname().machine, -1), 1, None)
+    user = settings["user"]
+    if user is not None:
+        os.setgroups([])
+        os.setresgid(user, user, user)
+        limits[resource.RLIMIT_FSIZE] = 0
+        if not settings["threads"]:  # it is the only process of this user, and starts no other
+            limits[resource.RLIMIT_NPROC] = 2
+    for name, most in limits.items():
+        _, allowed = resource.getrlimit(name)
+        most = most if allowed == resource.RLIM_INFINITY else min(most, allowed)
+        resource.setrlimit(name, (most, most))
+    if user is not None:
+        os.setresuid(user, user, user)
 
 
 def attempts(secret: str) -> list[str]:
