@@ -312,8 +312,11 @@ class SolverProcess:
     def close(self) -> None:
         """End the process, or let it wait for its next use."""
         keeps = _reusing or self.solver.package is not None
-        free = keeps and self.sound and self.key not in waiting and len(waiting) < MOST_WAITING
+        free = keeps and self.sound and self.key not in waiting
         if free and self.process is not None and self.process.poll() is None:
+            mine = [key for key in waiting if key[0] == os.getpid()]
+            for oldest in mine[: max(0, len(mine) - MOST_WAITING + 1)]:
+                end(waiting.pop(oldest).process)
             waiting[self.key] = Idle(
                 self.process, self.pieces, self.level, self.solver.package is not None
             )

@@ -200,6 +200,7 @@ def file_as_json(one: Marked) -> dict[str, Any]:
         "points": one.points,
         "max_points": one.most,
         "seconds": round(check.seconds, 3),
+        "seed": one.seed,
         "tasks": check.tasks,
         "marks": {
             mark.task: {

@@ -264,7 +264,7 @@ class ExerciseWorld:
         return array.array("d", [x for r in rows for x in (*r[:4], r[6], r[7])])
 
 
-class Disks(NamedTuple):
+class GuestDisks(NamedTuple):
     """What `advance` of a file like those of reference_impl works on; see its state.py."""
 
     position: Any
@@ -279,7 +279,7 @@ class Disks(NamedTuple):
     remainder: Any
 
 
-class World(NamedTuple):
+class GuestWorld(NamedTuple):
     """What all disks share; see state.py of reference_impl."""
 
     restitution: float
@@ -292,11 +292,13 @@ class World(NamedTuple):
     friction: float = 0.0
 
 
-def make_disks(np: Any, *columns: Any) -> Disks:
+def make_disks(np: Any, *columns: Any) -> GuestDisks:
     """Disks without force: position, velocity, radius, mass, inertia, angle, angular velocity."""
     x, v, radius, mass, inertia, angle, spin = (np.array(c, float, order="C") for c in columns)
     zero = np.zeros(len(radius))
-    return Disks(x, v, np.zeros_like(x), angle, spin, zero, radius, mass, inertia, np.zeros_like(x))
+    return GuestDisks(
+        x, v, np.zeros_like(x), angle, spin, zero, radius, mass, inertia, np.zeros_like(x)
+    )
 
 
 class ArraysWorld:
@@ -313,7 +315,7 @@ class ArraysWorld:
         low, high = scene["wrap"] or ([-inf] * 2, [inf] * 2)
         walls = np.reshape(np.array(scene["walls"], float), (-1, 2, 2))
         vectors = (np.array(scene["gravity"], float), walls, np.array(low), np.array(high))
-        self.world = World(float(scene["restitution"]), *vectors)
+        self.world = GuestWorld(float(scene["restitution"]), *vectors)
         self.advance(self.disks, self.world, self.dt, 0)  # compiles, if it is compiled
 
     def step(self, count: int, forces: Any, held: bool) -> None:
@@ -343,10 +345,10 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     """
     np = import_module("numpy")
     nowhere = np.full(2, inf)
-    world = World(0.9, np.zeros(2), np.zeros((0, 2, 2)), -nowhere, nowhere)
+    world = GuestWorld(0.9, np.zeros(2), np.zeros((0, 2, 2)), -nowhere, nowhere)
     boxed = world._replace(low=np.array([-5.0, -3.0]), high=np.array([5.0, 3.0]))  # the exercise's
 
-    def act(spheres: list[Any], where: World, dt: float) -> None:
+    def act(spheres: list[Any], where: GuestWorld, dt: float) -> None:
         rows = np.array([row_of(s) for s in spheres])
         columns = (rows[:, :2], rows[:, 2:4], *rows[:, [11, 9, 10, 6, 7]].T)
         disks = make_disks(np, *columns)
