@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled, internal, kernel
-from reference_impl.neighbour_list import (
+from .compiled import compiled, internal, kernel
+from .neighbour_list import (
     EDGES,
     PAIRS,
     STRIDE,
@@ -19,7 +19,7 @@ from reference_impl.neighbour_list import (
     NeighbourList,
     account_for,
 )
-from reference_impl.state import Disks, World
+from .state import Disks, World
 
 NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
 EXACT, COARSE = 2.0**-40, 2.0**-20  # of radii, speeds and accelerations

@@ -1,6 +1,6 @@
 """What each engine does in impacts that were measured, beside the experiment and the exact answer.
 
-`uv run --extra js python -m adapters.conformance.experiment` asks all engines with friction, and
+`uv run --extra js python -m crosscheck2d.adapters.conformance.experiment` asks all engines with friction, and
 writes experiment.csv and the table of adapters/README.md.
 """
 
@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from adapters.conformance.impact_table import PHASES, README, replace_table
-from adapters.engine import Engine, Unsupported
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED
-from scenarios.families.experiment import MEASURED, SPEED, oblique_impacts
-from scenarios.model import Array
+from crosscheck2d.adapters.conformance.impact_table import PHASES, README, replace_table
+from crosscheck2d.adapters.engine import Engine, Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.scenarios.families.experiment import MEASURED, SPEED, oblique_impacts
+from crosscheck2d.scenarios.model import Array
 
 KEPT = Path(__file__).with_name("experiment.csv")
 MARK = "experiment table"

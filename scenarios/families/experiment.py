@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.families.friction import IMPACT, start_of, turning_answer
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.sliding import bounce
+from crosscheck2d.scenarios.families.friction import IMPACT, start_of, turning_answer
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.sliding import bounce
 
 MEASURED = np.genfromtxt(
     Path(__file__).with_name("kharaz.csv"), delimiter=",", names=True, encoding="utf-8"

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.conformance import experiment
-from adapters.conformance.experiment import (
+from crosscheck2d.adapters.conformance import experiment
+from crosscheck2d.adapters.conformance.experiment import (
     DT,
     KEPT,
     LEAD,
@@ -19,11 +19,16 @@ from adapters.conformance.experiment import (
     replace_table,
     rows_of,
 )
-from adapters.conformance.impact_table import README
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, changed
-from scenarios.families.experiment import FRICTION, MEASURED, RESTITUTION, oblique_impacts
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.conformance.impact_table import README
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, changed
+from crosscheck2d.scenarios.families.experiment import (
+    FRICTION,
+    MEASURED,
+    RESTITUTION,
+    oblique_impacts,
+)
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 TABLE = pd.read_csv(KEPT)
 # the angle, in degrees, above which friction cannot end the slip of a sphere within the impact
@@ -74,7 +79,7 @@ def test_every_measured_number_is_in_the_table_beside_every_engine_that_takes_it
     "name", ["reference:ordered", "pymunk:matched", "box2d:shipped", "box2d_v3:matched"]
 )
 def test_an_engine_reads_what_is_kept_of_it(name):
-    """With the same versions; else `python -m adapters.conformance.experiment` writes it anew."""
+    """With the same versions; else `python -m crosscheck2d.adapters.conformance.experiment` writes it anew."""
     rows = pd.DataFrame(rows_of(name, ENGINES[name], experiment.exact()))
     kept = TABLE[TABLE.engine == name].reset_index(drop=True)
     assert rows.drop(columns="engine").columns.equals(kept.drop(columns="engine").columns)
