@@ -1,7 +1,7 @@
 """What each engine does in impacts that were measured, beside the experiment and the exact answer.
 
-`uv run --extra js python -m crosscheck2d.adapters.conformance.experiment` asks all engines with friction, and
-writes experiment.csv and the table of adapters/README.md.
+`uv run --extra js python -m crosscheck2d.adapters.conformance.experiment` asks all engines with
+friction, and writes experiment.csv and the table of adapters/README.md.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def test_every_measured_number_is_in_the_table_beside_every_engine_that_takes_it
     "name", ["reference:ordered", "pymunk:matched", "box2d:shipped", "box2d_v3:matched"]
 )
 def test_an_engine_reads_what_is_kept_of_it(name):
-    """With the same versions; else `python -m crosscheck2d.adapters.conformance.experiment` writes it anew."""
+    """With the same versions; else `crosscheck2d.adapters.conformance.experiment` is run anew."""
     rows = pd.DataFrame(rows_of(name, ENGINES[name], experiment.exact()))
     kept = TABLE[TABLE.engine == name].reset_index(drop=True)
     assert rows.drop(columns="engine").columns.equals(kept.drop(columns="engine").columns)
