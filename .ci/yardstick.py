@@ -225,7 +225,9 @@ def check(folder: Path) -> Numbers:
         (student / file).write_text(text, encoding="utf-8")
         shutil.copy(load("GL_MATRIX"), student)  # some call it
     marks = folder / "marks.json"
-    crosscheck("check", folder / "class", "--format", "json", "--out", marks)
+    words = ("check", folder / "class", "--format", "json", "--out", marks)
+    if crosscheck(*words, "--seed", 0, codes=()) > 1:  # code without this option
+        crosscheck(*words)
     for solver in json.loads(marks.read_text(encoding="utf-8"))["files"]:
         name = f"check/{solver['id']}"
         yield f"{name}/points", solver["points"]
