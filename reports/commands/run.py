@@ -15,7 +15,6 @@ import psutil
 from adapters.engines import row_of
 from reports.commands.own_solvers import checks_of
 from reports.commands.report import finish
-from reports.lessons.catalogue import LESSONS
 from reports.page.report import make_report
 from reports.run.archive import Archive, stored_scene
 from reports.run.arguments import (
@@ -173,7 +172,7 @@ def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path, bits: boo
     try:
         with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
             carry_out(plan, means, journal, progress)
-            report = make_report(part, progress.say, LESSONS)
+            report = make_report(part, progress.say)
             if bits:
                 write_bits(part)
             journal.close()

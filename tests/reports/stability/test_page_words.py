@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from reports.page.sections import limits_of
 from reports.page.situations import FAR_OFF
 from reports.page.style import number
 from reports.stability.cases import CASES
 from reports.stability.limits import LIMIT, Case, Limit, Trial
 from reports.stability.overview import findings, held, in_report, in_words
-from scenarios.catalogue import SCENARIOS, scenario
+from scenarios.catalogue import scenario
 
 COLUMN = "column_of_ten"
 
@@ -66,11 +65,3 @@ def test_the_column_of_the_report_and_that_of_the_limits_are_told_apart():
     assert f"more than {number(FAR_OFF)} radius" in said
     assert CASES["column"].predicate.means in said
     assert f"{COLUMN} is the same scene, at dt {dt} ms; here dt is varied." in same
-
-
-def test_the_report_names_the_cases_that_name_its_scene():
-    """Both ways; scenes with friction and the reader's own have none."""
-    for name in SCENARIOS:
-        asked = {case.name for case in CASES.values() if case.report == name}
-        assert set(limits_of(scenario(name))) == asked
-    assert limits_of(scenario(COLUMN)) == [f"dt_{COLUMN}", "column"]
