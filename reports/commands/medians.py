@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import OWN
-from adapters.friction import REFUSAL
-from reports.page.scenes import SceneScores, values
-from reports.page.style import number
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.reports.page.scenes import SceneScores, values
+from crosscheck2d.reports.page.style import number
 
 MAPPED = "position_max_radii"
 

@@ -16,8 +16,8 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports.page import style
-from reports.terminal.foreign_text import encoded
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay

@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from adapters.engines import OWN
-from adapters.friction import REFUSAL
-from reports.compare.comparison import Comparison
-from reports.compare.verdicts import in_words
-from reports.page.scenes import LOST, SceneScores
-from reports.page.situations import EXACT, YOURS, grouped
-from reports.page.style import number
-from reports.page.summary import Summary
-from reports.terminal.counts import counted, listed
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.verdicts import in_words
+from crosscheck2d.reports.page.scenes import LOST, SceneScores
+from crosscheck2d.reports.page.situations import EXACT, YOURS, grouped
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.page.summary import Summary
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 
 FEW = 1  # scenes that are named of each engine that fails
 

@@ -9,20 +9,20 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import OWN
-from reports.compare.comparison import Comparison
-from reports.page.cost_points import RunTimes
-from reports.page.findings import findings, not_counted
-from reports.page.own_engines import is_lawless, own_engine_sentences
-from reports.page.own_solvers import with_lines
-from reports.page.report_page import report_page
-from reports.page.summary import Summary, summarize
-from reports.run.archive import Archive
-from reports.run.made import writing
-from reports.run.tables import TABLES, comparisons_of, make_tables
-from reports.run.timing_pass import noise_floor
-from reports.terminal.counts import counted
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.findings import findings, not_counted
+from crosscheck2d.reports.page.own_engines import is_lawless, own_engine_sentences
+from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.summary import Summary, summarize
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.made import writing
+from crosscheck2d.reports.run.tables import TABLES, comparisons_of, make_tables
+from crosscheck2d.reports.run.timing_pass import noise_floor
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 PAGE = "report.html"
 

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from adapters.engines import OWN
-from reports.page import style
-from reports.page.kit import (
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.kit import (
     Page,
     Part,
     Section,
@@ -24,12 +24,12 @@ from reports.page.kit import (
     render_page,
     run_section,
 )
-from reports.page.links import neighbours
-from reports.page.own_solvers import Said
-from reports.page.scene_map import map_section, numbers, remarks, replay, title_of
-from reports.page.scenes import is_library, label, long_label
-from reports.page.summary import Summary, error_text, step_text
-from reports.page.trade_offs import cost_against_size, error_against_cost, limits
+from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.own_solvers import Said
+from crosscheck2d.reports.page.scene_map import map_section, numbers, remarks, replay, title_of
+from crosscheck2d.reports.page.scenes import is_library, label, long_label
+from crosscheck2d.reports.page.summary import Summary, error_text, step_text
+from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
 
 GENERATOR = "crosscheck run"
 TITLE = "2D disk engines against the exact answer"

@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from adapters.engines import OWN
-from reports.compare.fast_disks import fast_note
-from reports.compare.metrics import METRICS
-from reports.compare.verdicts import VERDICTS
-from reports.page import style
-from reports.page.kit import Part, Playback, Section, Table, TableCell, Text
-from reports.page.replay import pack_layers, ratio_of, view_of
-from reports.page.replay import played as drawn
-from reports.page.scenes import (
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.compare.fast_disks import fast_note
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.verdicts import VERDICTS
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.kit import Part, Playback, Section, Table, TableCell, Text
+from crosscheck2d.reports.page.replay import pack_layers, ratio_of, view_of
+from crosscheck2d.reports.page.replay import played as drawn
+from crosscheck2d.reports.page.scenes import (
     EXACT,
     LOST,
     OURS,
@@ -27,8 +27,8 @@ from reports.page.scenes import (
     long_label,
     values,
 )
-from reports.page.situations import FRICTION, SPIN
-from reports.page.summary import MEANING, Summary, error_text, played, step_text
+from crosscheck2d.reports.page.situations import FRICTION, SPIN
+from crosscheck2d.reports.page.summary import MEANING, Summary, error_text, played, step_text
 
 GRADES = (
     (EXACT, "exact", "="),

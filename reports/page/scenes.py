@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import ENGINES, FETCHED, OWN
-from reports.compare import laws
-from reports.compare.against import ITSELF, TRUTH
-from reports.compare.comparison import Comparison
-from reports.compare.metrics import METRICS
-from reports.compare.verdicts import VERDICTS, fails, in_words
-from reports.compare.view import LEAST_SHARE, NOT_JUDGED
-from reports.page.situations import FRICTION, situations_of
-from reports.page.style import number
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.against import ITSELF, TRUTH
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.verdicts import VERDICTS, fails, in_words
+from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED
+from crosscheck2d.reports.page.situations import FRICTION, situations_of
+from crosscheck2d.reports.page.style import number
 
 ERROR, ANGLE = "position_max_radii", "angle_max"
 EXACT, RIGHT, SEEN, LOST = 1e-6, 1e-3, 0.1, 1.0

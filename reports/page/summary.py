@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from adapters.engines import OWN
-from reports.compare.comparison import Comparison
-from reports.compare.verdicts import VERDICTS, in_words
-from reports.page import style
-from reports.page.cost_points import NO_CLOCK, RunTimes
-from reports.page.kit import Section, Table, TableCell
-from reports.page.scenes import (
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.verdicts import VERDICTS, in_words
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.cost_points import NO_CLOCK, RunTimes
+from crosscheck2d.reports.page.kit import Section, Table, TableCell
+from crosscheck2d.reports.page.scenes import (
     ANGLE,
     ERROR,
     EXACT,
@@ -35,8 +35,8 @@ from reports.page.scenes import (
     scenes_of,
     smooth,
 )
-from reports.page.situations import FRICTION, SITUATIONS, SPIN
-from reports.terminal.counts import counted, listed
+from crosscheck2d.reports.page.situations import FRICTION, SITUATIONS, SPIN
+from crosscheck2d.reports.terminal.counts import counted, listed
 
 WITHOUT = "All"
 MEANING = {

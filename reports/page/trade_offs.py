@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from adapters.engines import OWN
-from reports.page import style
-from reports.page.drawing import Line, draw_lines, new_figure, svg_of
-from reports.page.kit import Chart, Section, Table, TableCell
-from reports.page.scenes import OURS, SceneScores, label, smooth
-from reports.page.summary import Summary, played, rounded
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
+from crosscheck2d.reports.page.kit import Chart, Section, Table, TableCell
+from crosscheck2d.reports.page.scenes import OURS, SceneScores, label, smooth
+from crosscheck2d.reports.page.summary import Summary, played, rounded
 
 SIZES = Path(__file__).parents[1] / "speed" / "figures.csv"
 LIMITS = ("stability_limits.csv", "stability_limits_javascript.csv")

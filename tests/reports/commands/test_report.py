@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.commands.medians import medians, numbers_of_scenes
-from reports.compare.comparison import Comparison, compare
-from reports.page.scenes import SceneScores, scenes_of
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.commands.medians import medians, numbers_of_scenes
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.page.scenes import SceneScores, scenes_of
+from crosscheck2d.scenarios.catalogue import scenario
 
 NAMES = ("reference:exercise", "pymunk:matched")
 

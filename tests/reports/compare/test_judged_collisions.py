@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.run import Run
-from reports.commands.medians import medians
-from reports.compare.comparison import Comparison, compare
-from reports.compare.metrics import METRICS
-from reports.compare.view import LEAST_SHARE, NOT_JUDGED, Value
-from reports.page.scenes import scenes_of
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Collisions, Scenario, Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, Value
+from crosscheck2d.reports.page.scenes import scenes_of
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 NAMES = ("collisions_missed", "collisions_spurious", "first_wrong_collision_s")

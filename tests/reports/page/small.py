@@ -8,13 +8,13 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare.comparison import Comparison, compare
-from reports.page.report_page import report_page
-from reports.page.summary import summarize
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.summary import summarize
+from crosscheck2d.scenarios.catalogue import scenario
 
 HOSTILE = (
     "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from jinja2 import UndefinedError
 
-from reports.page.documents import REPORTS, fragment, render
-from reports.page.style import look
+from crosscheck2d.reports.page.documents import REPORTS, fragment, render
+from crosscheck2d.reports.page.style import look
 
 TEMPLATES = sorted(REPORTS.glob("*/*.j2"))
 BASE, MACROS = "page/base.html.j2", "page/macros.html.j2"

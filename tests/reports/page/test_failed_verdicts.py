@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.engines import row_of
-from adapters.play import play
-from reports.commands.medians import medians
-from reports.compare.comparison import Comparison, compare
-from reports.compare.pareto import cost_to_reach
-from reports.compare.pooling import middle_half
-from reports.page.findings import findings, nearest
-from reports.page.scenes import scenes_of
-from reports.page.summary import summarize
-from scenarios.files.scene_file import read_scene_file
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.pareto import cost_to_reach
+from crosscheck2d.reports.compare.pooling import middle_half
+from crosscheck2d.reports.page.findings import findings, nearest
+from crosscheck2d.reports.page.scenes import scenes_of
+from crosscheck2d.reports.page.summary import summarize
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
 
 CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 NAMES = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d_v3:matched")

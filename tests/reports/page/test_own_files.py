@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.friction import REFUSAL
-from adapters.run import Run
-from reports.compare.comparison import compare
-from reports.page.findings import early_ends, not_counted, refusals
-from reports.page.own_solvers import with_lines
-from reports.page.report import how_broken
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals
+from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.report import how_broken
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.page.browsing import overhang
 
 

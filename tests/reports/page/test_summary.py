@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare.comparison import Comparison, compare
-from reports.page.cost_points import RunTimes
-from reports.page.scene_map import map_section
-from reports.page.scenes import ANGLE, scenes_of
-from reports.page.situations import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.scene_map import map_section
+from crosscheck2d.reports.page.scenes import ANGLE, scenes_of
+from crosscheck2d.reports.page.situations import (
     CROWDS,
     ENGINE,
     EXACT,
@@ -28,10 +28,10 @@ from reports.page.situations import (
     grouped,
     situations_of,
 )
-from reports.page.summary import WITHOUT, Summary, summarize
-from reports.page.trade_offs import cost_against_size, error_against_cost, limits
-from reports.run.timing import noise_of
-from scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.reports.page.summary import WITHOUT, Summary, summarize
+from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
+from crosscheck2d.reports.run.timing import noise_of
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 
 NAMES = (
     *("reference:exercise", "reference:ordered", "pymunk:shipped", "pymunk:matched"),
@@ -242,7 +242,7 @@ def test_every_situation_has_a_scene_in_the_catalogue():
 def test_the_farthest_engine_that_is_ticked_can_be_seen(summary: Summary):
     """In the packed facts of a scene: at most three, ours first, the nearest library named."""
     [scene] = [s for s in scenes_of([summary.scenes[2].comparison])]
-    from reports.page.scene_map import to_tick
+    from crosscheck2d.reports.page.scene_map import to_tick
 
     names = [run.name for run in scene.comparison.middle_runs if run.trajectory is not None]
     ticked, notes = to_tick(scene, summary, names)
