@@ -25,7 +25,7 @@ from crosscheck2d.reports.page.kit import (
     run_section,
 )
 from crosscheck2d.reports.page.links import neighbours
-from crosscheck2d.reports.page.own_solvers import Said
+from crosscheck2d.reports.page.own_solvers import Said, sourced
 from crosscheck2d.reports.page.scene_map import map_section, numbers, remarks, replay, title_of
 from crosscheck2d.reports.page.scenes import is_library, label, long_label
 from crosscheck2d.reports.page.summary import Summary, error_text, step_text
@@ -150,16 +150,7 @@ def engines_table(summary: Summary) -> Table:
 def check_section(name: str, said: Sequence[Said]) -> Section:
     """What `crosscheck check` says of a solver's file, with its lines and the formula."""
     path = name.removesuffix(OWN)
-    items = [
-        Markup("{}{}").format(
-            sentence,
-            Markup("").join(
-                Markup("<br><small>{}: <code>{}</code></small>").format(*line.split(": ", 1))
-                for line in shown
-            ),
-        )
-        for sentence, shown in said
-    ]
+    items = [sourced(sentence, lines) for sentence, lines in said]
     says = f"by crosscheck check {path}, which writes the smallest scene that shows each fault"
     return Section(path, says, [Text(items=items, ordered=len(items) > 1)], id="check")
 
