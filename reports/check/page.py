@@ -68,7 +68,9 @@ def write_page(path: Path, marked: Marked) -> None:
         sections.append(Section("", no_scene(check, hidden)))
     for verdict, (title, about) in GROUPS.items():
         if rows := [row for row in check.rows if row.verdict == verdict]:
-            sections.append(Section(title, about, [rows_table(check, rows)], css=verdict))
+            folded = verdict in ("right", "not asked")
+            table = rows_table(check, rows)
+            sections.append(Section(title, about, [table], folded, css=verdict))
     if check.faults:
         sources = dict.fromkeys(row.read for row in check.faults)
         sections.append(Section("", f"To read: {'; '.join(sources)}."))
@@ -122,8 +124,8 @@ def scene_section(name: str, number: int, smallest: Smallest) -> Section:
     fault = f"{smallest.fault[0].upper()}{smallest.fault[1:]}."
     facts = [f"Sphere {k}: {line}" for k, line in enumerate(scene_lines(scenario))]
     facts.append(
-        f"Steps of {shown(DT)} s; e = {style.number(scenario.scene.restitution)}. A program searched"
-        " for it and reduced it to as few spheres and as small numbers as still show the fault."
+        f"Steps of {shown(DT)} s; e = {style.number(scenario.scene.restitution)}. A program"
+        " searched for it and reduced it to as few spheres and as small numbers as still show the fault."
     )
     replay = Playback(
         pack_layers(scenario, layers, more={"labels": labels}),
