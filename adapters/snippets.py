@@ -185,7 +185,8 @@ function addShape(shape, body) {
 
 function addDisk([x, y], [u, v], radius, mass) {
   const body = RAPIER.RigidBodyDesc.dynamic().setTranslation(x, y).setLinvel(u, v)
-    .setCanSleep($sleeping).setAdditionalMassProperties(mass, { x: 0, y: 0 }, mass * radius ** 2 / 2);
+    .setCanSleep($sleeping)
+    .setAdditionalMassProperties(mass, { x: 0, y: 0 }, mass * radius ** 2 / 2);
   return addShape(RAPIER.ColliderDesc.ball(radius), world.createRigidBody(body));
 }
 
