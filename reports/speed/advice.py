@@ -512,7 +512,7 @@ def play_starts(scene: str, seed: int, purpose: str, bound: float, one: Attempt)
     for begin, part in starts_within_a_step(scene, seed, one.dt):
         played = play_part(part, purpose, bound, one)
         errors.append(played.error)
-        until.append(whole if played.error <= bound else begin + played.until)
+        until.append(whole if played.error <= bound else played.until and begin + played.until)
     tenth = float(np.sort(np.nan_to_num(until, nan=0.0))[int((1 - NINE_TENTHS) * STARTS)])
     return replace(one, starts=tuple(errors), lasting=tenth if purpose in LASTING else nan)
 

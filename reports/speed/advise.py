@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import isfinite, isnan
 from typing import Any, NoReturn
 
-from adapters.engines import ENGINES
+from adapters.engines import ENGINES, row_of, told_apart
 from adapters.snippets import write_snippet
 from reports.page.style import number
 from reports.run.arguments import checked_engines, checked_scenes, unknown
@@ -47,7 +47,8 @@ def give_advice(
         refuse([unknown("purpose", purpose, PURPOSES) + f"; allowed: {', '.join(PURPOSES)}"])
     bound = bound_of(error)
     (checked,) = checked_scenes([scene], [], False, seed)
-    names = checked_engines(engines, ENGINES)
+    rows = {name: row_of(name) for name in checked_engines(engines, ENGINES)}
+    names = told_apart(rows, open_scene(checked, seed).scene)
     with stoppable(), Progress() as progress:
         try:
             inquiry = Inquiry(checked, seed, os.cpu_count() or 1, progress)

@@ -24,7 +24,6 @@ from reports.compare.pareto import (
     yardstick_of,
 )
 from reports.compare.pooling import POOLED, WHO, pooled
-from reports.page import style
 from reports.run.stepping import CALL, EMPTY, READ, binding_of
 from reports.run.timing import WARM_UP
 from reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
@@ -343,21 +342,14 @@ def end_of_all_pairs(costs: pd.DataFrame) -> str:
     return f"Testing all pairs costs more than {listed(ends)}." if ends else ""
 
 
-def cost_of_sleep(measured: Measured) -> str:
-    """A sentence: what a step of a settled pile costs, and with sleeping allowed; "" if none was
-    timed."""
+def pile(measured: Measured) -> pd.DataFrame:
+    """name, n and what a step of a settled pile of n disks costs, µs: `PLAIN` and `SLEEPING`; no
+    rows if none was timed."""
     samples = measured.samples[measured.samples.kind == IN_PILE]
     costs = in_us(summed_up(samples, [*WHO, "change", "n"]))
     named = costs.assign(name=costs.engine + ":" + costs.profile)
-    table = named.pivot(index="name", columns="change", values="cost")
-    both = [
-        f"{name} {style.number(row[PLAIN], 2)}, with sleeping {style.number(row[SLEEPING], 2)}"
-        for name, row in table.iterrows()
-        if len(row.dropna()) > 1
-    ]
-    if not both:
-        return ""
-    return f"A step of a settled pile of {costs.n.max()} disks costs, in µs: {'; '.join(both)}."
+    wide = named.pivot(index=["name", "n"], columns="change", values="cost")
+    return wide.reindex(columns=[PLAIN, SLEEPING]).dropna().reset_index()
 
 
 def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:

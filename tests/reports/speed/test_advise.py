@@ -290,7 +290,7 @@ def test_advice_names_those_that_keep_the_error_and_those_that_do_not(
     assert [one["engine"] for one in answer["cheapest_first"]] == ["reference:ordered"]
     assert all(one["error"] <= 0.001 for one in answer["cheapest_first"])
     short = {one["engine"]: one for one in answer["not_within"]}
-    hand_written = {f"reference:{name}" for name in ("exercise", "neighbours", "lesson", "coulomb")}
+    hand_written = {f"reference:{name}" for name in ("exercise", "neighbours", "lesson")}
     assert set(short) == {*hand_written, "pymunk:shipped"}
     assert all(one["error"] > 0.001 and one["why"] for one in short.values())
     assert all(0 < one["kept_until_s"] <= one["longest_until_s"] < 10 for one in short.values())
