@@ -198,11 +198,7 @@ def print_group(console: Console, advice: Advice, group: str) -> None:
         one = ("library" if group == LIBRARIES else "solver of this project") + right
         console.print(f"No {one} keeps this error at any step size tried.", style="bold")
     if short:
-        rows = replace(advice, short=short)
-        if advice.purpose in LASTING:
-            print_until(console, rows, group)
-        else:
-            print_errors(console, rows, group)
+        print_short(console, replace(advice, short=short), group)
     if ranked or short or partial:
         console.print()
     if group == LIBRARIES and advice.statistics is not None:
@@ -246,47 +242,46 @@ def print_choices(
         console.print(f"Also within it: {names}.", highlight=False)
 
 
-def print_until(console: Console, advice: Advice, group: str) -> None:
-    """Print until when the engines that do not keep the error do: at the usual step size of the
-    scene, and at the one that keeps it longest."""
+def print_short(console: Console, advice: Advice, group: str) -> None:
+    """Print how near the engines come that do not keep the error; and of one that only grows until
+    when they keep it, at the usual step size of the scene and at the one that keeps it longest."""
 
     def until(one: Attempt) -> list[str]:
-        numbers = (one.until, one.lasting)
-        return ["–" if isnan(t) else number(t) for t in numbers] + [number(one.dt * 1e3)]
+        return ["–" if isnan(t) else number(t) for t in (one.until, one.lasting)] + [ms(one.dt)]
 
+    def ms(seconds: float) -> str:
+        return number(seconds * 1e3)
+
+    coarse, fine = ms(advice.step_sizes[0]), ms(advice.step_sizes[-1])
     short = sorted(advice.short, key=lambda row: (-reach(row.longest), row.best.name))
-    rows = [
-        [row.best.name, *until(row.usual), *until(row.longest), number(row.finest)] for row in short
-    ]
-    until_at = ["until,\ns", "9 of 10\nuntil, s", "at dt,\nms"]
-    fine = number(advice.step_sizes[-1] * 1e3)
-    headings = ["engine", *until_at, f"longest\n{until_at[0]}", *until_at[1:]]
-    title = f"{group.capitalize()} that do not keep it to {number(advice.until)} s, and until when"
-    print_table(console, [*headings, f"error at\n{fine} ms"], rows, title)
-    console.print(
-        f"At the usual step size, and at that of {number(advice.step_sizes[0] * 1e3)} to"
-        f" {fine} ms which keeps it longest; 9 of 10: nine tenths of runs from {STARTS} instants of"
-        " a step keep it until then.",
-        highlight=False,
-    )
-
-
-def print_errors(console: Console, advice: Advice, group: str) -> None:
-    """Print the errors of the engines that do not keep an error that has no beginning in time."""
-    coarse, *_, fine = advice.step_sizes
-    rows = [
-        [row.best.name, number(row.finest), number(row.best.error)]
-        + [number(row.best.dt * 1e3) if isfinite(row.best.error) else "–"]
-        for row in advice.short
-    ]
-    headings = ["engine", f"error at\n{number(fine * 1e3)} ms", "least\nerror", "at dt,\nms"]
-    print_table(console, headings, rows, f"{group.capitalize()} that do not keep it")
-    console.print(
-        f"Tried: {number(coarse * 1e3)} to {number(fine * 1e3)} ms. A step size counts only if it"
-        " and every finer one keep the error, and it does from nine tenths of the instants of a"
-        " step.",
-        highlight=False,
-    )
+    headings, title = ["engine"], f"{group.capitalize()} that do not keep it"
+    rows = [[row.best.name] for row in short]
+    if advice.purpose in LASTING:
+        title += f" to {number(advice.until)} s, and until when"
+        until_at = ["until,\ns", "9 of 10\nuntil, s", "at dt,\nms"]
+        headings += [*until_at, f"longest\n{until_at[0]}", *until_at[1:]]
+        rows = [
+            [*row, *until(x.usual), *until(x.longest), number(x.finest)]
+            for row, x in zip(rows, short)
+        ]
+        headings.append(f"error at\n{fine} ms")
+        note = (
+            f"At the usual step size, and at that of {coarse} to {fine} ms which keeps it longest;"
+            f" 9 of 10: nine tenths of runs from {STARTS} instants of a step keep it until then."
+        )
+    else:
+        headings += [f"error at\n{fine} ms", "least\nerror", "at dt,\nms"]
+        rows = [
+            [*row, number(x.finest), number(x.best.error)]
+            + [ms(x.best.dt) if isfinite(x.best.error) else "–"]
+            for row, x in zip(rows, short)
+        ]
+        note = (
+            f"Tried: {coarse} to {fine} ms. A step size counts only if it and every finer one keep"
+            " the error, and it does from nine tenths of the instants of a step."
+        )
+    print_table(console, headings, rows, title)
+    console.print(note, highlight=False)
 
 
 def print_changes(console: Console, advice: Advice) -> None:
