@@ -9,9 +9,9 @@ from contextlib import closing
 from string import Template
 from typing import Any
 
-from adapters.engines import row_of
-from adapters.friction import of_shapes
-from scenarios.model import Scene
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.friction import of_shapes
+from crosscheck2d.scenarios.model import Scene
 
 PYMUNK = """\
 import pymunk

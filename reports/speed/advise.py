@@ -11,12 +11,12 @@ from dataclasses import replace
 from math import isfinite, isnan
 from typing import Any, NoReturn
 
-from adapters.engines import ENGINES, row_of, told_apart
-from adapters.snippets import write_snippet
-from reports.page.style import number
-from reports.run.arguments import checked_engines, checked_scenes, unknown
-from reports.run.scenes import open_scene
-from reports.speed.advice import (
+from crosscheck2d.adapters.engines import ENGINES, row_of, told_apart
+from crosscheck2d.adapters.snippets import write_snippet
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, unknown
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed.advice import (
     BUSY,
     LASTING,
     LOUD,
@@ -27,12 +27,12 @@ from reports.speed.advice import (
     NoAdvice,
     reach,
 )
-from reports.speed.purposes import PURPOSES
-from reports.speed.scored_part import STARTS
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table, print_texts
+from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.speed.scored_part import STARTS
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table, print_texts
 
 SHOWN = 3  # ranks: the cheapest and the next two
 LIBRARIES, OWN_SOLVERS = "libraries", "solvers of this project"

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from adapters.mechanisms.table import NAMES
-from reports.compare.order import ELSEWHERE, UNSTEADY
-from reports.compare.pareto import ACCURACIES, YARDSTICK, front, said_of_cheaper
-from reports.compare.pooling import WHO, said_of_pool, without_idle
-from reports.page import situations, style
-from reports.page.drawing import Line, draw_lines, new_figure, svg_of
-from reports.page.kit import (
+from crosscheck2d.adapters.mechanisms.table import NAMES
+from crosscheck2d.reports.compare.order import ELSEWHERE, UNSTEADY
+from crosscheck2d.reports.compare.pareto import ACCURACIES, YARDSTICK, front, said_of_cheaper
+from crosscheck2d.reports.compare.pooling import WHO, said_of_pool, without_idle
+from crosscheck2d.reports.page import situations, style
+from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
+from crosscheck2d.reports.page.kit import (
     Chart,
     Page,
     Part,
@@ -27,17 +27,17 @@ from reports.page.kit import (
     render_page,
     run_section,
 )
-from reports.page.links import neighbours
-from reports.page.style import number
-from reports.run.scenes import open_scene
-from reports.speed import explained, tables
-from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
-from reports.speed.explained import LEAST
-from reports.speed.plan import PLAIN
-from reports.speed.results import QUIET, Results
-from reports.speed.scored_part import scored
-from reports.terminal.counts import counted
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed import explained, tables
+from crosscheck2d.reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
+from crosscheck2d.reports.speed.explained import LEAST
+from crosscheck2d.reports.speed.plan import PLAIN
+from crosscheck2d.reports.speed.results import QUIET, Results
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck speed"
 COST, ERROR = "engine time per simulated second", "error, radii"

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.run.scenes import open_scene
-from scenarios.model import Array, Collisions, Scenario, Trajectory
-from scenarios.no_truth import NoTruth
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Trajectory
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 STARTS = 20  # of a run, evenly spread over a step
 

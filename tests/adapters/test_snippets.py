@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, FETCHED, row_of
-from adapters.npm_packages import missing, place
-from adapters.snippets import TEMPLATES, write_snippet
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, row_of
+from crosscheck2d.adapters.npm_packages import missing, place
+from crosscheck2d.adapters.snippets import TEMPLATES, write_snippet
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scene
 
 LACKING = [reason for row in FETCHED.values() if (reason := missing(row.package))]
 # two disks fall onto a floor and meet there, so that every setting of contacts acts
