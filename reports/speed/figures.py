@@ -19,6 +19,7 @@ from crosscheck2d.reports.terminal.foreign_text import put_text
 KEPT = Path(__file__).parent / "figures.csv"
 # of the same run, errors only
 ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")
+PICTURE = KEPT.with_name("speed.svg")  # of `page.write_picture`
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 AGAINST, AGAINST_BARE = f"cost over {YARDSTICK}", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
