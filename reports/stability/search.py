@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import isfinite, isnan, nan
 
 from adapters.run import Run
+from reports.compare.verdicts import Verdict
 from reports.stability.limits import (
     ALL,
     LIMIT,
@@ -19,25 +20,29 @@ from reports.stability.limits import (
     Limit,
     Trial,
 )
-from reports.stability.predicates import Reading, judge
+from reports.stability.predicates import judge
 from reports.stability.variants import DRIVEN_ENGINES
 from scenarios.model import Scenario
 
 
 @dataclass
 class LimitSearch:
-    """The search for the limit of one case on one engine; keeps the readings at each value, and the
+    """The search for the limit of one case on one engine; keeps the verdicts at each value, and the
     first failing run there."""
 
     case: Case
     engine: str
     form: Form
-    readings: dict[float, list[Reading]] = field(default_factory=dict)
+    readings: dict[float, list[Verdict]] = field(default_factory=dict)
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
     def limit(self) -> Limit:
         """Scan to the first failure and bisect between it and the value before; harsher values
-        are played too."""
+        are played too.
+
+        Where the gentlest value fails, a single value that works between two that fail is no limit:
+        a step of a third of the run may meet its one collision by luck.
+        """
         scan = self.case.scan(self.form)
         first = next(
             (k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan)
@@ -48,6 +53,9 @@ class LimitSearch:
         works = [True] * first + [self.trial(value).works for value in scan[first:]]
         if all(works):
             return self.limit_of(NEVER_FAILS, scan[-1], nan)
+        if not works[0]:
+            beside = zip([False, *works], works, [*works[1:], True])
+            works = [middle and (before or after) for before, middle, after in beside]
         if not any(works):
             return self.limit_of(NEVER_WORKS, nan, scan[0])
         edge = next((k for k in range(1, len(scan)) if works[k - 1] and not works[k]), None)
@@ -100,10 +108,11 @@ class LimitSearch:
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
         if not failed:
             return Trial(value, count, failed, worst)
-        first, one = next((k, reading) for k, reading in enumerate(readings) if reading.failed)
-        seen = one.at, one.event, one.broken, one.disk
+        first, verdict = next((k, each) for k, each in enumerate(readings) if each.failed)
+        disk = verdict.disks[0] if verdict.disks else -1
+        happens = verdict.at, verdict.text, verdict.id, disk
         left = count < self.case.runs
-        return Trial(value, count, failed, worst, first, *seen, self.allowed, left)
+        return Trial(value, count, failed, worst, first, *happens, self.allowed, left)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
         """The limit with all trials from gentle to harsh; at its failing value every run is
@@ -114,13 +123,11 @@ class LimitSearch:
             self.tried(value)
             for value in sorted(self.readings, key=lambda x: self.case.harsher * x)
         )
-        changes = sum(one.works != other.works for one, other in pairwise(trials))
+        changes = sum(before.works != after.works for before, after in pairwise(trials))
         until = [trial.value for trial in trials]
         if verdict == LIMIT:
             until = until[: until.index(fails_at) + 1]
-        spacing = max(
-            (max(one / other, other / one) for one, other in pairwise(until)), default=nan
-        )
+        spacing = max((max(a / b, b / a) for a, b in pairwise(until)), default=nan)
         names = self.case.name, self.engine, self.form.name
         return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
 
