@@ -132,7 +132,7 @@ ADDED: dict[str, list[Added]] = {
         ),
         Added(
             "reports/page/charts.py",
-            '    "toy_chart": Chart("a toy", toy_chart),\n',
+            '    "toy_chart": SceneChart("a toy", toy_chart),\n',
             "}\n\n\ndef packed",
         ),
     ],
