@@ -191,7 +191,7 @@ class Limit:
         case, engine: names; the engine is a key of `DRIVEN_ENGINES`.
         form: of `FORMS`.
         verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on, but for
-            single values), or "works only beyond" (at works_at, and not at the gentler fails_at).
+            a few values), or "works only beyond" (at works_at, and not at the gentler fails_at).
         works_at: the harshest value before the first failure, where all runs of the form were
             played; nan: none.
         fails_at: the first failure on the way from gentle to harsh: more runs failed than may by

@@ -22,7 +22,7 @@ from scenarios.model import Scenario
 WITH_FRICTION = {case.name for case in FRICTION}
 MARKS = {
     "–": "did not fail at any value tried",
-    "everywhere": "fails at every value, with * at all but single ones",
+    "everywhere": "fails at every value, with * at most of them",
     "refused": "the engine does not play the scene, or not from a value on",
     "≤": "fails at this value and below, works above",
     "≥": "fails at this value and above, works below",

@@ -14,13 +14,13 @@ from markupsafe import Markup
 from reports.page.documents import environment
 from reports.page.drawing import Line, draw_lines, new_figure, svg_of
 from reports.page.kit import (
-    TableCell,
     Chart,
     Page,
     Part,
     Playback,
     Section,
     Table,
+    TableCell,
     Text,
     render_page,
     run_section,
@@ -146,8 +146,8 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
     says = (
         "Each cell shows the first value, from gentle to harsh, at which an engine fails: the"
         " deeper the colour, the gentler that value. Below each name are the parameter that is"
-        " varied, and the step size dt and the radius R of the disks that move, if they are constant."
-        " A row opens on its failing runs, their causes and all readings."
+        " varied, and the step size dt and the radius R of the disks that move, if constant. A row"
+        " opens on its failing runs, their causes and all readings."
     )
     table = Table(frame, groups, opens=opens, css=css, corner="case", caption=f"{marks}.")
     return [
@@ -255,7 +255,7 @@ def replay_of(case: Case, limit: Limit) -> Playback | None:
     label = f"{case.parameter} = {number(failing.value)}: {failing.event}"
     beside = EXACT if case.shown_with == EXACT else f"the same gas {case.shown_with}"
     caption = (
-        "From just before the failure; at speed 1 all of it takes five seconds. Grey:"
+        "From just before the failure; at speed 1 all of it takes five seconds. In black:"
         f" {beside}, where there is one."
     )
     return Playback(limit.replay, limit.ratio, label, caption)
@@ -268,7 +268,7 @@ def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
     for limit in limits:
         if predicate.bound:
             trials = [t for t in limit.trials if isfinite(t.worst) and isfinite(t.value)]
-            y = [abs(trial.worst) for trial in trials]
+            y = [abs(trial.worst) or np.nan for trial in trials]  # 0 is nowhere on a log scale
         else:
             trials = [trial for trial in limit.trials if not trial.left and isfinite(trial.value)]
             y = [trial.failed / trial.runs for trial in trials]
@@ -278,15 +278,15 @@ def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
         return Text(["No engine reads more than 0 anywhere."])
     what = f"{predicate.name.capitalize()}, {predicate.unit}"
     caption = (
-        f"The worst of the runs played at each {case.parameter}, harsher to the right. Above the"
-        " dotted line the engine fails. Where a line ends, the engine refused the scene, stopped,"
-        " or gave a value that is not a number."
+        f"The worst of the runs played at each value of {case.parameter}, harsher to the right."
+        " Above the dotted line the engine fails. Where a line ends, the engine refused the scene,"
+        " stopped, or gave 0 or a value that is not a number."
     )
     if not predicate.bound:
         what = f"{predicate.name.capitalize()}, share of runs"
         caption = (
-            f"The share of the runs at each {case.parameter} that failed; harsher to the right."
-            " Values at which the quick form stopped at the first failing run are not drawn."
+            f"The share of the runs at each value of {case.parameter} that failed; harsher to the"
+            " right. Values at which the quick form stopped at the first failing run are not drawn."
         )
     figure, axes = new_figure(9.5, 3.6)
     if predicate.bound:
@@ -375,7 +375,9 @@ def law_section(laws: Sequence[LawOf]) -> Section:
     frame = pd.DataFrame(rows, [law.engine for law in ordered], heads, dtype=object)
     groups = [f"{law.name}: {TOUCHING[law.name].asks}" for law in ordered]
     sources = [f"{name}: {TOUCHING[name].source}." for name in dict.fromkeys(x.name for x in laws)]
-    table = Table(frame, groups, [("gap in radii", len(GAPS))], css="plain", corner="engine")
+    table = Table(
+        frame, groups, [(TableCell("gap in radii"), len(GAPS))], css="plain", corner="engine"
+    )
     says = WHICH_LAW + " Point at a cell for its numbers."
     return Section("Touching disks: which law", says, [table, Text(items=sources)], id="touching")
 

@@ -3,6 +3,7 @@ failure, then bisection."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite, isnan, nan
@@ -38,11 +39,7 @@ class LimitSearch:
 
     def limit(self) -> Limit:
         """Scan to the first failure and bisect between it and the value before; harsher values
-        are played too.
-
-        Where the gentlest value fails, a single value that works between two that fail is no limit:
-        a step of a third of the run may meet its one collision by luck.
-        """
+        are played too."""
         scan = self.case.scan(self.form)
         first = next(
             (k for k, value in enumerate(scan) if not self.trial(value, self.few).works), len(scan)
@@ -53,15 +50,11 @@ class LimitSearch:
         works = [True] * first + [self.trial(value).works for value in scan[first:]]
         if all(works):
             return self.limit_of(NEVER_FAILS, scan[-1], nan)
-        if not works[0]:
-            beside = zip([False, *works], works, [*works[1:], True])
-            works = [middle and (before or after) for before, middle, after in beside]
-        if not any(works):
-            return self.limit_of(NEVER_WORKS, nan, scan[0])
-        edge = next((k for k in range(1, len(scan)) if works[k - 1] and not works[k]), None)
-        if edge is not None:
+        if edge := first_edge(works):
             return self.limit_of(LIMIT, *self.bracket(scan[edge - 1], scan[edge]))
-        edge = works.index(True)
+        if not works[-1]:
+            return self.limit_of(NEVER_WORKS, nan, scan[0])
+        edge = len(works) - works[::-1].index(False)
         return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
 
     def bracket(self, good: float, bad: float) -> tuple[float, float]:
@@ -134,3 +127,19 @@ class LimitSearch:
     def failure(self, limit: Limit) -> tuple[Scenario, Run] | None:
         """The first run that failed at the limit, for the replay; None if none failed."""
         return self.seen.get(limit.fails_at)
+
+
+def first_edge(works: Sequence[bool]) -> int | None:
+    """The first value that fails after a stretch of values that work, if that is longer than all
+    that fails before it; None if there is none.
+
+    An engine that fails at the gentlest values may work at some harsher ones by luck: a step of a
+    third of the run may meet its one collision. That is no limit.
+    """
+    start = 0
+    for k, (before, after) in enumerate(pairwise(works), 1):
+        if after and not before:
+            start = k
+        if before and not after and k - start > works[:start].count(False):
+            return k
+    return None

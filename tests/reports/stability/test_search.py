@@ -137,17 +137,17 @@ def test_what_works_only_where_it_is_harsh_is_called_so():
     assert found.fails_at <= 17 <= found.works_at
 
 
-def test_a_single_value_that_works_between_failures_is_no_limit_where_the_gentlest_fails():
-    """A step of a third of the run that meets its one collision by luck; two in a row are a limit,
-    and the harshest values may all work."""
+def test_a_few_values_that_work_beyond_more_that_fail_are_no_limit():
+    """A step of a third of the run that meets its one collision by luck. A longer stretch is a
+    limit, and so is any that begins at the gentlest value; the harshest values may all work."""
 
     def verdict(*works: float) -> tuple[str, bool]:
         found = limit_of(case(lambda x, _: 0.5 if x in works else 2.0, UP, refines=False), QUICK)
         return found.verdict, found.monotone
 
-    assert verdict(10.0) == verdict(3.0, 30.0) == ("never works", False)
-    assert verdict(10.0, 30.0) == ("limit", False)
-    assert verdict(10.0, 100.0) == ("works only beyond", False)
+    assert verdict(3.0) == verdict(10.0, 30.0) == ("never works", False)
+    assert verdict(3.0, 10.0) == ("limit", False)
+    assert verdict(3.0, 30.0, 100.0) == ("works only beyond", False)
     assert verdict(1.0) == ("limit", True)
 
 
