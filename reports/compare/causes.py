@@ -23,7 +23,6 @@ from adapters.mechanisms.table import (
     SKIN,
     SWEPT,
 )
-from reports.terminal.counts import listed
 
 LATE = "end-of-step detection"  # what is left of an engine without any of its mechanisms
 
@@ -74,7 +73,9 @@ def by_mechanisms(names: Sequence[str], engine: str) -> Cause:
     """The mechanisms with which the reference fails as the engine does; `LATE`: with none."""
     rows = [mechanism_words(name, engine) for name in names]
     text, source = ("; ".join(dict.fromkeys(row[k] for row in rows)) for k in (2, 3))
-    more = "nothing else" if tuple(names) == (LATE,) else f"the engine's {listed(names)}"
+    *most, last = names
+    listed = f"{', '.join(most)} and {last}" if most else last
+    more = "nothing else" if listed == LATE else f"the engine's {listed}"
     shown = f"the reference with end-of-step detection and {more} has this limit"
     return Cause(CauseKind.MECHANISM, text, source, shown)
 

@@ -8,7 +8,6 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from reports.stability.phases import phase
 
 from adapters.engines import ENGINES, UNASKED
 from adapters.mechanisms.table import IMPULSE, Mechanism, mechanisms_of, with_mechanisms
@@ -19,6 +18,7 @@ from reports.stability.cases_friction import DT, FALL, FRICTION, PHASES, in_corn
 from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
 from reports.stability.overview import findings
 from reports.stability.predicates import judge, truth_of
+from reports.stability.scenes import phase
 from reports.stability.search import LimitSearch
 from reports.stability.variants import play_as
 
