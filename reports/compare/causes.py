@@ -59,9 +59,9 @@ class Cause(NamedTuple):
         return f"{self.text}: {self.shown}" if self.shown else self.text
 
 
-def unknown(*tried: str, sep: str = "; ") -> Cause:
-    """No cause was found; what was tried, in words."""
-    return Cause(CauseKind.UNKNOWN, sep.join(["not known", *filter(None, tried)]))
+def unknown(shown: str = "", *tried: str) -> Cause:
+    """No cause was found; what shows that, and what was tried, in words."""
+    return Cause(CauseKind.UNKNOWN, "; ".join(["not known", *filter(None, tried)]), shown=shown)
 
 
 def by_settings(remedy: Remedy, engine: str, shown: str) -> Cause:

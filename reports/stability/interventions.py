@@ -173,8 +173,8 @@ def cause_by_replays(limit: Limit, varied: str) -> Cause | None:
     if intervention := INTERVENTIONS.get(limit.intervention):
         shown = f"works {intervention.how}"
         if intervention.reason is None:
-            cause = unknown("the step is too large for something in it")
-            return cause._replace(text=ghost + cause.text, shown=shown)
+            cause = unknown(shown, "the step is too large for something in it")
+            return cause._replace(text=ghost + cause.text)
         return Cause(CauseKind.INTERVENTION, ghost + intervention.reason, shown=shown)
     if failing.broken == REFUSED:
         return Cause(CauseKind.REFUSAL, "the engine refuses it", shown=SAYS_SO)
@@ -183,4 +183,5 @@ def cause_by_replays(limit: Limit, varied: str) -> Cause | None:
         for name, intervention in INTERVENTIONS.items()
         if name not in FIRST and intervention.fits(limit.engine, varied)
     )
-    return unknown(f"it also fails {', '.join(tried)}" if tried else "", limit.settings)
+    also = f"it also fails {', '.join(tried)}" if tried else ""
+    return unknown("", also, limit.settings)
