@@ -8,8 +8,8 @@ from enum import StrEnum
 from fnmatch import fnmatch
 from typing import NamedTuple
 
-from adapters.mechanisms.settings import Remedy
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.mechanisms.settings import Remedy
+from crosscheck2d.adapters.mechanisms.table import (
     AIR,
     DIGITS,
     EDGES,

@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike
 
-from reports.page import style
+from crosscheck2d.reports.page import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import pandas as pd
 from markupsafe import Markup
 
-from reports.page import style
-from reports.page.documents import deflated, environment, render
-from reports.page.links import Neighbour
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.documents import deflated, environment, render
+from crosscheck2d.reports.page.links import Neighbour
 
 SCRIPTS = ("page/player.js", "page/player_canvas.js", "page/panels.js", "page/kit.js")
 

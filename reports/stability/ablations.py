@@ -1,8 +1,8 @@
 """Which mechanisms of an engine are enough to produce its limit: the reference with only these
 works and fails at the same values as the engine.
 
-`adapters.mechanisms.table` lists what an engine does differently from exact flight with
-end-of-step detection, and `adapters.mechanisms.ablated_reference` can enable each of these
+`crosscheck2d.adapters.mechanisms.table` lists what an engine does differently from exact flight with
+end-of-step detection, and `crosscheck2d.adapters.mechanisms.ablated_reference` can enable each of these
 mechanisms. An ablation is the reference with some of them enabled. An ablation that has the
 engine's limit shows its cause.
 """
@@ -14,14 +14,19 @@ from dataclasses import dataclass
 from functools import partial
 from math import isnan
 
-from adapters.mechanisms.table import MECHANISMS, Mechanism, mechanisms_of, with_mechanisms
-from reports.compare.causes import LATE
-from reports.compare.verdicts import Verdict
-from reports.stability.limits import Case, Limit
-from reports.stability.predicates import judge
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DrivenEngine
-from scenarios.model import Scenario
+from crosscheck2d.adapters.mechanisms.table import (
+    MECHANISMS,
+    Mechanism,
+    mechanisms_of,
+    with_mechanisms,
+)
+from crosscheck2d.reports.compare.causes import LATE
+from crosscheck2d.reports.compare.verdicts import Verdict
+from crosscheck2d.reports.stability.limits import Case, Limit
+from crosscheck2d.reports.stability.predicates import judge
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DrivenEngine
+from crosscheck2d.scenarios.model import Scenario
 
 MOST = 300  # disks: the ablated reference tests all pairs
 # where an engine works nowhere, the reading of its ablation must be the same within this factor

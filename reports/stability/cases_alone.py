@@ -9,18 +9,18 @@ from math import sqrt
 
 import numpy as np
 
-from adapters.engine import Unsupported
-from adapters.run import Run, gather
-from adapters.runaway import fault_of
-from reports.stability.limits import Case
-from reports.stability.predicates import (
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.run import Run, gather
+from crosscheck2d.adapters.runaway import fault_of
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.predicates import (
     ANGLE_OFF,
     BOUNCES_OFF,
     SCALED_DEVIATION,
     SPRING_GROWS,
     WRONG_DISTANCE,
 )
-from reports.stability.scenes import (
+from crosscheck2d.reports.stability.scenes import (
     DT,
     EDGE,
     RADIUS,
@@ -32,9 +32,9 @@ from reports.stability.scenes import (
     sampled,
     scenario_of,
 )
-from reports.stability.variants import DrivenEngine, with_variant
-from scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
-from scenarios.truth.closed_forms import answer, bouncing
+from crosscheck2d.reports.stability.variants import DrivenEngine, with_variant
+from crosscheck2d.scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, bouncing
 
 HEIGHT = 1.25  # m, so that the fall lasts 0.5 s and ends at 5 m/s
 FALLS = 20  # the drop and nine and a half bounces

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.stability.limits import Case
-from reports.stability.predicates import (
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.predicates import (
     COLLISIONS_MISSED,
     COLLISIONS_SPURIOUS,
     RESTITUTION_OFF,
     VELOCITY_OFF,
 )
-from reports.stability.scenes import DT, LEAD, RADIUS, disks, flyby, phase, stepped
-from reports.stability.variants import with_variant
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import answer, flight
+from crosscheck2d.reports.stability.scenes import DT, LEAD, RADIUS, disks, flyby, phase, stepped
+from crosscheck2d.reports.stability.variants import with_variant
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, flight
 
 # runs at a value, each with the collision elsewhere in its step: a run is a millisecond
 PHASES = 32

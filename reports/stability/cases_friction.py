@@ -12,9 +12,14 @@ from math import ceil, hypot
 
 import numpy as np
 
-from reports.stability.limits import Case
-from reports.stability.predicates_friction import CREEPS, FRICTION_OFF, ROLLING_OFF, SLIPS
-from reports.stability.scenes import (
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.predicates_friction import (
+    CREEPS,
+    FRICTION_OFF,
+    ROLLING_OFF,
+    SLIPS,
+)
+from crosscheck2d.reports.stability.scenes import (
     AFTER,
     LEAD,
     RADIUS,
@@ -24,14 +29,14 @@ from reports.stability.scenes import (
     scenario_of,
     stepped,
 )
-from reports.stability.scenes import (
+from crosscheck2d.reports.stability.scenes import (
     DT as REST_DT,
 )
-from reports.stability.variants import WITH_FRICTION_ONLY
-from scenarios.families.friction import start_of, turning_answer
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import at_rest
-from scenarios.truth.sliding import bounce, slide, spinning_pair
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY
+from crosscheck2d.scenarios.families.friction import start_of, turning_answer
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import at_rest
+from crosscheck2d.scenarios.truth.sliding import bounce, slide, spinning_pair
 
 SOLID = 2.0  # m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped

@@ -10,19 +10,19 @@ import numpy as np
 from numpy.random import Generator, default_rng
 from numpy.typing import ArrayLike
 
-from adapters.run import Run
-from reports.stability.limits import RARELY, Case
-from reports.stability.predicates_gas import (
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.stability.limits import RARELY, Case
+from crosscheck2d.reports.stability.predicates_gas import (
     ENERGY_DRIFTS,
     GAS_DIVERGES,
     MOMENTUM_DRIFTS,
     TEMPERATURES_PART,
     WRONG_GAS,
 )
-from reports.stability.scenes import RADIUS, SEEDS, disks, scenario_of
-from reports.stability.variants import DrivenEngine, played, with_variant
-from scenarios.families.placing import box
-from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
+from crosscheck2d.reports.stability.scenes import RADIUS, SEEDS, disks, scenario_of
+from crosscheck2d.reports.stability.variants import DrivenEngine, played, with_variant
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 
 DT = 1 / 240
 STEP = 0.04  # of a radius: how far a disk of mean energy moves in a step

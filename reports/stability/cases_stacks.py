@@ -9,12 +9,18 @@ import numpy as np
 from numpy.random import default_rng
 from numpy.typing import ArrayLike
 
-from reports.stability.limits import RARELY, Case
-from reports.stability.predicates_crowds import BURSTS, EJECTED, NOT_AT_REST, STANDS, STILL_OVERLAP
-from reports.stability.scenes import DT, RADIUS, SEEDS, G, disks, phase, scenario_of
-from scenarios.families.placing import box
-from scenarios.model import Scenario
-from scenarios.truth.closed_forms import at_rest
+from crosscheck2d.reports.stability.limits import RARELY, Case
+from crosscheck2d.reports.stability.predicates_crowds import (
+    BURSTS,
+    EJECTED,
+    NOT_AT_REST,
+    STANDS,
+    STILL_OVERLAP,
+)
+from crosscheck2d.reports.stability.scenes import DT, RADIUS, SEEDS, G, disks, phase, scenario_of
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.closed_forms import at_rest
 
 FLOOR = [[[-4, 0], [4, 0]]]
 

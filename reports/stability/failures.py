@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.run import Run
-from reports.page.replay import COLLISIONS, pack_layers, ratio_of
-from reports.run.trajectories import STATE
-from reports.stability.limits import Limit, Trial
-from reports.stability.search import LimitSearch
-from scenarios.model import Collisions, Scenario, Trajectory, frozen
-from scenarios.no_truth import NoTruth
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.page.replay import COLLISIONS, pack_layers, ratio_of
+from crosscheck2d.reports.run.trajectories import STATE
+from crosscheck2d.reports.stability.limits import Limit, Trial
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory, frozen
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 SECONDS = 5.0  # that a replay lasts

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from reports.page.documents import environment
-from reports.page.drawing import Line, draw_lines, new_figure, svg_of
-from reports.page.kit import (
+from crosscheck2d.reports.page.documents import environment
+from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
+from crosscheck2d.reports.page.kit import (
     Chart,
     Page,
     Part,
@@ -25,12 +25,19 @@ from reports.page.kit import (
     render_page,
     run_section,
 )
-from reports.page.links import neighbours
-from reports.page.style import TRUTH, number
-from reports.stability.cases import FAMILY_OF
-from reports.stability.limits import EXACT, FORMS, NEVER_FAILS, NEVER_WORKS, Case, Limit
-from reports.stability.maps import MAPS, MapOf
-from reports.stability.overview import (
+from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.reports.stability.cases import FAMILY_OF
+from crosscheck2d.reports.stability.limits import (
+    EXACT,
+    FORMS,
+    NEVER_FAILS,
+    NEVER_WORKS,
+    Case,
+    Limit,
+)
+from crosscheck2d.reports.stability.maps import MAPS, MapOf
+from crosscheck2d.reports.stability.overview import (
     MARKS,
     bracket,
     findings,
@@ -40,11 +47,11 @@ from reports.stability.overview import (
     where_it_works,
     why,
 )
-from reports.stability.predicates import REFUSED
-from reports.stability.results import StabilityResults, case_named
-from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, AtGap, LawOf
-from reports.terminal.counts import counted
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.stability.predicates import REFUSED
+from crosscheck2d.reports.stability.results import StabilityResults, case_named
+from crosscheck2d.reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, AtGap, LawOf
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck stability"
 FITS = 12  # columns of the table of limits in the width of a page

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws
-from reports.compare.verdicts import (
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.verdicts import (
     MOST_JITTER,
     MOST_RESIDUAL,
     MOST_SINKING,
     Verdict,
     own_speed,
 )
-from reports.stability.predicates import Predicate, first_above, largest, read, worst_of
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.reports.stability.predicates import (
+    Predicate,
+    first_above,
+    largest,
+    read,
+    worst_of,
+)
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 MOST_SPEED = 10.0  # radii/s
 

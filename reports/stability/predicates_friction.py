@@ -5,9 +5,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare.verdicts import SETTLED, Verdict
-from reports.stability.predicates import Predicate, first_above, largest, read, truth_of
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.reports.compare.verdicts import SETTLED, Verdict
+from crosscheck2d.reports.stability.predicates import (
+    Predicate,
+    first_above,
+    largest,
+    read,
+    truth_of,
+)
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 
 def friction_off(scenario: Scenario, played: Trajectory) -> Verdict:

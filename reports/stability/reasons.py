@@ -7,7 +7,7 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.mechanisms.table import (
     DIGITS,
     FLIGHT,
     FRICTION,
@@ -15,14 +15,14 @@ from adapters.mechanisms.table import (
     POSITION_CORRECTION,
     RESTITUTION,
 )
-from reports.compare.causes import B2_SETTINGS, LATE, THRESHOLD, THRESHOLDS
-from reports.stability.cases import CASES
-from reports.stability.limits import NEVER_FAILS, Limit
+from crosscheck2d.reports.compare.causes import B2_SETTINGS, LATE, THRESHOLD, THRESHOLDS
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, Limit
 
 
 class Law(NamedTuple):
     """What happens, where that stands, and the mechanism that it is about, of
-    `adapters.mechanisms.table`, or `LATE`; an ablation that has the limit must have it."""
+    `crosscheck2d.adapters.mechanisms.table`, or `LATE`; an ablation that has the limit must have it."""
 
     text: str
     source: str

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import answer, flight, pair
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, flight, pair
 
 RADIUS, G, DT = 0.25, 10.0, 1 / 64
 LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it

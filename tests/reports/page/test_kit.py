@@ -8,13 +8,13 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare.comparison import compare
-from reports.page import kit, style
-from reports.page.drawing import Line, draw_lines, new_figure, svg_of
-from reports.page.replay import pack_layers, played, ratio_of
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.page import kit, style
+from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
+from crosscheck2d.reports.page.replay import pack_layers, played, ratio_of
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened, overhang
 
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>"
