@@ -21,8 +21,8 @@ from crosscheck2d.reports.stability.limits import NEVER_FAILS, Limit
 
 
 class Law(NamedTuple):
-    """What happens, where that stands, and the mechanism that it is about, of
-    `crosscheck2d.adapters.mechanisms.table`, or `LATE`; an ablation that has the limit must have it."""
+    """What happens, where that stands, and the mechanism that it is about, of adapters/mechanisms,
+    or `LATE`; an ablation that has the limit must have it."""
 
     text: str
     source: str
