@@ -8,20 +8,16 @@ import hashlib
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
-from jinja2.bccache import Bucket
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.terminal.foreign_text import encoded
-from crosscheck2d.scenarios.truth.cache import folder
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
@@ -92,34 +88,10 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
-        bytecode_cache=CompiledTemplates(home) if (home := folder()) else None,
     )
     made.filters["number"] = style.number
     made.filters["for_script"] = for_script
     return made
-
-
-class CompiledTemplates(FileSystemBytecodeCache):
-    """Templates compiled by an earlier process, beside the cached truths. It only saves time: where
-    nothing can be read or written they are compiled again."""
-
-    def __init__(self, home: Path) -> None:
-        # The code made of a template depends on the version of jinja2 and on the options above.
-        made_by = hashlib.sha256(version("jinja2").encode() + Path(__file__).read_bytes())
-        where = home / "templates" / made_by.hexdigest()[:12]
-        with suppress(OSError):
-            where.mkdir(parents=True, exist_ok=True)
-        super().__init__(str(where))
-
-    def load_bytecode(self, bucket: Bucket) -> None:
-        """Look up a compiled template; see the base class."""
-        with suppress(OSError):
-            super().load_bytecode(bucket)
-
-    def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep a compiled template; see the base class."""
-        with suppress(OSError):
-            super().dump_bytecode(bucket)
 
 
 def css(sheet: str = "page/page.css") -> str:

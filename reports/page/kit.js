@@ -11,7 +11,7 @@ async function openRow(row, open = row.nextElementSibling?.className !== "opened
     if (!open) shown?.remove();
     return;
   }
-  const cell = Object.assign(make("td", ""), { colSpan: [...row.cells].reduce((sum, { colSpan }) => sum + colSpan, 0) });
+  const cell = Object.assign(make("td", ""), { colSpan: row.closest("table").querySelector("colgroup").children.length });
   row.after(make("tr", "opened", cell));
   if (!window.DecompressionStream) {
     cell.textContent = "This browser cannot unpack the row; any browser since 2023 can.";
