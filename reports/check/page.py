@@ -125,7 +125,8 @@ def scene_section(name: str, number: int, smallest: Smallest) -> Section:
     facts = [f"Sphere {k}: {line}" for k, line in enumerate(scene_lines(scenario))]
     facts.append(
         f"Steps of {shown(DT)} s; e = {style.number(scenario.scene.restitution)}. A program"
-        " searched for it and reduced it to as few spheres and as small numbers as still show the fault."
+        " searched for it and reduced it to as few spheres and as small numbers as still"
+        " show the fault."
     )
     replay = Playback(
         pack_layers(scenario, layers, more={"labels": labels}),

@@ -78,7 +78,7 @@ def report_page(
         *conformance_section(conformance),
         commands_section(),
         trust_section(summary, known_answers),
-        run_section(about),
+        run_section({**about, "engines": engine_versions(summary)}),
     ]
     return render_page(
         Page(
@@ -206,6 +206,13 @@ def conformance_section(conformance: pd.DataFrame) -> list[Section]:
     says = f"{probes} probes before the scenes; {len(rows)} have an answer other than stated"
     table = Table(frame, css="plain text", corner="question")
     return [Section("Conformance", says, [table], folded=True, id="conformance")]
+
+
+def engine_versions(summary: Summary) -> list[str]:
+    """The libraries of each engine with their versions."""
+    runs = [run for scene in summary.scenes for run in scene.comparison.runs if run.versions]
+    found = {run.engine: ", ".join(map(" ".join, run.versions.items())) for run in runs}
+    return [f"{engine}: {versions}" for engine, versions in found.items()]
 
 
 def commands_section() -> Section:
