@@ -1,8 +1,12 @@
-"""Takes the README's pictures: uv run python .ci/picture.py game | lesson"""
+"""Takes the README's pictures.
+
+uv run python .ci/picture.py game | lesson | PAGE.html PICTURE.png
+"""
 
 import sys
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # the tests are not installed
@@ -68,11 +72,24 @@ def clip(tab: Page, name: str, first: str, last: str) -> None:
     tab.screenshot(path=REPORTS / name, clip=box, full_page=True)
 
 
-def main(what: str) -> None:
+def first_screen(browser: Browser, page: str, picture: str) -> None:
+    """The first screen of a page, in 128 colours."""
+    tab = browser.new_page(viewport={"width": 1280, "height": 700})
+    tab.goto(Path(page).resolve().as_uri())
+    tab.wait_for_timeout(1000)
+    tab.screenshot(path=picture)
+    Image.open(picture).convert("RGB").quantize(128).save(picture, optimize=True)
+
+
+def main(what: str, picture: str = "") -> None:
     """One picture."""
+    if picture:
+        with chromium() as browser:
+            first_screen(browser, what, picture)
+        return
     with chromium() as browser, served(application(Game(FIRST))) as url:
         {"game": game, "lesson": lesson}[what](browser, url)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -4,6 +4,7 @@ replay and its table. What most readers do not need is folded."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,9 +13,12 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
+from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.snippets import write_snippet
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.kit import (
+    Code,
     Page,
     Part,
     Section,
@@ -174,12 +178,19 @@ def settings_section(summary: Summary) -> list[Section]:
             frame = frame[[len(set(map(str, row))) > 1 for row in frame.itertuples(index=False)]]
         note = f"{name.partition(':')[2]} is nearer in {nearer} scenes, farther in {farther}"
         table = Table(frame, css="plain text", corner=label(name))
-        parts.append(Section(label(name), note if len(of) > 1 else "", [table], folded=True))
+        code: list[Part] = []
+        with suppress(Unsupported, ImportError):  # a run of another machine
+            snippet = write_snippet(
+                name, scene.comparison.scenario.scene, scene.comparison.middle_dt
+            )
+            code = [Code(snippet)]
+        parts.append(Section(label(name), note if len(of) > 1 else "", [*code, table], folded=True))
     intro = Text(
         [
-            f"What each engine has in {title_of(scene)}, where its settings differ. The first table"
-            " has one profile for each library in all scenes, because a program runs with one: the"
-            " one that is nearer by more than a factor of 2 in more scenes."
+            f"The settings that each library has in {title_of(scene)}, as code to copy, and those"
+            " that differ between the profiles; adapters/README.md says why. The first table has"
+            " one profile for each library in all scenes, because a program runs with one: the one"
+            " that is nearer by more than a factor of 2 in more scenes."
         ]
     )
     says = "what matched means for each library"
