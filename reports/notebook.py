@@ -62,7 +62,7 @@ def framed(title: str, sections: Sequence[Section], names: Sequence[str] = ()) -
     )
 
 
-class Results(pd.DataFrame):
+class ShownFrame(pd.DataFrame):
     """A frame that shows itself as a page; what is made from it is a plain frame."""
 
     _metadata = ["page"]  # noqa: RUF012 - as pandas wants it
@@ -76,9 +76,9 @@ class Results(pd.DataFrame):
         return self.page()
 
 
-def results(frame: pd.DataFrame, page: Callable[[], str]) -> Results:
+def showing(frame: pd.DataFrame, page: Callable[[], str]) -> ShownFrame:
     """The frame, with what makes its page."""
-    made = Results(frame)
+    made = ShownFrame(frame)
     made.page = page
     return made
 
@@ -136,7 +136,7 @@ def run(
     dts: float | Sequence[float] = (),
     seed: int = 0,
     timeout: float = 60.0,
-) -> Results:
+) -> ShownFrame:
     """Run scenes through engines and compare: one number a row, as in deviations.csv.
 
     Args:
@@ -167,17 +167,17 @@ def run(
         for number, scenario in enumerate(asked)
     ]
     table = pd.concat([each.table for each in comparisons], ignore_index=True)
-    return results(table, partial(page_of_runs, comparisons, names))
+    return showing(table, partial(page_of_runs, comparisons, names))
 
 
-def check(path: str | Path) -> Results:
+def check(path: str | Path) -> ShownFrame:
     """Check a solver of the exercise, Exercise.js or solver.py: a row for each question."""
     found = check_file(Path(path))
     if found.refused:
         raise ValueError(found.refused)
     columns = ("task", "name", "verdict", "cause", "asked", "got", "expected")
     frame = pd.DataFrame([{name: getattr(row, name) for name in columns} for row in found.rows])
-    return results(frame, partial(page_of_check, found))
+    return showing(frame, partial(page_of_check, found))
 
 
 def advise(
@@ -186,7 +186,7 @@ def advise(
     purpose: str = "trajectory",
     engines: str | Sequence[str] = (),
     seed: int = 0,
-) -> Results:
+) -> ShownFrame:
     """The cheapest engines and step sizes that keep an error in a scene, cheapest first; then those
     that do not, with the reason. Raises `ValueError` for a scene without an exact answer."""
     if purpose not in PURPOSES or not error > 0:
@@ -206,7 +206,7 @@ def advise(
     frame = frame_of_advice(advice)
     says = f"{PURPOSES[purpose].what}, at most {style.number(error)}, {advice.judged}"
     shown = [Section("", says, [Table(frame.set_index("engine"), corner="engine")])]
-    return results(frame, partial(framed, f"Advice on {scenario.name}", shown))
+    return showing(frame, partial(framed, f"Advice on {scenario.name}", shown))
 
 
 @contextmanager
