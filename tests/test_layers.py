@@ -42,7 +42,7 @@ LAYERS = {
         "own_solver",
         "javascript own_engine",
         "engines",
-        "mechanisms conformance",
+        "mechanisms conformance snippets",
     ],
     "reports": [
         "terminal compare",

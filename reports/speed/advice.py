@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf, isfinite, isnan, log, nan
+from math import ceil, inf, isfinite, isnan, log, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,6 +112,12 @@ class Attempt:
     def typical(self) -> float:
         """The median of its errors over the starts within a step."""
         return float(np.median(self.starts))
+
+    @property
+    def usually(self) -> float:
+        """The error that nine tenths of the starts keep; nan where these were not played."""
+        count = ceil(NINE_TENTHS * len(self.starts))
+        return sorted(self.starts)[count - 1] if count else nan
 
     def kept_in(self, bound: float) -> int:
         """From how many of the starts it keeps the error."""
