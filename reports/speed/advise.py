@@ -300,7 +300,7 @@ def print_changes(console: Console, advice: Advice) -> None:
     rows = [
         [
             f"{change.plain.name}, {change.changed.change}",
-            f"{number(change.plain.typical, 2)} → {number(change.changed.typical, 2)}",
+            " → ".join(number(error, 2) for error in change.errors),
             f"× {number(change.changed.cost / change.plain.cost, 2)}",
             change.verdict(advice.bound, advice.floor),
         ]
