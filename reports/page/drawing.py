@@ -271,7 +271,8 @@ def svg_of(figure: Figure, label: str, alone: bool = False) -> Markup:
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     used = set(re.findall(r"[#(]#?([\w-]+)[)\"]", text))
     text = re.sub(r' id="([^"]*)"', lambda m: m[0] if m[1] in used else "", text)
-    text = re.sub(r"(\d+\.\d\d)\d+", r"\1", text)
+    # in attributes only: a label 0.003 stays
+    text = re.sub(r'"[^"]*"', lambda m: re.sub(r"(\d+\.\d\d)\d+", r"\1", m[0]), text)
     text = re.sub(r"\n\s*", "\n", text)
     text = text.replace("font: ", "font-family:inherit;font: ") if not alone else text
     text = re.sub(r' width="[\d.]+pt"| height="[\d.]+pt"', "", text, count=2) if not alone else text
