@@ -41,7 +41,7 @@ LAYERS = {
         f"{' '.join({name.partition(':')[0] for name in ENGINES})} npm_packages",
         "host",
         "engines",
-        "mechanisms conformance",
+        "mechanisms conformance snippets",
     ],
     "reports": [
         "terminal compare",
@@ -49,7 +49,7 @@ LAYERS = {
         "page",
         "check speed stability game tune",
         "lessons",
-        "commands",
+        "commands notebook",
         "cli",
         "__main__",
     ],
