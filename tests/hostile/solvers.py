@@ -186,7 +186,15 @@ CALLED: dict[str, tuple[str, str, str]] = {
 }
 WRITES = ("check.html", "out", "out.part")
 CHECKED = tuple(
-    Input(f"check: {what}", ("check", name), {name: text}, codes=(1,), says=says, writes=WRITES)
+    Input(
+        f"check: {what}",
+        ("check", name),
+        {name: text},
+        # what is not there is no fault: nothing is judged
+        codes=(2 if what == "a module that is not there" else 1,),
+        says=says,
+        writes=WRITES,
+    )
     for what, (name, text, says) in LOADING.items()
 ) + tuple(
     Input(
