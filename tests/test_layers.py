@@ -50,7 +50,7 @@ LAYERS = {
         "page",
         "check speed stability game tune",
         "lessons",
-        "commands",
+        "commands notebook",
         "cli",
         "__main__",
     ],

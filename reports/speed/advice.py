@@ -8,7 +8,8 @@ import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf, isfinite, isnan, log, nan
+from itertools import islice
+from math import ceil, inf, isfinite, isnan, log, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,6 +56,7 @@ NOT_COMPARED = "times not compared"
 LOUD, BUSY = 0.1, 0.5
 HALF = 0.5  # with at most this part of the error an option counts as more accurate
 STATISTICS = "statistics"
+FOURTH = 4  # an option is played from every fourth start: there are more options than engines
 LASTING = ("trajectory", "energy")  # purposes whose error only grows: it is kept until an instant
 
 
@@ -109,9 +111,10 @@ class Attempt:
         return row_of(self.name).outside or self.name.endswith(OWN)
 
     @property
-    def typical(self) -> float:
-        """The median of its errors over the starts within a step."""
-        return float(np.median(self.starts))
+    def usually(self) -> float:
+        """The error that nine tenths of the starts keep; nan where these were not played."""
+        count = ceil(NINE_TENTHS * len(self.starts))
+        return sorted(self.starts)[count - 1] if count else nan
 
     def kept_in(self, bound: float) -> int:
         """From how many of the starts it keeps the error."""
@@ -129,6 +132,13 @@ class ChangedOption(NamedTuple):
     plain: Attempt
     changed: Attempt
 
+    @property
+    def errors(self) -> tuple[float, float]:
+        """The medians, without the change and with it, over the starts that both were played
+        from."""
+        every = len(self.plain.starts) // len(self.changed.starts)
+        return float(np.median(self.plain.starts[::every])), float(np.median(self.changed.starts))
+
     def verdict(self, bound: float, floor: float) -> str:
         """The effect of the change: on the error, or else on the cost, if the cost changes by more
         than the fraction `floor`; inf where costs cannot be compared."""
@@ -136,7 +146,8 @@ class ChangedOption(NamedTuple):
             return TOO_FAR_OFF
         if self.changed.cost / self.plain.cost < 1 - floor:
             return SAVES_TIME
-        if self.changed.typical <= HALF * self.plain.typical:
+        before, after = self.errors
+        if after <= HALF * before:
             return NEARER
         return NO_GAIN if isfinite(floor) else NOT_COMPARED
 
@@ -277,7 +288,7 @@ class Inquiry:
         optional = self.attempts(
             [(x.engine, x.change, at[x.engine]) for x in OPTIONS if x.engine in at], purpose, bound
         )
-        able, _ = self.to_the_end(self.from_every_start(optional, purpose, bound))
+        able, _ = self.to_the_end(self.from_every_start(optional, purpose, bound, FOURTH))
         priced, differences, busy = self.timed([*keeping, *able])
         plain = {one.name: one for one in priced if one.change == PLAIN}
         ended = {one.name for one in (*keeping, *partly)}
@@ -326,15 +337,15 @@ class Inquiry:
         ]
 
     def from_every_start(
-        self, wanted: Sequence[Attempt], purpose: str, bound: float
+        self, wanted: Sequence[Attempt], purpose: str, bound: float, every: int = 1
     ) -> list[Attempt]:
-        """The attempts with their errors from each of the starts within a step, and until when
-        nine tenths of these keep the bound."""
+        """The attempts with their errors from every `every`-th of the starts within a step, and
+        until when nine tenths of these keep the bound."""
         tasks = {
-            one.task: partial(play_starts, self.scene, self.seed, purpose, bound, one)
+            one.task: partial(play_starts, self.scene, self.seed, purpose, bound, one, every)
             for one in wanted
         }
-        outcomes = self.done(tasks, f"playing from {STARTS} instants of a step")
+        outcomes = self.done(tasks, f"playing from {STARTS // every} instants of a step")
         return [
             replace(one, starts=(inf,) * STARTS) if isinstance(outcome, Failure) else outcome
             for one in wanted
@@ -505,16 +516,19 @@ def play_scene(scene: str, seed: int, purpose: str, bound: float, one: Attempt) 
     return play_part(scored(scene, seed), purpose, bound, one)
 
 
-def play_starts(scene: str, seed: int, purpose: str, bound: float, one: Attempt) -> Attempt:
-    """The attempt with its errors from each of the starts within a step, and what nine tenths of
-    these reach."""
+def play_starts(
+    scene: str, seed: int, purpose: str, bound: float, one: Attempt, every: int = 1
+) -> Attempt:
+    """The attempt with its errors from every `every`-th of the starts within a step, and until
+    when nine tenths of these keep the bound."""
     errors, until, whole = list[float](), list[float](), scored(scene, seed).scenario.duration
-    for begin, part in starts_within_a_step(scene, seed, one.dt):
+    for begin, part in islice(starts_within_a_step(scene, seed, one.dt), 0, None, every):
         played = play_part(part, purpose, bound, one)
         errors.append(played.error)
         until.append(whole if played.error <= bound else played.until and begin + played.until)
-    tenth = float(np.sort(np.nan_to_num(until, nan=0.0))[int((1 - NINE_TENTHS) * STARTS)])
-    return replace(one, starts=tuple(errors), lasting=tenth if purpose in LASTING else nan)
+    count = len(errors) - ceil(NINE_TENTHS * len(errors))
+    lasting = float(np.sort(np.nan_to_num(until, nan=0.0))[count])
+    return replace(one, starts=tuple(errors), lasting=lasting if purpose in LASTING else nan)
 
 
 def kept_until(view: View, purpose: str, bound: float) -> float:

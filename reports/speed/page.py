@@ -372,21 +372,18 @@ def budget_sections(results: Results) -> list[Section]:
         Text(items=[f"{k}: {v}" for k, v in TERMS.items()]),
     ]
     parts.append(Text([f"The contribution of flight equals its formula to {closed} radii."]))
-    cuts = explained.extent(found).cuts
-    if cuts:
-        rows = [[cut.until, cut.horizon, f"{100 * cut.share:.0f}"] for cut in cuts]
-        frame = pd.DataFrame(
-            rows,
-            [cut.scenario for cut in cuts],
-            ["evaluated, s", "exact answer, s", "share, %"],
-            dtype=object,
-        )
+    if len(cuts := explained.cuts(found)):
+        columns: Columns = {
+            "evaluated, s": "until_s",
+            "exact answer, s": "horizon_s",
+            "share, %": lambda row: f"{100 * row['until_s'] / row['horizon_s']:.0f}",
+        }
         caption = "Scenes that are not evaluated up to the end of their exact answer"
-        parts.append(Table(frame, caption=caption))
+        parts.append(table_of(cuts, "scenario", columns, caption=caption))
     parts.append(contributions(budget))
     changed = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
     if len(changed):
-        columns: Columns = {
+        columns = {
             "scene": "scenario",
             "without": "contribution",
             "in the engine, radii": "off_engine_radii",

@@ -21,7 +21,7 @@ from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.speed import figures
 from crosscheck2d.reports.speed.budget import budget_of
 from crosscheck2d.reports.speed.effort import QUICK
-from crosscheck2d.reports.speed.explained import extent
+from crosscheck2d.reports.speed.explained import cuts
 from crosscheck2d.reports.speed.measure import Measured, Measuring
 from crosscheck2d.reports.speed.page import LOWEST, NEVER, drawn_lines, reached_table, write_page
 from crosscheck2d.reports.speed.plan import SpeedPlan
@@ -294,13 +294,13 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     )
     cut = Results(results.plan, replace(results.measured, budget=both))
     whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
-    (gas,) = extent(cut.explained).cuts
+    (gas,) = cuts(cut.explained).itertuples()
 
     for page in (whole, shorter):
         assert said_of_pool(results.pooled) in page
         assert "pymunk:shipped 1" in said_of_pool(results.pooled)
         assert 'id="versus"' in page
-    assert f"gas_of_100 at {gas.until:.2g} of {gas.horizon:.2g} s" in shorter
+    assert f"gas_of_100 at {gas.until_s:.2g} of {gas.horizon_s:.2g} s" in shorter
     assert CUTS in shorter
     assert "1 scene is cut" in shorter
     assert "up to the end of every exact answer" in whole
