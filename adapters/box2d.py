@@ -50,7 +50,7 @@ at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
 SEARCHED = Searched(
     MATCHED,
     {
-        "velocity_iterations": ((8, 20, 50, 100), "passes of the impulse solver; the manual has 8"),
+        "velocity_iterations": ((4, 8, 20, 50), "passes of the impulse solver; the manual has 8"),
         "position_iterations": (
             (0, 1, 3, 8),
             "passes of the position correction at e < 1; the manual: 3",
@@ -76,21 +76,23 @@ SEARCHED = Searched(
             ),
         ),
         "length_unit": (
-            (0.125, 0.25, 0.5, 1.0, 3.0),
+            (0.015, 0.03, 0.06, 0.125, 0.25, 0.5, 1.0),
             (
                 "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2"
                 " units are compiled in"
             ),
         ),
         "step_unit": (
-            (1.0, 2.0, 4.0),
+            (0.6, 1.0, 2.0, 4.0),
             "ways of the fastest disk in a step: a unit of length at least",
         ),
     },
     (
         (("continuous", "bullet"), (False, True), (False, True)),
         (("elastic_continuous", "elastic_bullet"), (True,), (True,)),
-        (("bullet", "length_unit"), (False, True), (0.125, 0.5, 1.0)),
+        (("bullet", "length_unit"), (False, True), (0.06, 1.0)),
+        (("length_unit", "step_unit"), (0.015, 0.03, 0.06, 0.125), (0.6, 1.0, 4.0)),
+        (("elastic_continuous", "length_unit"), (True,), (0.015, 0.03, 0.06, 0.125)),
     ),
     {
         "radius of an edge (wall skin)": f"0: {GEOMETRY}",

@@ -28,25 +28,23 @@ MATCHED: dict[str, Any] = {
     "iterations": 10,
     "slop": 1e-6,
     "bias": DEFAULT_BIAS,
-    "elastic_bias": 1.0,
     "persistence": 1,
 }
-"""What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after
-1 s, at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
+"""What `matched` chooses: `slop` in smallest radii; `bias` is what is left of an overlap after
+1 s. `adapters/matched.csv` holds what else was tried."""
 
 SEARCHED = Searched(
     MATCHED,
     {
-        "iterations": ((5, 10, 20, 50, 100, 200), "passes of the impulse solver; 10 by default"),
+        "iterations": ((5, 10, 20, 50), "passes of the impulse solver; 10 by default"),
         "slop": (
             (0.01, 1e-3, 1e-4, 1e-6, 0.0),
             "overlap left alone, in smallest radii; 0.1 m by default",
         ),
         "bias": (
             (1.0, 0.3, DEFAULT_BIAS, 1e-12, 1e-24, 1e-48, 0.0),
-            "share of an overlap that is left after 1 s, at e < 1; 0.0018 by default",
+            "share of an overlap that is left after 1 s; 0.0018 by default",
         ),
-        "elastic_bias": ((1.0, 0.3, DEFAULT_BIAS, 1e-24, 0.0), "the same at e = 1"),
         "persistence": (
             (1, 2, 3),
             "steps for which a lost contact keeps its impulses; 3 by default",
@@ -54,7 +52,7 @@ SEARCHED = Searched(
     },
     (
         (("slop", "bias"), (1e-2, 1e-4, 0.0), (DEFAULT_BIAS, 1e-12, 1e-48, 0.0)),
-        (("slop", "elastic_bias"), (1e-3, 0.0), (DEFAULT_BIAS, 1e-24, 0.0)),
+        (("iterations", "bias"), (5, 20), (1e-24, 0.0)),
     ),
     {
         "elasticity": "sqrt(e) on every shape: the engine multiplies two",
@@ -142,7 +140,7 @@ class Pymunk:
             "friction": float(np.sqrt(scene.friction)),
             "iterations": chosen["iterations"],
             "collision_slop": float(chosen["slop"] * scene.radius.min()),
-            "collision_bias": chosen["elastic_bias" if scene.restitution == 1 else "bias"],
+            "collision_bias": chosen["bias"],
             "collision_persistence": chosen["persistence"],
         }
         return asked | self.changed

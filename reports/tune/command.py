@@ -69,9 +69,9 @@ def show(table: pd.DataFrame) -> None:
     for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
         numbers = [
             "" if pd.isna(row[name]) else f"{row[name]:.3g}"
-            for name in ("equal_cost", "again", "cost")
+            for name in ("equal_cost", "cost", "harmed")
         ]
         rows.append([f"{row.engine}, {row.setting}: {row.value}", *numbers, row.verdict])
-    headings = ["setting", "error", "on other\nseeds", "cost\nof a step", "verdict"]
+    headings = ["setting", "error", "cost\nof a step", "runs\nworse", "verdict"]
     title = "Errors at equal cost, and costs, as factors of those of the chosen settings"
     print_table(Console(), headings, rows, title, left=headings[-1:])
