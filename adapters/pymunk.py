@@ -27,11 +27,12 @@ DEFAULT_BIAS = (1 - 0.1) ** 60
 MATCHED: dict[str, Any] = {
     "iterations": 10,
     "slop": 1e-6,
-    "bias": DEFAULT_BIAS,
+    "bias": 1e-24,
+    "elastic_bias": 0.0,
     "persistence": 1,
 }
-"""What `matched` chooses: `slop` in smallest radii; `bias` is what is left of an overlap after
-1 s. `adapters/matched.csv` holds what else was tried."""
+"""What `matched` chooses: `slop` in smallest radii; the biases are what is left of an overlap after
+1 s, at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
 
 SEARCHED = Searched(
     MATCHED,
@@ -42,16 +43,19 @@ SEARCHED = Searched(
             "overlap left alone, in smallest radii; 0.1 m by default",
         ),
         "bias": (
-            (1.0, 0.3, DEFAULT_BIAS, 1e-12, 1e-24, 1e-48, 0.0),
-            "share of an overlap that is left after 1 s; 0.0018 by default",
+            (1.0, 0.3, DEFAULT_BIAS, 1e-12, 1e-24, 1e-36, 1e-48, 0.0),
+            "share of an overlap that is left after 1 s, at e < 1; 0.0018 by default",
         ),
+        "elastic_bias": ((1.0, 0.3, DEFAULT_BIAS, 1e-24, 0.0), "the same at e = 1"),
         "persistence": (
             (1, 2, 3),
             "steps for which a lost contact keeps its impulses; 3 by default",
         ),
     },
     (
-        (("slop", "bias"), (1e-2, 1e-4, 0.0), (DEFAULT_BIAS, 1e-12, 1e-48, 0.0)),
+        (("bias", "elastic_bias"), (1e-12, 1e-24, 1e-36, 0.0), (1.0, DEFAULT_BIAS, 1e-24, 0.0)),
+        (("slop", "bias"), (1e-2, 1e-3, 1e-4, 0.0), (DEFAULT_BIAS, 1e-12, 1e-24, 1e-48, 0.0)),
+        (("slop", "elastic_bias"), (1e-3, 0.0), (DEFAULT_BIAS, 1e-24, 0.0)),
         (("iterations", "bias"), (5, 20), (1e-24, 0.0)),
     ),
     {
@@ -73,8 +77,8 @@ class Pymunk:
     `crosscheck tune`: ten iterations, because more cost time and are not more accurate; nearly no
     slop, because the default 0.1 is a length in the scene's units; contacts are forgotten when they
     separate, because one that touches again within three steps inherits an impulse that is not
-    applied again, but is reported and may be taken back; at e = 1 no position correction, because
-    it adds energy.
+    applied again, but is reported and may be taken back. An overlap is removed in a step at e = 1,
+    where nothing rests; else by 60 % in a step of 1/60 s, because a column jitters if all of it is.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `turning` False gives
     every disk an infinite inertia, `spatial_hash` (cell in m, count) replaces the tree of the broad
@@ -140,7 +144,7 @@ class Pymunk:
             "friction": float(np.sqrt(scene.friction)),
             "iterations": chosen["iterations"],
             "collision_slop": float(chosen["slop"] * scene.radius.min()),
-            "collision_bias": chosen["bias"],
+            "collision_bias": chosen["elastic_bias" if scene.restitution == 1 else "bias"],
             "collision_persistence": chosen["persistence"],
         }
         return asked | self.changed

@@ -10,7 +10,7 @@
   // The length unit is that of Box2D 3.1, matched, whose slop and margin are the same shares of theirs.
   const matched = {
     matched: true, friction: null, turning: true, sleeping: false, iterations: 4, continuous: false, length_unit: 0.5,
-    continuous_steps: 1, pgs_iterations: 1, soft_ccd: 0, hertz: 30, prediction: 0.02,
+    continuous_steps: 1, pgs_iterations: 1, soft_ccd: 0, hertz: 120, prediction: 0.02,
   };
 
   function world(scene, chosen, hear) {

@@ -209,9 +209,8 @@ def _as_box2d(
         "slop": slop,
         "correction_most": most,
     }
-    uncorrected = without(position_iterations=0, elastic_position_iterations=0)
+    uncorrected = without(position_iterations=0)
     unswept = {"continuous": False, "bullet": False}
-    unswept |= {f"elastic_{option}": value for option, value in unswept.items()}
     found = [
         Mechanism(RESTITUTION, {"threshold": threshold}),
         Mechanism(IMPULSE, impulse),
@@ -259,6 +258,8 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
         # (b2ApplyRestitutionTask).
         *_friction(name, reported, scene, rub_restituted=False),
     ]
+    awake = {"sleeping": False} if name.endswith(":shipped") else {}
+    found.append(Mechanism(SWEPT, without=_without(name, continuous=False, **awake)))
     if name.endswith(":matched"):
         return found
     # At the threshold itself it bounces, where Box2D 2.3 does not.
@@ -269,7 +270,6 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
     return [
         Mechanism(RESTITUTION, {"threshold": threshold}, without=bouncing),
         *found,
-        Mechanism(SWEPT, without=_without(name, continuous=False, sleeping=False)),
     ]
 
 

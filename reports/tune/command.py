@@ -53,7 +53,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
         for engine in dict.fromkeys(engines or UNASKED):
             bar.say(f"{engine}: the exact answers, and the present settings")
             search = SettingsSearch(engine, say=bar.note)
-            bar.say(f"{engine}: setting by setting")
+            bar.say(f"{engine}: pairs of settings, and setting by setting")
             found = pd.concat([*tables, search.run()])
             with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):
                 put_text(part / NAME, found.to_csv(index=False))

@@ -11,6 +11,7 @@ The bounds are the same for every engine, and absolute. A run gets worse where
 What a setting breaks, it breaks for every seed, at the coarsest step at least: in a third of the
 runs of a family. What is less comes and goes with the phase of a collision within its step, and so
 does as much in all families together. Runs that get better are set against those that get worse.
+But a run that is refused, or fails, is no matter of phase: there may be none.
 """
 
 from __future__ import annotations
@@ -135,9 +136,10 @@ def of_run(
 
 def against(now: TrialScores, before: TrialScores, cost: float, scenes: Sequence[Asked]) -> Against:
     """Set `now` against `before`, if its steps cost `cost` times as much."""
-    both = np.isfinite(now.error) & np.isfinite(before.error)
+    at_its_cost = at_cost(now.error, cost)
+    both = np.isfinite(now.error) & np.isfinite(at_its_cost) & np.isfinite(before.error)
     had = np.log(before.error[both])
-    same, equal = np.log(now.error[both]) - had, np.log(at_cost(now.error, cost)[both]) - had
+    same, equal = np.log(now.error[both]) - had, np.log(at_its_cost[both]) - had
     counts = int((equal < np.log(0.8)).sum()), int((equal > np.log(1.25)).sum()), int(both.sum())
     change = changes(now, before)
     return Against(
@@ -182,17 +184,16 @@ def changes(now: TrialScores, before: TrialScores) -> NDArray[np.int64]:
 def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:
     """The families that get worse beyond the bounds; [] if no bound is broken."""
     family = np.array([scene.name.rsplit("-", 1)[0] for scene, _ in scenes])
-    change, faults = changes(now, before), {}
+    change, faults = changes(now, before), []
+    lost = increases(now.harm, before.harm)[:, :, HARMS.index(FAILED)]
+    many = change.sum() > MOST_OF_ALL * change.size
     for name in dict.fromkeys(family.tolist()):
         its = np.flatnonzero(family == name)
         worse, runs = int(change[its].sum()), change[its].size
-        if worse > 0:
-            faults[name] = (
-                f"{name}: {worse} of {runs} runs worse, {worst(now, before, scenes, its)}"
-            )
-            if worse < MOST_OF_A_FAMILY * runs and change.sum() <= MOST_OF_ALL * change.size:
-                del faults[name]
-    return list(faults.values())
+        if lost[its].any() or worse >= MOST_OF_A_FAMILY * runs or (many and worse > 0):
+            text = worst(now, before, scenes, its)
+            faults.append(f"{name}: {worse} of {runs} runs worse, {text}")
+    return faults
 
 
 def worst(

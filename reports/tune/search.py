@@ -1,5 +1,5 @@
-"""The search: setting by setting, then the pairs, again and again until nothing on the grid is
-better."""
+"""The search: pairs of settings, then setting by setting, again and again until nothing on the
+grid is better."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ from adapters.conformance.conform import conform
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED
 from adapters.matched import Searched
-from reports.tune.score import Against, Make, TrialScores, against, cost_of, measured, posed
+from reports.tune.score import (
+    FAILED,
+    HARMS,
+    Against,
+    Make,
+    TrialScores,
+    against,
+    cost_of,
+    measured,
+    posed,
+)
 from scenarios.families.tuning import FAMILIES
 
 SEEDS = (0, 1, 2, 3)
@@ -58,8 +68,8 @@ def searched_of(engine: str) -> Searched:
 
 
 class SettingsTrial(NamedTuple):
-    """One change of the chosen settings: its cost, what it is against them at equal cost, and the
-    probes that it does not keep."""
+    """One change of the chosen settings: its cost, what it is against them at equal cost, and, if
+    it is better, the probes that it does not keep."""
 
     change: dict[str, Any]
     cost: float
@@ -120,10 +130,14 @@ class SettingsSearch:
     def trial(self, change: dict[str, Any]) -> SettingsTrial:
         """The chosen settings with a change, against them without it."""
         settings, before = self.chosen | change, self.played(self.chosen)
-        one_a_family = self.scenes[:: len(self.seeds)]
-        cost = cost_of(self.make(settings), self.make(self.chosen), one_a_family)
-        result = against(self.played(settings), before, cost, self.scenes)
-        trial = SettingsTrial(change, cost, result, sorted(self.kept - self.keeps(settings)))
+        now, one_a_family = self.played(settings), slice(None, None, len(self.seeds))
+        fails = (now.harm + before.harm)[one_a_family, -1, HARMS.index(FAILED)] > 0
+        timed = [scene for scene, failed in zip(self.scenes[one_a_family], fails) if not failed]
+        cost = cost_of(self.make(settings), self.make(self.chosen), timed)
+        result = against(now, before, cost, self.scenes)
+        trial = SettingsTrial(change, cost, result, [])
+        if trial.verdict == BETTER:
+            trial = trial._replace(departs=sorted(self.kept - self.keeps(settings)))
         what = ", ".join(f"{name} {value:g}" for name, value in change.items())
         self.say(
             f"{self.engine} {what}: {result.equal_cost:.3f}, {result.harmed:+d} runs worse:"
@@ -132,14 +146,15 @@ class SettingsSearch:
         return trial
 
     def groups(self) -> Iterator[list[dict[str, Any]]]:
-        """The changes of each setting, and then of each pair that differ in both."""
-        for name, (values, _) in self.searched.settings.items():
-            yield [{name: value} for value in values if value != self.chosen[name]]
+        """The changes of each pair of settings that differ in both, and then of each setting: what
+        two gain in scenes of their own, neither gains in all by itself."""
         for names, *tried in self.searched.pairs:
             changes = [dict(zip(names, values)) for values in product(*tried)]
             yield [
                 each for each in changes if all(each[name] != self.chosen[name] for name in each)
             ]
+        for name, (values, _) in self.searched.settings.items():
+            yield [{name: value} for value in values if value != self.chosen[name]]
 
     def sweep(self) -> tuple[list[SettingsTrial], bool]:
         """All trials, taking the best of each setting at once; and whether anything was taken."""

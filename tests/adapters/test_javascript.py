@@ -33,6 +33,7 @@ from adapters.own_solver import gl_matrix
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
 from adapters.play import play_once
+from reports.lessons.mechanisms.planck import played, whole
 from reports.run import arguments
 from reports.speed.budget import RESIDUAL, TOTAL, budget_of
 from reports.speed.plan import middle
@@ -176,12 +177,9 @@ def test_what_the_row_says_an_engine_misses_of_the_protocol_it_does_miss():
 
 @fetched
 def test_planck_differs_from_box2d_by_float32_alone():
-    """Both matched profiles choose the same, planck by settings and Box2D by units."""
+    """In the same units, planck by settings."""
     one = scenario("head_on_equal_e09")
-    runs = [
-        play_once(rows[name].make, name, one, one.dt(4)).trajectory
-        for rows, name in ((FETCHED, "planck:matched"), (ENGINES, "box2d:matched"))
-    ]
+    runs = [whole(played(engine, "matched", one.name, 4)) for engine in ("planck", "box2d")]
     apart = np.abs(runs[0].position - runs[1].position).max()
     steps = 4 * one.intervals
     # a position of up to 8 m and a velocity round once a step
