@@ -57,7 +57,7 @@ SEARCHED = Searched(
             (10.0, 30.0, 120.0, 1e6),
             "stiffness of a contact; 30 by default; cut at an eighth of the substeps a second",
         ),
-        "damping_ratio": ((1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
+        "damping_ratio": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
         "push_speed": (
             (0.0, 0.3, 3.0, 30.0),
             "m/s, at most, of a position correction; 3 by default",

@@ -168,9 +168,7 @@ ENGINES: dict[str, EngineRow] = {
         },
         variants={
             "fifty_iterations": Variant({"iterations": 50}, "50 iterations instead of 10"),
-            "position_correction": Variant(
-                {"collision_bias": (1 - 0.1) ** 60}, "position correction as shipped"
-            ),
+            "no_correction": Variant({"collision_bias": 1.0}, "no position correction"),
         },
     ),
     "box2d:shipped": _Box2D(
@@ -205,7 +203,7 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d_v3:matched": _Box2DV3(
         partial(_made, "adapters.box2d_v3.Box2DV3", "matched"),
-        "Box2D 3.1, matched: no thresholds, length unit 0.3 r, stiffer contacts, friction as stated",
+        "Box2D 3.1, matched: no thresholds, length unit 0.3 r, stiffer contacts; CCD",
         0.625,
         FLOAT32,
         options={

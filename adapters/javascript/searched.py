@@ -68,8 +68,11 @@ SEARCHED = {
                 "of the smallest disk; all thresholds are in pixels",
             ),
             "sides": ((26, 50, 100, 200, 400), "of the polygon of a disk; 26 at most by default"),
-            "position_iterations": ((2, 6, 12), "passes of the position correction; 6 by default"),
-            "velocity_iterations": ((2, 4, 8), "passes of the impulse solver; 4 by default"),
+            "position_iterations": (
+                (2, 6, 12, 24),
+                "passes of the position correction; 6 by default",
+            ),
+            "velocity_iterations": ((2, 4, 8, 16), "passes of the impulse solver; 4 by default"),
         },
         (),
         {
@@ -118,8 +121,8 @@ SEARCHED = {
             ),
         },
         (
-            (("iterations", "hertz"), (2, 8), (120, 1000)),
-            (("length_unit", "hertz"), (0.25, 1.0), (1000,)),
+            (("iterations", "hertz"), (2, 8), (1000,)),
+            (("length_unit", "hertz"), (1.0,), (1000,)),
         ),
         {
             "normalizedAllowedLinearError": (

@@ -251,9 +251,10 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
         "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }
+    correction = {"correction_speed": chosen["push_speed"], "share_capped": True}
     found = [
         Mechanism(IMPULSE, impulse),
-        Mechanism(POSITION_CORRECTION, {"correction_speed": chosen["push_speed"]}, (IMPULSE,)),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,)),
         # What the sweep for restitution adds to the normal impulse allows no more friction
         # (b2ApplyRestitutionTask).
         *_friction(name, reported, scene, rub_restituted=False),
@@ -288,7 +289,7 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) ->
         "margin": reported["prediction distance in m"],
         "carried": True,
         "rub_biased": False,
-        "hertz": 30.0,
+        "hertz": 30.0 if name.endswith(":shipped") else 120.0,
         "damping": 10.0,
     }
     # normalized_contact_recycle_distance, BroadPhaseBvh::CHANGE_DETECTION_FACTOR

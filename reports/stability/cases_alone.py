@@ -191,7 +191,7 @@ ALONE = (
         ball,
         BOUNCES_OFF,
         runs=16,
-        also=(*with_variant("16_substeps"), *with_variant("position_correction")),
+        also=(*with_variant("16_substeps"), *with_variant("no_correction")),
     ),
     Case(
         "scale_up",

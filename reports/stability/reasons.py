@@ -148,15 +148,15 @@ REASONS = (
     # One disk, or two.
     Reason(
         "bounce_drift",
-        "pymunk:matched+position_correction",
+        "pymunk:matched",
         "the position correction at the floor adds height",
         "Munk2D src/cpSpaceStep.c, collision_bias",
-        variant="pymunk:matched",
+        variant="pymunk:matched+no_correction",
         mechanism=POSITION_CORRECTION,
     ),
     Reason(
         "bounce_drift",
-        "pymunk:matched",
+        "pymunk:matched+no_correction",
         "v dt exceeds the radius, and the floor is missed",
         GEOMETRY,
         mechanism=END_OF_STEP,

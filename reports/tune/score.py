@@ -211,15 +211,15 @@ def worst(
 def cost_of(make: Make, than: Make, scenes: Sequence[Asked]) -> float:
     """What a step costs over what it costs with the other settings: geometric mean over scenes.
 
-    Both are timed in turns, `ROUNDS` times a scene, of which the shortest counts; see
+    Both are timed in turns, `ROUNDS` times a scene, of whose ratios the median counts; see
     `Engine.listening` for why no collision is logged. Time of this thread, so that what else the
     machine does is not in it; of an engine in V8 the time in V8.
     """
     times = [
         [(spent(make, scene), spent(than, scene)) for _ in range(ROUNDS)] for scene, _ in scenes
     ]
-    mine, theirs = np.min(times, axis=1).T
-    return float(np.exp(np.log(mine / theirs).mean()))
+    ratio = np.log(times)[:, :, 0] - np.log(times)[:, :, 1]
+    return float(np.exp(np.median(ratio, axis=1).mean()))
 
 
 def spent(make: Make, scenario: Scenario) -> float:
