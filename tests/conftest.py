@@ -13,8 +13,8 @@ from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 from playwright.sync_api import Browser
 
-from adapters.engines import ENGINES
-from reports.run import timing_pass, worker
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import timing_pass, worker
 from tests.compiling import LOCKS, compiling_alone
 from tests.forks import FRESH, Forked
 from tests.reports.page.browsing import chromium

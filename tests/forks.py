@@ -18,21 +18,21 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from unittest import mock
 
-from reports.run import worker
+from crosscheck2d.reports.run import worker
 
 FRESH = worker.start  # as users have it, an interpreter of its own
 ROOT = Path(__file__).parent.parent
 LOADED = [
     "tests.loaded",
-    "reports.cli",
-    "reports.run.arguments",
-    "reports.commands.truth",
-    "reports.commands.diff",
-    "reports.check.command",
-    "reports.speed.command",
-    "reports.stability.command",
-    "reports.lessons.command",
-    "reports.tune.command",
+    "crosscheck2d.reports.cli",
+    "crosscheck2d.reports.run.arguments",
+    "crosscheck2d.reports.commands.truth",
+    "crosscheck2d.reports.commands.diff",
+    "crosscheck2d.reports.check.command",
+    "crosscheck2d.reports.speed.command",
+    "crosscheck2d.reports.stability.command",
+    "crosscheck2d.reports.lessons.command",
+    "crosscheck2d.reports.tune.command",
 ]
 # multiprocessing polls all of its processes whenever it starts one; what one thread has read,
 # another waits for.
@@ -70,7 +70,7 @@ def crosscheck_in(
 ) -> None:
     """In a fork: the command in `cwd`, which leads a group of its own and prints into files in
     `folder`."""
-    from reports.__main__ import main
+    from crosscheck2d.reports.__main__ import main
 
     os.setsid()
     for number, name in ((1, "stdout"), (2, "stderr")):
@@ -86,7 +86,7 @@ class Forked:
     for."""
 
     def __init__(self, theirs: Connection, trail: int, printing: int, memory: int) -> None:
-        """Serve `theirs` in a fork; in place of `reports.run.worker.start`."""
+        """Serve `theirs` in a fork; in place of `crosscheck2d.reports.run.worker.start`."""
         lines = [Connection(os.dup(line)) for line in (theirs.fileno(), trail, printing)]
         self.process = start(serve, lines, memory, dict(os.environ))
 
@@ -113,8 +113,8 @@ class Forked:
 
 
 def serve(lines: list[Connection], memory: int, environment: Mapping[str, str]) -> None:
-    """In the fork: what `python -m reports.run.worker_process` does."""
-    from reports.run import worker_process
+    """In the fork: what `python -m crosscheck2d.reports.run.worker_process` does."""
+    from crosscheck2d.reports.run import worker_process
 
     os.environ.clear()
     os.environ |= environment

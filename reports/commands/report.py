@@ -9,25 +9,25 @@ from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import NoReturn
 
-from adapters.engines import OWN
-from adapters.friction import REFUSAL
-from adapters.run import STATUSES
-from adapters.thrust_grid import off_grid_note
-from reports.commands.own_solvers import lines
-from reports.compare.comparison import Comparison
-from reports.compare.fast_disks import fast_note
-from reports.lessons.catalogue import LESSONS
-from reports.page import overview
-from reports.page.report import Report, make_report
-from reports.page.situations import by_friction
-from reports.run.archive import Archive
-from reports.run.arguments import of_main_job, refusing
-from reports.run.folders import found
-from reports.terminal.console import Console
-from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, refuse, say
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_list, print_table
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.adapters.run import STATUSES
+from crosscheck2d.adapters.thrust_grid import off_grid_note
+from crosscheck2d.reports.commands.own_solvers import lines
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.fast_disks import fast_note
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page import overview
+from crosscheck2d.reports.page.report import Report, make_report
+from crosscheck2d.reports.page.situations import by_friction
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.arguments import of_main_job, refusing
+from crosscheck2d.reports.run.folders import found
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_list, print_table
 
 
 def finish(report: Report, out: Path, status: int = DONE) -> NoReturn:

@@ -12,13 +12,13 @@ from typing import Any, NoReturn
 
 import psutil
 
-from adapters.engines import row_of
-from reports.commands.own_solvers import checks_of
-from reports.commands.report import finish
-from reports.lessons.catalogue import LESSONS
-from reports.page.report import make_report
-from reports.run.archive import Archive, stored_scene
-from reports.run.arguments import (
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.reports.commands.own_solvers import checks_of
+from crosscheck2d.reports.commands.report import finish
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page.report import make_report
+from crosscheck2d.reports.run.archive import Archive, stored_scene
+from crosscheck2d.reports.run.arguments import (
     checked_engines,
     checked_scenes,
     go_where_files_are,
@@ -26,8 +26,8 @@ from reports.run.arguments import (
     opening,
     refusing,
 )
-from reports.run.bits import BITS, kept_bits, write_bits
-from reports.run.folders import (
+from crosscheck2d.reports.run.bits import BITS, kept_bits, write_bits
+from crosscheck2d.reports.run.folders import (
     RUN,
     given_back,
     open_again,
@@ -37,15 +37,15 @@ from reports.run.folders import (
     reopened,
     replace_folder,
 )
-from reports.run.journal import JOURNAL, Journal
-from reports.run.results import OtherVersions
-from reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
-from reports.run.suite import carry_out
-from reports.run.tasks import Means, RunPlan
-from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, broken_off, refuse, say
-from reports.terminal.progress import Progress
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.reports.run.journal import JOURNAL, Journal
+from crosscheck2d.reports.run.results import OtherVersions
+from crosscheck2d.reports.run.runner import LEAST_MEMORY, NoScheduler, affordable, cluster
+from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.tasks import Means, RunPlan
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, broken_off, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,17 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from reports.run.cells import digest
-from reports.run.scenes import Records, open_scene, scenario_of
-from reports.run.worker_process import Failure
-from reports.terminal.foreign_text import put_bytes
-from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth, answered
-from scenarios.regular import opened
-from scenarios.truth.cache import UNREADABLE, packed, unpacked
-from scenarios.truth.exact import CLOSED_FORM, OracleTruth
-from scenarios.truth.oracle.work import TimeLimit
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.reports.run.cells import digest
+from crosscheck2d.reports.run.scenes import Records, open_scene, scenario_of
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.terminal.foreign_text import put_bytes
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.no_truth import NoTruth, answered
+from crosscheck2d.scenarios.regular import opened
+from crosscheck2d.scenarios.truth.cache import UNREADABLE, packed, unpacked
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, OracleTruth
+from crosscheck2d.scenarios.truth.oracle.work import TimeLimit
+from crosscheck2d.scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"
 # share of the time limit; computing the horizon takes up to as long as the events

@@ -20,12 +20,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from adapters.run import Run
-from reports.run.cells import digest
-from reports.run.journal import JOURNAL, lines_of, unusable
-from reports.run.trajectories import load_trajectory
-from scenarios.model import Trajectory
-from scenarios.regular import all_of
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.run.cells import digest
+from crosscheck2d.reports.run.journal import JOURNAL, lines_of, unusable
+from crosscheck2d.reports.run.trajectories import load_trajectory
+from crosscheck2d.scenarios.model import Trajectory
+from crosscheck2d.scenarios.regular import all_of
 
 LINES = {
     # the request, and the versions that played it

@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.run.archive import Archive, stored_trajectory
-from reports.run.cells import versions
-from reports.run.made import writing
-from reports.terminal.console import Console
-from reports.terminal.counts import counted, listed
-from reports.terminal.foreign_text import put_text
-from reports.terminal.tables import print_list, print_table
-from scenarios.model import Trajectory
+from crosscheck2d.reports.run.archive import Archive, stored_trajectory
+from crosscheck2d.reports.run.cells import versions
+from crosscheck2d.reports.run.made import writing
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.tables import print_list, print_table
+from crosscheck2d.scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"
 COLUMNS = ["scenario", "engine", "profile", "dt_s", "status", "bits", "until"]

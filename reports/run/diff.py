@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from reports.compare.metrics import METRICS
-from reports.compare.table import COLUMNS
-from reports.compare.verdicts import VERDICTS
-from reports.compare.view import NOT_JUDGED, rounding_of
-from reports.run.archive import Archive
-from reports.run.tables import is_sealed
-from reports.run.timing_pass import is_busy, noise_floor
-from reports.terminal.counts import listed
-from reports.terminal.foreign_text import encoded
-from scenarios.truth.horizon import DIVERGED
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.table import COLUMNS
+from crosscheck2d.reports.compare.verdicts import VERDICTS
+from crosscheck2d.reports.compare.view import NOT_JUDGED, rounding_of
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.tables import is_sealed
+from crosscheck2d.reports.run.timing_pass import is_busy, noise_floor
+from crosscheck2d.reports.terminal.counts import listed
+from crosscheck2d.reports.terminal.foreign_text import encoded
+from crosscheck2d.scenarios.truth.horizon import DIVERGED
 
 # Measured on two busy cores (load 15 to 20), with 3 scenes and five rounds of timings. Eight runs
 # of one build, compared with each other, gave 280 verdicts from 4200 ratios of rounds: 4 were

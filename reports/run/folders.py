@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 
-from reports.run.archive import Archive
-from reports.run.journal import JOURNAL, Busy, Journal
-from reports.run.made import (
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.journal import JOURNAL, Busy, Journal
+from crosscheck2d.reports.run.made import (
     MADE,
     FolderKind,
     Made,
@@ -21,8 +21,8 @@ from reports.run.made import (
     put_made,
     read_made,
 )
-from reports.terminal.counts import counted
-from reports.terminal.exits import FolderTaken, deferring_signals
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import FolderTaken, deferring_signals
 
 RUN = FolderKind(
     "crosscheck run",

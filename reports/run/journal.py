@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from adapters.system import BINARY, lock
-from reports.run.cells import digest
-from scenarios.regular import opened
+from crosscheck2d.adapters.system import BINARY, lock
+from crosscheck2d.reports.run.cells import digest
+from crosscheck2d.scenarios.regular import opened
 
 JOURNAL = "journal.jsonl"
 CLOSED = -1

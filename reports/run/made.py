@@ -18,9 +18,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from reports.run.journal import JOURNAL
-from reports.terminal.exits import FolderTaken
-from reports.terminal.foreign_text import encoded, is_part, put_text
+from crosscheck2d.reports.run.journal import JOURNAL
+from crosscheck2d.reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.terminal.foreign_text import encoded, is_part, put_text
 
 MADE = "made.json"
 HEAD = 4096  # bytes at the start of a file in which its mark is searched

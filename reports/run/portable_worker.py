@@ -16,12 +16,12 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from time import monotonic
 
-from adapters import system
-from adapters.safe_path import path_of_this, python
-from reports.run import worker_process
-from reports.run.worker import PRINTED, STARTING, Worker
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.safe_path import path_of_this, python
+from crosscheck2d.reports.run import worker_process
+from crosscheck2d.reports.run.worker import PRINTED, STARTING, Worker
 
-WORK = "from reports.run.portable_worker import main; main(sys.argv[1:])"
+WORK = "from crosscheck2d.reports.run.portable_worker import main; main(sys.argv[1:])"
 KEY = "CROSSCHECK_WORKER"  # the variable with the key of our processes
 LOOK = 0.05  # s between two checks whether a process that has not connected is still alive
 

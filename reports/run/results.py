@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any, Literal
 
-from adapters.conformance.conform import Finding, not_probed
-from adapters.run import Run
-from reports.run.archive import trajectory_file
-from reports.run.cells import Cell, content_key, digest, scene_hash
-from reports.run.journal import Journal
-from reports.run.known_answers import KnownAnswer
-from reports.run.playing import CellResult, source_and_versions
-from reports.run.tasks import Check, Means, RunPlan, engine_key
-from reports.run.trajectories import from_trail, packed
-from reports.run.worker_process import Failure
-from reports.terminal.foreign_text import put_bytes
-from scenarios.model import Scenario
+from crosscheck2d.adapters.conformance.conform import Finding, not_probed
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.run.archive import trajectory_file
+from crosscheck2d.reports.run.cells import Cell, content_key, digest, scene_hash
+from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.known_answers import KnownAnswer
+from crosscheck2d.reports.run.playing import CellResult, source_and_versions
+from crosscheck2d.reports.run.tasks import Check, Means, RunPlan, engine_key
+from crosscheck2d.reports.run.trajectories import from_trail, packed
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.terminal.foreign_text import put_bytes
+from crosscheck2d.scenarios.model import Scenario
 
 Status = tuple[str, str, str]  # a task in words, its status, the reason of a failure
 

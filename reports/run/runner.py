@@ -17,12 +17,12 @@ from typing import Any
 
 import psutil
 
-from adapters import system
-from adapters.system import most_files
-from reports.run.portable_worker import PortableWorker
-from reports.run.worker import Worker
-from reports.run.worker_process import Failure
-from reports.terminal.exits import say
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.system import most_files
+from crosscheck2d.reports.run.portable_worker import PortableWorker
+from crosscheck2d.reports.run.worker import Worker
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.terminal.exits import say
 
 ATTEMPTS = 3  # of a task whose worker is killed from outside
 

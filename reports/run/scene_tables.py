@@ -19,18 +19,24 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.run import Run
-from reports.compare.against import TRUTH
-from reports.compare.comparison import Comparison, compare
-from reports.compare.table import status_row, table_of
-from reports.compare.view import NOT_JUDGED
-from reports.run.answers import ExactAnswer, answer_here, no_answer, put_answer, read_answer
-from reports.run.archive import Archive, archived_run, as_found
-from reports.run.cells import Cell, digest, versions
-from reports.run.scenes import Records, scenario_of
-from reports.run.worker_process import Failure, allow
-from reports.terminal.foreign_text import put_bytes
-from scenarios.regular import all_of
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.against import TRUTH
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.table import status_row, table_of
+from crosscheck2d.reports.compare.view import NOT_JUDGED
+from crosscheck2d.reports.run.answers import (
+    ExactAnswer,
+    answer_here,
+    no_answer,
+    put_answer,
+    read_answer,
+)
+from crosscheck2d.reports.run.archive import Archive, archived_run, as_found
+from crosscheck2d.reports.run.cells import Cell, digest, versions
+from crosscheck2d.reports.run.scenes import Records, scenario_of
+from crosscheck2d.reports.run.worker_process import Failure, allow
+from crosscheck2d.reports.terminal.foreign_text import put_bytes
+from crosscheck2d.scenarios.regular import all_of
 
 # The source that decides the numbers of a scene table; the patterns reach into subfolders.
 JUDGE_SOURCE = ("reports/compare/**/*.py", "scenarios/**/*.py")

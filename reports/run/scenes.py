@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from reports.run.archive import stored_scene
-from reports.run.cells import scene_hash
-from reports.terminal.exits import Unusable
-from scenarios.catalogue import SCENARIOS
-from scenarios.catalogue import scenario as from_catalogue
-from scenarios.files.scene_file import read_scene_file
-from scenarios.files.tables import MOST_STEPS
-from scenarios.model import Scenario
+from crosscheck2d.reports.run.archive import stored_scene
+from crosscheck2d.reports.run.cells import scene_hash
+from crosscheck2d.reports.terminal.exits import Unusable
+from crosscheck2d.scenarios.catalogue import SCENARIOS
+from crosscheck2d.scenarios.catalogue import scenario as from_catalogue
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.files.tables import MOST_STEPS
+from crosscheck2d.scenarios.model import Scenario
 
 Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
 

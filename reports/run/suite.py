@@ -11,23 +11,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reports.run.archive import Archive, stored_scene
-from reports.run.cells import Cell, scene_hash
-from reports.run.folders import RUN
-from reports.run.journal import Journal, plain
-from reports.run.known_answers import KnownAnswer
-from reports.run.made import writing
-from reports.run.playing import CellResult
-from reports.run.results import keep_cell, keep_check, keep_known_answer, keep_probes
-from reports.run.runner import run_all
-from reports.run.scene_tables import SceneTasks
-from reports.run.tasks import Checking, Means, RunPlan, finished_tasks, tasks_of
-from reports.run.timing_pass import Pass, cells_to_time, is_timed
-from reports.run.worker_process import Failure
-from reports.terminal.foreign_text import put_text
-from reports.terminal.progress import Progress
-from scenarios.files.scene_file import scene_text
-from scenarios.model import Scenario
+from crosscheck2d.reports.run.archive import Archive, stored_scene
+from crosscheck2d.reports.run.cells import Cell, scene_hash
+from crosscheck2d.reports.run.folders import RUN
+from crosscheck2d.reports.run.journal import Journal, plain
+from crosscheck2d.reports.run.known_answers import KnownAnswer
+from crosscheck2d.reports.run.made import writing
+from crosscheck2d.reports.run.playing import CellResult
+from crosscheck2d.reports.run.results import keep_cell, keep_check, keep_known_answer, keep_probes
+from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.scene_tables import SceneTasks
+from crosscheck2d.reports.run.tasks import Checking, Means, RunPlan, finished_tasks, tasks_of
+from crosscheck2d.reports.run.timing_pass import Pass, cells_to_time, is_timed
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.files.scene_file import scene_text
+from crosscheck2d.scenarios.model import Scenario
 
 
 def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:

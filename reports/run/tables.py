@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.compare.against import ITSELF
-from reports.compare.comparison import Comparison
-from reports.run.answers import ExactAnswer, read_answer
-from reports.run.archive import Archive, archived_run
-from reports.run.cells import digest
-from reports.run.folders import RUN
-from reports.run.journal import JOURNAL
-from reports.run.runner import run_all
-from reports.run.scene_tables import (
+from crosscheck2d.reports.compare.against import ITSELF
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.run.answers import ExactAnswer, read_answer
+from crosscheck2d.reports.run.archive import Archive, archived_run
+from crosscheck2d.reports.run.cells import digest
+from crosscheck2d.reports.run.folders import RUN
+from crosscheck2d.reports.run.journal import JOURNAL
+from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.scene_tables import (
     ANSWER,
     PATHS,
     SceneTasks,
@@ -35,14 +35,14 @@ from reports.run.scene_tables import (
     rows_not_judged,
     scene_table_file,
 )
-from reports.run.scenes import Records, scenario_of
-from reports.run.timing_pass import TABLE, timings
-from reports.run.worker_process import Failure
-from reports.terminal.exits import say as warn
-from reports.terminal.foreign_text import encoded, is_part, put_text, whole
-from scenarios.model import Scenario
-from scenarios.no_truth import answered
-from scenarios.regular import all_of
+from crosscheck2d.reports.run.scenes import Records, scenario_of
+from crosscheck2d.reports.run.timing_pass import TABLE, timings
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.terminal.exits import say as warn
+from crosscheck2d.reports.terminal.foreign_text import encoded, is_part, put_text, whole
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.no_truth import answered
+from crosscheck2d.scenarios.regular import all_of
 
 TABLES = ("deviations.csv", "runs.csv", TABLE)
 

@@ -10,16 +10,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from adapters.engine_row import EngineRow
-from adapters.engines import told_apart
-from reports.run.archive import Archive
-from reports.run.cells import Cell, content_key, scene_hash
-from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE
-from reports.run.machine import about
-from reports.run.playing import conform_here, play_here
-from reports.run.runner import TIMEOUT
-from reports.run.scenes import open_scene, with_steps
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import told_apart
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.cells import Cell, content_key, scene_hash
+from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.playing import conform_here, play_here
+from crosscheck2d.reports.run.runner import TIMEOUT
+from crosscheck2d.reports.run.scenes import open_scene, with_steps
+from crosscheck2d.scenarios.model import Scenario
 
 
 class Check(NamedTuple):

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from reports.run.archive import Archive
-from reports.run.stepping import (
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.stepping import (
     CALL,
     EMPTY,
     READ,
@@ -23,9 +23,9 @@ from reports.run.stepping import (
     binding_of,
     overheads,
 )
-from reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
-from reports.run.worker_process import allow
-from scenarios.model import Scenario
+from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
+from crosscheck2d.reports.run.worker_process import allow
+from crosscheck2d.scenarios.model import Scenario
 
 ROUNDS = 9  # rounds at most, without the warm-up
 SCENES = (

@@ -9,8 +9,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
-from scenarios.regular import opened
+from crosscheck2d.scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+from crosscheck2d.scenarios.regular import opened
 
 STATE = ("position", "velocity", "angle", "angular_velocity")
 COLLISIONS = {

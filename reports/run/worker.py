@@ -16,16 +16,16 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from adapters import system
-from adapters.safe_path import path_of_this, python
-from reports.run.worker_process import CLOCK, Failure, out_of_memory
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.safe_path import path_of_this, python
+from crosscheck2d.reports.run.worker_process import CLOCK, Failure, out_of_memory
 
 # s for Python to start and to import the modules of a task, on a busy machine
 STARTING = 120.0
 OUTSIDE = {system.KILLED, system.TERMINATED, 0}  # signals that a fault of an engine does not cause
 # bytes kept of the output of a task: faulthandler writes up to 100 lines a thread
 PRINTED = 65536
-WORK = "from reports.run.worker_process import main; main(sys.argv[1:])"
+WORK = "from crosscheck2d.reports.run.worker_process import main; main(sys.argv[1:])"
 # the calls that wait for what a solver's file answers
 ASKING = ("own_solver/process.py", "adapters/system.py")
 # of the thread that got the signal, which is the one that plays; other threads only watch

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from adapters import system
+from crosscheck2d.adapters import system
 
 CLOCK = b"clock "  # marks a number of s; no pickle begins with it
 LONGEST = 1e6  # s, of a task that only ends with the run

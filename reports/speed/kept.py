@@ -7,8 +7,8 @@ import json
 import os
 from typing import Any
 
-from reports.run.folders import may_go_on
-from reports.run.journal import Journal, lines_of, plain
+from crosscheck2d.reports.run.folders import may_go_on
+from crosscheck2d.reports.run.journal import Journal, lines_of, plain
 
 LINES = {"header": (), "task": ("result",)}
 """The kinds of lines of the journal -> what they hold: the measurement that was asked for; a task,

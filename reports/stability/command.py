@@ -12,18 +12,24 @@ from typing import NoReturn
 
 import pandas as pd
 
-from adapters.engines import ENGINES, FETCHED, OWN, row_of
-from reports.run.arguments import checked_engines, opening, unknown
-from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
-from reports.run.journal import Journal
-from reports.run.made import FolderKind, writing
-from reports.run.runner import affordable
-from reports.stability.cases import CASES
-from reports.stability.limits import Limit
-from reports.stability.maps import MAPS
-from reports.stability.overview import in_words
-from reports.stability.page import write_page
-from reports.stability.results import (
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, row_of
+from crosscheck2d.reports.run.arguments import checked_engines, opening, unknown
+from crosscheck2d.reports.run.folders import (
+    given_back,
+    may_go_on,
+    open_part,
+    place_of,
+    replace_folder,
+)
+from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.made import FolderKind, writing
+from crosscheck2d.reports.run.runner import affordable
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import Limit
+from crosscheck2d.reports.stability.maps import MAPS
+from crosscheck2d.reports.stability.overview import in_words
+from crosscheck2d.reports.stability.page import write_page
+from crosscheck2d.reports.stability.results import (
     StabilityPlan,
     StabilityResults,
     Task,
@@ -34,15 +40,15 @@ from reports.stability.results import (
     table,
     tasks_of,
 )
-from reports.stability.touching import TOUCHING, AtGap
-from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
-from reports.stability.vary import VARIES, cannot_vary
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
-from reports.terminal.foreign_text import put_text
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table, print_texts
-from scenarios.files.scene_file import SceneFileError, read_scene_file
+from crosscheck2d.reports.stability.touching import TOUCHING, AtGap
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
+from crosscheck2d.reports.stability.vary import VARIES, cannot_vary
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table, print_texts
+from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
 
 SEE = (
     "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"

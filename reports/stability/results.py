@@ -16,25 +16,25 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED, OWN
-from adapters.npm_packages import version_of
-from reports.run.journal import Journal, lines_of, of_another_version, plain, unusable
-from reports.run.machine import about
-from reports.run.made import digest_of, writing
-from reports.run.runner import run_all
-from reports.run.worker_process import Failure
-from reports.stability.cases import CASES
-from reports.stability.explain import explained, with_replays
-from reports.stability.failures import keep_failure
-from reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
-from reports.stability.maps import MAPS, MapOf, map_of
-from reports.stability.search import LimitSearch
-from reports.stability.touching import TOUCHING, LawOf, law_of
-from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
-from reports.stability.vary import case_of_file
-from reports.terminal.foreign_text import put_text
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.npm_packages import version_of
+from crosscheck2d.reports.run.journal import Journal, lines_of, of_another_version, plain, unusable
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.made import digest_of, writing
+from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.explain import explained, with_replays
+from crosscheck2d.reports.stability.failures import keep_failure
+from crosscheck2d.reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
+from crosscheck2d.reports.stability.maps import MAPS, MapOf, map_of
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.touching import TOUCHING, LawOf, law_of
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
+from crosscheck2d.reports.stability.vary import case_of_file
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.progress import Progress
 
 COLUMNS = (
     "engine",

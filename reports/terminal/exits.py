@@ -13,8 +13,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from adapters.system import REPEATED, every, signals_wait
-from reports.terminal.foreign_text import legible
+from crosscheck2d.adapters.system import REPEATED, every, signals_wait
+from crosscheck2d.reports.terminal.foreign_text import legible
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 STATUS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}

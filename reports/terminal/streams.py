@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from reports.terminal.exits import DONE, FAILED, say
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, say
 
 
 class Outlet(io.FileIO):

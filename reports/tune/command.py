@@ -10,15 +10,23 @@ from typing import NoReturn
 
 import pandas as pd
 
-from reports.run.arguments import opening, unknown
-from reports.run.folders import made_anew, place_of
-from reports.run.made import FolderKind, may_replace, writing
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, broken_off, refuse
-from reports.terminal.foreign_text import put_text
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table
-from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, UNASKED, SettingsSearch
+from crosscheck2d.reports.run.arguments import opening, unknown
+from crosscheck2d.reports.run.folders import made_anew, place_of
+from crosscheck2d.reports.run.made import FolderKind, may_replace, writing
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, broken_off, refuse
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table
+from crosscheck2d.reports.tune.search import (
+    BETTER,
+    BREAKS,
+    CHOSEN,
+    NO_BETTER,
+    TUNED,
+    UNASKED,
+    SettingsSearch,
+)
 
 NAME = "matched.csv"
 TUNE = FolderKind("crosscheck tune")

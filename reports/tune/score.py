@@ -4,7 +4,7 @@ of its settings.
 The bounds are the same for every engine, and absolute. A run gets worse where
 
 - it fails or is refused, and was played before;
-- a verdict (`reports.compare.verdicts`) fails that did not, or is above its bound by one bound more
+- a verdict (`crosscheck2d.reports.compare.verdicts`) fails that did not, or is above its bound by one bound more
   than before;
 - a collision is missed where none was, or spurious, or more than one more than before.
 
@@ -25,15 +25,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.advance import advance
-from adapters.engine import Engine
-from adapters.engine_row import FLOAT32
-from adapters.javascript.engine import JavaScriptEngine
-from adapters.play import play_once
-from reports.compare.collisions import match
-from reports.compare.verdicts import VERDICTS, verdicts
-from scenarios.families.tuning import FAMILIES, LADDER, one_of
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.advance import advance
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engine_row import FLOAT32
+from crosscheck2d.adapters.javascript.engine import JavaScriptEngine
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.collisions import match
+from crosscheck2d.reports.compare.verdicts import VERDICTS, verdicts
+from crosscheck2d.scenarios.families.tuning import FAMILIES, LADDER, one_of
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 FLOOR = 1e-6  # radii: below the finest accuracy that any page asks for, an error is as good as none
 MOST_OF_A_FAMILY = 1 / 3  # of its runs, fewer than which may get worse

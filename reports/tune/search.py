@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.conformance.conform import conform
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED
-from adapters.matched import Searched
-from reports.tune.score import (
+from crosscheck2d.adapters.conformance.conform import conform
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.matched import Searched
+from crosscheck2d.reports.tune.score import (
     FAILED,
     HARMS,
     Against,
@@ -26,7 +26,7 @@ from reports.tune.score import (
     measured,
     posed,
 )
-from scenarios.families.tuning import FAMILIES
+from crosscheck2d.scenarios.families.tuning import FAMILIES
 
 SEEDS = (0, 1, 2, 3)
 # times the error: what gains less is kept as it is, as costs are known to some percent only

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from platformdirs import user_cache_path
 
-from scenarios.model import Scenario, frozen
-from scenarios.regular import opened
+from crosscheck2d.scenarios.model import Scenario, frozen
+from crosscheck2d.scenarios.regular import opened
 
 HERE = Path(__file__).parent
 ARRAYS = {"legs": 15, "events": 5, "outcomes": 4, "orders": 3}

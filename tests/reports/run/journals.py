@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from reports.run.journal import JOURNAL, written
+from crosscheck2d.reports.run.journal import JOURNAL, written
 
 
 def contents(folder: Path) -> list[dict[str, Any]]:

@@ -3,15 +3,15 @@ second or two."""
 
 from pathlib import Path
 
-from adapters.conformance.conform import Finding
-from adapters.engines import ENGINES
-from reports.run.cells import Cell, scene_hash
-from reports.run.folders import RUN, open_new, part_of, replace_folder
-from reports.run.known_answers import KNOWN_ANSWERS
-from reports.run.playing import play_here
-from reports.run.results import keep_cell, keep_known_answer, keep_probes
-from reports.run.suite import begin
-from reports.run.tasks import Means, RunPlan, tasks_of
+from crosscheck2d.adapters.conformance.conform import Finding
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run.cells import Cell, scene_hash
+from crosscheck2d.reports.run.folders import RUN, open_new, part_of, replace_folder
+from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS
+from crosscheck2d.reports.run.playing import play_here
+from crosscheck2d.reports.run.results import keep_cell, keep_known_answer, keep_probes
+from crosscheck2d.reports.run.suite import begin
+from crosscheck2d.reports.run.tasks import Means, RunPlan, tasks_of
 
 PLAYED = ("pymunk:shipped", "pymunk:matched")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from reports.run import folders
+from crosscheck2d.reports.run import folders
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 
 # 24 cells of ms

@@ -12,18 +12,18 @@ from statistics import median
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from reports.commands.diff import show_difference
-from reports.lessons.catalogue import LESSONS
-from reports.page.report import make_report
-from reports.run import suite
-from reports.run.cells import digest
-from reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
-from reports.run.journal import Journal
-from reports.run.suite import carry_out
-from reports.run.tables import seal_of
-from reports.run.tasks import Means, RunPlan
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.commands.diff import show_difference
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page.report import make_report
+from crosscheck2d.reports.run import suite
+from crosscheck2d.reports.run.cells import digest
+from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
+from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.tables import seal_of
+from crosscheck2d.reports.run.tasks import Means, RunPlan
+from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.journals import contents, put
 
 PLAN = RunPlan(
@@ -131,7 +131,7 @@ def test_runs_without_a_common_cell_are_not_said_to_have_got_worse(
 ):
     """Exit 1: the comparison that was asked for cannot be made."""
     nothing = replace(difference(before, after), shared=0)
-    monkeypatch.setattr("reports.commands.diff.difference", lambda *_: nothing)
+    monkeypatch.setattr("crosscheck2d.reports.commands.diff.difference", lambda *_: nothing)
 
     with pytest.raises(SystemExit) as end:
         show_difference(before, after)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.archive import Archive
+from crosscheck2d.reports.run.archive import Archive
 from tests.reports.run.sweeps import SMALL, assert_nothing_lost, lines, undisturbed
 from tests.reports.terminal.command_line import crosscheck
 

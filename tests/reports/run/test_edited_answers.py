@@ -16,9 +16,9 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from reports.run.answers import ExactAnswer, put_answer, read_answer, record_of
-from scenarios.catalogue import scenario
-from scenarios.truth.cache import has_valid_types
+from crosscheck2d.reports.run.answers import ExactAnswer, put_answer, read_answer, record_of
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.truth.cache import has_valid_types
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 

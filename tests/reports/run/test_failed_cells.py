@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.archive import Archive
-from reports.run.journal import Journal
-from reports.run.suite import carry_out
-from reports.run.tasks import Means, RunPlan
-from reports.terminal.progress import Progress
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.tasks import Means, RunPlan
+from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.control_engines import CONTROLS, FATAL, Controlled, row
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT

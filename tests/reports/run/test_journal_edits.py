@@ -14,20 +14,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.engines import row_of
-from reports.run.archive import LINES, Archive
-from reports.run.journal import JOURNAL, Journal, end_of, written
-from reports.run.machine import about
-from reports.run.made import digest_of, read_made
-from reports.speed import budget, cheapest
-from reports.speed.kept import TEXT, Kept
-from reports.speed.measure import in_turns, scene_rows
-from reports.speed.plan import PLAIN, SCENE, Measurement
-from reports.stability.limits import Limit
-from reports.stability.maps import MAPS, MapOf
-from reports.stability.results import Task, found_limit, journalled
-from reports.stability.touching import law_of
-from reports.terminal.exits import FolderTaken
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.reports.run.archive import LINES, Archive
+from crosscheck2d.reports.run.journal import JOURNAL, Journal, end_of, written
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.made import digest_of, read_made
+from crosscheck2d.reports.speed import budget, cheapest
+from crosscheck2d.reports.speed.kept import TEXT, Kept
+from crosscheck2d.reports.speed.measure import in_turns, scene_rows
+from crosscheck2d.reports.speed.plan import PLAIN, SCENE, Measurement
+from crosscheck2d.reports.stability.limits import Limit
+from crosscheck2d.reports.stability.maps import MAPS, MapOf
+from crosscheck2d.reports.stability.results import Task, found_limit, journalled
+from crosscheck2d.reports.stability.touching import law_of
+from crosscheck2d.reports.terminal.exits import FolderTaken
 from tests.reports.run.journals import contents, put
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import crosscheck

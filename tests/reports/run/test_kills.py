@@ -86,7 +86,7 @@ def test_a_run_that_is_signalled_to_stop_keeps_what_was_played_and_says_how_to_g
 
 def children_of(parent: int) -> list[int]:
     """The worker processes of a run."""
-    workers = ["pgrep", "-P", str(parent), "-f", "reports.run.worker_process"]
+    workers = ["pgrep", "-P", str(parent), "-f", "crosscheck2d.reports.run.worker_process"]
     found = subprocess.run(workers, capture_output=True, text=True)
     return [int(pid) for pid in found.stdout.split()]
 

@@ -19,21 +19,21 @@ from typing import Any
 
 import pytest
 
-from adapters import safe_path
-from adapters.engine import NotStarted
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import WORK
-from adapters.own_solver.worker import HERE, MEMORY
-from adapters.play import play
-from adapters.safe_path import python
-from reports.run import runner, worker
-from reports.run.archive import Archive
-from reports.run.cells import Cell
-from reports.run.playing import play_here
-from reports.run.runner import LEAST_MEMORY, affordable, run_all
-from reports.run.worker_process import Failure
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters import safe_path
+from crosscheck2d.adapters.engine import NotStarted
+from crosscheck2d.adapters.own_engine.engine import row_of_file
+from crosscheck2d.adapters.own_solver.file import read_solver
+from crosscheck2d.adapters.own_solver.process import WORK
+from crosscheck2d.adapters.own_solver.worker import HERE, MEMORY
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.safe_path import python
+from crosscheck2d.reports.run import runner, worker
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.playing import play_here
+from crosscheck2d.reports.run.runner import LEAST_MEMORY, affordable, run_all
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.run.journals import contents, put
 from tests.reports.run.sweeps import SMALL, lines, undisturbed
 from tests.reports.terminal.command_line import crosscheck

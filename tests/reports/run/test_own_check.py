@@ -10,14 +10,14 @@ from typing import cast
 
 import pytest
 
-from adapters.own_engine.engine import row_of_file
-from reports.check.verdict import check_file
-from reports.commands.own_solvers import checked, checks_of, lines
-from reports.run.archive import LINES
-from reports.run.journal import JOURNAL, Journal
-from reports.run.results import keep_check
-from reports.run.tasks import Check, RunPlan
-from reports.run.worker_process import Failure
+from crosscheck2d.adapters.own_engine.engine import row_of_file
+from crosscheck2d.reports.check.verdict import check_file
+from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
+from crosscheck2d.reports.run.archive import LINES
+from crosscheck2d.reports.run.journal import JOURNAL, Journal
+from crosscheck2d.reports.run.results import keep_check
+from crosscheck2d.reports.run.tasks import Check, RunPlan
+from crosscheck2d.reports.run.worker_process import Failure
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import MUTANTS
 

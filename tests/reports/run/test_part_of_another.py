@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.folders import RUN, found, part_of, replace_folder
-from reports.run.made import put_made, read_made
-from reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.run.folders import RUN, found, part_of, replace_folder
+from crosscheck2d.reports.run.made import put_made, read_made
+from crosscheck2d.reports.terminal.exits import FolderTaken
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import crosscheck
 from tests.reports.terminal.test_strangers import COMMANDS, SCENE, all_of

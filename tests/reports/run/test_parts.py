@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from reports.commands.run import what_is_kept
-from reports.run.folders import RUN, begun, part_of
-from reports.run.journal import JOURNAL
+from crosscheck2d.reports.commands.run import what_is_kept
+from crosscheck2d.reports.run.folders import RUN, begun, part_of
+from crosscheck2d.reports.run.journal import JOURNAL
 from tests.reports.run.journals import contents, put
 from tests.reports.terminal.command_line import crosscheck
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from reports.run.folders import part_of, reopened
-from reports.run.journal import Journal
+from crosscheck2d.reports.run.folders import part_of, reopened
+from crosscheck2d.reports.run.journal import Journal
 from tests.reports.terminal.command_line import crosscheck
 
 QUICK = ("head_on_equal_e09", "--engine", "reference:exercise")

@@ -7,8 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.run.archive import Archive
-from reports.run.journal import Journal
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.journal import Journal
 from tests.reports.run.sweeps import SMALL, assert_nothing_lost, broken_off, lines, undisturbed
 from tests.reports.terminal.command_line import crosscheck
 

@@ -11,15 +11,15 @@ from unittest import mock
 
 import pytest
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES
-from reports.run import playing, worker
-from reports.run.cells import Cell
-from reports.run.playing import CellResult, play_cell, play_here
-from reports.run.runner import NoScheduler, cluster, run_all
-from reports.run.trajectories import from_trail, load_trajectory, packed
-from reports.run.worker_process import Failure
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import playing, worker
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.playing import CellResult, play_cell, play_here
+from crosscheck2d.reports.run.runner import NoScheduler, cluster, run_all
+from crosscheck2d.reports.run.trajectories import from_trail, load_trajectory, packed
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.forks import FRESH, Forked
 from tests.reports.run.control_engines import (
     CONTROLS,
@@ -143,7 +143,7 @@ def impatient(*words: Any) -> CellResult:
 def test_a_worker_imports_no_tables_and_no_compiler_to_play_a_cell():
     """A worker starts in half of the time without them."""
     code = (
-        "import sys, reports.run.playing\nprint([name for name in ('pandas', 'pydantic', 'numba')"
+        "import sys, crosscheck2d.reports.run.playing\nprint([name for name in ('pandas', 'pydantic', 'numba')"
         " if name in sys.modules])"
     )
 

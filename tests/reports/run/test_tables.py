@@ -13,13 +13,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from reports.run import cells, scene_tables, tables
-from reports.run.answers import answer_here, answer_of, no_answer, put_answer, read_answer
-from reports.run.archive import Archive
-from reports.run.cells import ROOT, Cell
-from reports.run.journal import JOURNAL, Journal
-from reports.run.scene_tables import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import cells, scene_tables, tables
+from crosscheck2d.reports.run.answers import (
+    answer_here,
+    answer_of,
+    no_answer,
+    put_answer,
+    read_answer,
+)
+from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.cells import ROOT, Cell
+from crosscheck2d.reports.run.journal import JOURNAL, Journal
+from crosscheck2d.reports.run.scene_tables import (
     ANSWER,
     JUDGE_SOURCE,
     SceneTable,
@@ -29,13 +35,13 @@ from reports.run.scene_tables import (
     name_of,
     scene_table_of,
 )
-from reports.run.suite import carry_out
-from reports.run.tables import comparisons_of, make_tables
-from reports.run.tasks import Means, RunPlan
-from reports.run.worker_process import Failure
-from reports.terminal.progress import Progress
-from scenarios.catalogue import scenario
-from scenarios.truth import cache
+from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.tables import comparisons_of, make_tables
+from crosscheck2d.reports.run.tasks import Means, RunPlan
+from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.truth import cache
 
 
 @pytest.fixture(scope="module")
@@ -286,8 +292,8 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
 
     assert JUDGE_SOURCE[0].startswith("reports/compare/")
     assert {name for name in imported if name.startswith("reports")} <= {
-        "reports.compare",
-        *(f"reports.compare.{path.stem}" for path in folder.rglob("*.py")),
+        "crosscheck2d.reports.compare",
+        *(f"crosscheck2d.reports.compare.{path.stem}" for path in folder.rglob("*.py")),
     }
 
 

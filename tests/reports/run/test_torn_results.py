@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.run.archive import Archive, trajectory_file
-from reports.run.journal import JOURNAL
+from crosscheck2d.reports.run.archive import Archive, trajectory_file
+from crosscheck2d.reports.run.journal import JOURNAL
 from tests.reports.run.small_runs import make
 from tests.reports.terminal.command_line import crosscheck
 
@@ -158,7 +158,7 @@ def test_a_file_that_diff_cannot_read_is_named(
     def refused(*_: object) -> None:
         raise PermissionError(13, "Permission denied", str(torn / JOURNAL))
 
-    monkeypatch.setattr("reports.commands.diff.difference", refused)
+    monkeypatch.setattr("crosscheck2d.reports.commands.diff.difference", refused)
     done = crosscheck("diff", whole, torn, cwd=torn.parent)
 
     assert (done.returncode, done.stderr) == (2, f"{torn / JOURNAL}: Permission denied\n")

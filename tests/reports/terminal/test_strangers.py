@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from reports.commands import run as run_command
-from reports.run.folders import RUN, begun, made_anew, replace_folder
-from reports.run.made import (
+from crosscheck2d.reports.commands import run as run_command
+from crosscheck2d.reports.run.folders import RUN, begun, made_anew, replace_folder
+from crosscheck2d.reports.run.made import (
     MADE,
     FolderKind,
     Made,
@@ -27,8 +27,8 @@ from reports.run.made import (
     read_made,
     writing,
 )
-from reports.terminal.exits import FolderTaken
-from reports.terminal.foreign_text import put_text, whole
+from crosscheck2d.reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.terminal.foreign_text import put_text, whole
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
 pytestmark = pytest.mark.slow  # each is a command with a folder of its own

@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adapters.engines import changed
-from adapters.matched import chosen, searched
-from adapters.npm_packages import missing
-from adapters.pymunk import MATCHED as PYMUNK
-from reports.compare.view import cut
-from reports.tune.score import (
+from crosscheck2d.adapters.engines import changed
+from crosscheck2d.adapters.matched import chosen, searched
+from crosscheck2d.adapters.npm_packages import missing
+from crosscheck2d.adapters.pymunk import MATCHED as PYMUNK
+from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.tune.score import (
     FLOOR,
     HARMS,
     TrialScores,
@@ -25,7 +25,7 @@ from reports.tune.score import (
     of_run,
     posed,
 )
-from reports.tune.search import (
+from crosscheck2d.reports.tune.search import (
     BETTER,
     CHOSEN,
     COLUMNS,
@@ -36,8 +36,8 @@ from reports.tune.search import (
     searched_of,
     shown,
 )
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.families.tuning import (
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.families.tuning import (
     FAMILIES,
     LADDER,
     LEAST_GAP,
@@ -45,7 +45,7 @@ from scenarios.families.tuning import (
     one_of,
     tuning,
 )
-from scenarios.model import Array, Collisions, Scenario
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario
 
 FRESH = (4, 5, 6, 7)
 
@@ -258,7 +258,7 @@ def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.Monk
     nothing."""
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
-    monkeypatch.setattr("reports.tune.search.searched_of", lambda _: slop)
+    monkeypatch.setattr("crosscheck2d.reports.tune.search.searched_of", lambda _: slop)
     search = SettingsSearch("pymunk", ("column", "landing"), say=lambda _: None)
     table = search.run()
 
