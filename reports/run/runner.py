@@ -18,6 +18,7 @@ from typing import Any
 import psutil
 
 from crosscheck2d.adapters import system
+from crosscheck2d.adapters.library_versions import how_to_add
 from crosscheck2d.adapters.system import most_files
 from crosscheck2d.reports.run.portable_worker import PortableWorker
 from crosscheck2d.reports.run.worker import Worker
@@ -249,7 +250,7 @@ def cluster(scheduler: str) -> Any:
     except ImportError as missing:
         raise NoScheduler(
             f"--scheduler {scheduler}: it needs the package {missing.name}, which is not"
-            " installed; uv sync --extra cluster, or pip install crosscheck2d[cluster]"
+            f" installed: {how_to_add('cluster')}"
         ) from missing
     # important faults are raised; each logger of distributed has its own level
     for name in logging.root.manager.loggerDict:

@@ -143,8 +143,8 @@ def impatient(*words: Any) -> CellResult:
 def test_a_worker_imports_no_tables_and_no_compiler_to_play_a_cell():
     """A worker starts in half of the time without them."""
     code = (
-        "import sys, crosscheck2d.reports.run.playing\nprint([name for name in ('pandas', 'pydantic', 'numba')"
-        " if name in sys.modules])"
+        "import sys, crosscheck2d.reports.run.playing\n"
+        "print([name for name in ('pandas', 'pydantic', 'numba') if name in sys.modules])"
     )
 
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
