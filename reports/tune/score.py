@@ -4,8 +4,8 @@ of its settings.
 The bounds are the same for every engine, and absolute. A run gets worse where
 
 - it fails or is refused, and was played before;
-- a verdict (`crosscheck2d.reports.compare.verdicts`) fails that did not, or is above its bound by one bound more
-  than before;
+- a verdict (`reports/compare/verdicts.py`) fails that did not, or is above its bound by one bound
+  more than before;
 - a collision is missed where none was, or spurious, or more than one more than before.
 
 What a setting breaks, it breaks for every seed, at the coarsest step at least: in a third of the

@@ -611,8 +611,8 @@ def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
     """The second finds the place taken, and puts its own there whole."""
 
     def npm(_words, cwd, **_settings):
-        for package, played in pinned()["played"].items():
-            file = cwd / "node_modules" / package / played["file"]
+        for package, entry in pinned()["played"].items():
+            file = cwd / "node_modules" / package / entry["file"]
             file.parent.mkdir(parents=True)
             file.write_bytes(b"")
         shutil.copytree(cwd, packages.place(), dirs_exist_ok=True)

@@ -115,7 +115,8 @@ def row_claims(n: int, order: str, iterations: int) -> Iterator[Claim]:
         ),
     )
     yield Claim(
-        "In Box2D without CCD (+no_ccd) the first disk is thrown back and all others move on; the momentum is the same.",
+        "In Box2D without CCD (+no_ccd) the first disk is thrown back and all others move on; the"
+        " momentum is the same.",
         shared,
     )
     if order == "pair by pair":
