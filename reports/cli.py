@@ -191,14 +191,6 @@ def report(
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help="The folder of a run, finished or not.")
     ],
-    scenes: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="SCENE", help="With --print: scenes to print with the page."),
-    ] = None,
-    printed: Annotated[
-        bool,
-        typer.Option("--print", help="When the page is printed, add half a page for each SCENE."),
-    ] = False,
 ) -> None:
     """Write the tables and the page of a run again.
 
@@ -206,7 +198,7 @@ def report(
     """
     from crosscheck2d.reports.commands.report import report_again
 
-    report_again(out, scenes or [], printed)
+    report_again(out)
 
 
 @app.command()

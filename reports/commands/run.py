@@ -15,7 +15,6 @@ import psutil
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.reports.commands.own_solvers import checks_of
 from crosscheck2d.reports.commands.report import finish
-from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run.archive import Archive, stored_scene
 from crosscheck2d.reports.run.arguments import (
@@ -173,7 +172,7 @@ def carry_on(plan: RunPlan, means: Means, journal: Journal, out: Path, bits: boo
     try:
         with broken_off(part, partial(what_is_kept, out)), journal, Progress() as progress:
             carry_out(plan, means, journal, progress)
-            report = make_report(part, progress.say, LESSONS)
+            report = make_report(part, progress.say)
             if bits:
                 write_bits(part)
             journal.close()

@@ -215,8 +215,9 @@ def in_numbers(case: Case, trial: Trial, limit: Limit) -> dict[str, str]:
         limit.engine: f"{in_words(limit, case)}.",
     }
     if limit.verdict != NEVER_FAILS:
-        tested = f" Tested: {limit.tested}." if limit.tested else ""
-        source = f" Source: {limit.source}." if limit.source else ""
+        shown, its_source = (limit.cause.shown, limit.cause.source) if limit.cause else ("", "")
+        tested = f" Tested: {shown}." if shown else ""
+        source = f" Source: {its_source}." if its_source else ""
         facts["Why"] = f"{why(limit)}{tested}{source}"
     return facts
 
@@ -261,7 +262,8 @@ LIMITS = Lesson(
     <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a disk
     in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk against walls and
     static disks, and against moving disks only if it is marked as a <b>bullet</b>. As matched,
-    Box2D 2.3 has bullets only, and Box2D 3.1 none. A name with a + is an engine with one change: {"; ".join(CHANGES)}.
+    Box2D 2.3 has bullets only, and Box2D 3.1 none. A name with a + is an engine with one change:
+    {"; ".join(CHANGES)}.
     """,
     sliders=(
         Slider("case", "Case", tuple(SEEN)),

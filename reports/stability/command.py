@@ -4,7 +4,6 @@ stability.html."""
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import NoReturn
 
 import pandas as pd
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, row_of
+from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.run.arguments import checked_engines, opening, unknown
 from crosscheck2d.reports.run.folders import (
     given_back,
@@ -27,7 +26,7 @@ from crosscheck2d.reports.run.runner import affordable
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import Limit
 from crosscheck2d.reports.stability.maps import MAPS
-from crosscheck2d.reports.stability.overview import in_words
+from crosscheck2d.reports.stability.overview import MARKS, in_words
 from crosscheck2d.reports.stability.page import write_page
 from crosscheck2d.reports.stability.results import (
     StabilityPlan,
@@ -36,6 +35,7 @@ from crosscheck2d.reports.stability.results import (
     carry_out,
     case_named,
     done_before,
+    expected,
     read,
     table,
     tasks_of,
@@ -54,22 +54,8 @@ SEE = (
     "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"
     " --vary see --help"
 )
-MARKS = {
-    "–": "did not fail at any value tried",
-    "everywhere": "fails at every value",
-    "refused": "the engine does not play the scene",
-    "≤": "fails at this value and below, works above",
-    "≥": "fails at this value and above, works below",
-    "*": "works again at a harsher value, or also fails at the gentlest value",
-}
-"""Mark in the table of limits -> its meaning."""
 LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
-PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in [*ENGINES, *FETCHED])
-STABILITY = FolderKind(
-    "crosscheck stability",
-    rf"journal\.jsonl|trajectories/.+(\.({PLAYED_BY})|-own)[^/.]*\.npz",
-    ("trajectories",),
-)
+STABILITY = FolderKind("crosscheck stability", r"journal\.jsonl")
 
 
 def find_limits(
@@ -110,6 +96,8 @@ def find(plan: StabilityPlan, resume: bool, out: Path) -> NoReturn:
             done = gone_on_with(journal, plan, resume)
     part = journal.path.parent
     kept = f"The finished part is kept in {part}: ask again with --resume"
+    tasks = [task for task in tasks_of(plan) if task not in done]
+    Console(stderr=True).print(f"{expected(tasks, plan.workers)}.", highlight=False)
     with broken_off(part, lambda: kept), journal, Progress() as progress:
         carry_out(plan, journal, done, progress)
         progress.say("writing the tables and the page")
@@ -141,9 +129,9 @@ def write_files(folder: Path) -> StabilityResults:
         put_text(folder / LIMITS, table(results.limits).to_csv(index=False))
         columns = ["scene", "engine", *AtGap._fields[:-1]]
         put_text(folder / LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
-        columns = ["map", "engine", "x", "y", "reading", "failed", "event"]
+        columns = ["map", "engine", "x", "y", "reading", "failed", "verdict", "event"]
         put_text(folder / MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
-        write_page(folder / PAGE, folder, results)
+        write_page(folder / PAGE, results)
     return results
 
 

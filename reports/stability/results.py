@@ -26,36 +26,29 @@ from crosscheck2d.reports.run.runner import run_all
 from crosscheck2d.reports.run.worker_process import Failure
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
-from crosscheck2d.reports.stability.failures import keep_failure
-from crosscheck2d.reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
+from crosscheck2d.reports.stability.failures import with_failure
+from crosscheck2d.reports.stability.limits import (
+    FORMS,
+    FULL,
+    NEVER_WORKS,
+    Case,
+    Limit,
+    Trial,
+    engines_of,
+)
 from crosscheck2d.reports.stability.maps import MAPS, MapOf, map_of
 from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.touching import TOUCHING, LawOf, law_of
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from crosscheck2d.reports.stability.vary import case_of_file
+from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import put_text
 from crosscheck2d.reports.terminal.progress import Progress
 
 COLUMNS = (
-    "engine",
-    "profile",
-    "case",
-    "parameter",
-    "works_at",
-    "fails_at",
-    "unit",
-    "predicate",
-    "seeds",
-    "reason",
-    "verdict",
-    "failed_fraction",
-    "runs",
-    "monotone",
-    "spacing",
-    "tested",
-    "source",
-    "event",
-    "form",
+    *("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate"),
+    *("seeds", "reason", "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested"),
+    *("source", "event", "form", "cause"),
 )
 LINES = {
     "header": ("seed", "started", "versions", "machine", "form", "files"),
@@ -65,17 +58,26 @@ LINES = {
 """The kinds of lines of the journal -> what they hold: what was asked for, and the versions that
 played it; a `Task`, with a `Limit`, a `MapOf` or a `LawOf` under the name of its kind; how much was
 done."""
-TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one engine
-SLOWEST_FIRST = (
-    "long_gas",
-    "long_wrapped_gas",
-    "thermometer",
-    "fast_gas",
-    "dense_gas",
-    "pile_comes_to_rest",
-    "bounce_drift",
-    "equipartition",
-)
+# s of processor time that a search takes in the quick form, the mean of all engines (1200 searches
+# on one machine): of the cases that take longest, and of the mean of the others
+SECONDS = {
+    "thermometer": 6.8,
+    "equipartition": 3.7,
+    "overfull_box": 3.3,
+    "pile_comes_to_rest": 3.2,
+    "dt_gas_of_100": 2.0,
+    "bounce_drift": 1.4,
+    "dense_gas": 1.4,
+    "fast_gas": 0.9,
+    "stiff_force": 0.8,
+    "dt_falling_box": 0.7,
+    "dt_column_of_ten": 0.6,
+    "insertion_order": 0.6,
+}
+OTHERS = 0.16
+FULL_TIMES = 5  # the time of the full form over that of the quick one: 71 searches in both
+# the first in the full form, where they are the longest; in the quick form they are short
+LONGEST = ("long_gas", "long_wrapped_gas")
 
 
 @dataclass(frozen=True)
@@ -115,12 +117,11 @@ class Task:
     engine: str
     form: str
 
-    def __call__(self, folder: Path, added: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
-        """In the worker: do it, with the rows that the plan adds among the others; the first
-        failing run at the limit is saved."""
+    def __call__(self, added: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
+        """In the worker: do it, with the rows that the plan adds among the others."""
         with taking_part(added):
             if self.kind == "limit":
-                return found_limit(self, folder)
+                return found_limit(self)
             if self.kind == "law":
                 return law_of(self.name, self.engine)
             started = process_time()
@@ -132,12 +133,31 @@ def case_named(name: str) -> Case:
     return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
 
 
-def found_limit(task: Task, folder: Path) -> Limit:
-    """Search, and save the first failing run next to the limit."""
+def expected(tasks: Collection[Task], workers: int) -> str:
+    """What these tasks are, and about how long they take, as a sentence."""
+    searches = [task for task in tasks if task.kind == "limit"]
+    cases, engines = ({getattr(task, name) for task in searches} for name in ("name", "engine"))
+    seconds = sum(SECONDS.get(task.name, OTHERS) for task in tasks) / workers
+    parts = [
+        f"{counted(len(searches), 'search', 'searches')} ({counted(len(cases), 'case')},"
+        f" {counted(len(engines), 'engine')})",
+        counted(len(tasks) - len(searches), "other table"),
+    ]
+    times = FULL_TIMES if any(task.form == FULL.name for task in tasks) else 1
+    minutes = max(1, round(seconds * times / 60))
+    least = "at least" if times > 1 else "about"
+    return (
+        f"{' and '.join(parts if len(tasks) > len(searches) else parts[:1])}: {least}"
+        f" {counted(minutes, 'minute')} in {counted(workers, 'process', 'processes')}"
+    )
+
+
+def found_limit(task: Task) -> Limit:
+    """Search, and explain the first failing run at the limit."""
     started = process_time()
     search = LimitSearch(case_named(task.name), task.engine, FORMS[task.form])
     limit = with_replays(search, replace(search.limit(), case=task.name))
-    keep_failure(search, limit, folder)
+    limit = with_failure(search, limit)
     return replace(limit, seconds=process_time() - started)
 
 
@@ -146,7 +166,6 @@ def carry_out(
 ) -> None:
     """Do every task that is not in `done`; all results go into the journal's folder."""
     folder = journal.path.parent
-    (folder / "trajectories").mkdir(exist_ok=True)
     named = [*plan.cases, *(name for name in plan.added if name not in FETCHED)]
     paths = [name.rpartition(":")[0] for name in named]
     files = {path: digest_of(path) for path in paths if path}
@@ -156,10 +175,10 @@ def carry_out(
         put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
     wanted = tasks_of(plan)
     tasks: dict[Any, Callable[[], Any]] = {
-        task: partial(task, folder, plan.added) for task in wanted if task not in done
+        task: partial(task, plan.added) for task in wanted if task not in done
     }
     progress.start(len(tasks), len(wanted))
-    with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:
+    with closing(run_all(tasks, plan.workers, FORMS[plan.form].timeout)) as results:
         for task, result in results:
             reason = result.reason if isinstance(result, Failure) else ""
             result = failed(task, result) if isinstance(result, Failure) else result
@@ -183,8 +202,7 @@ def tasks_of(plan: StabilityPlan) -> list[Task]:
             for engine in engines_of(case_named(name), ENGINES)
             if engine.split("+")[0] in plan.engines
         ]
-    rank = {name: k for k, name in enumerate(SLOWEST_FIRST)}
-    return sorted(tasks, key=lambda task: rank.get(task.name, len(rank)))
+    return sorted(tasks, key=lambda task: (task.name not in LONGEST, -SECONDS.get(task.name, 0.0)))
 
 
 def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
@@ -226,10 +244,10 @@ def read(folder: Path) -> StabilityResults:
         return order.get(task.name, len(order)), task.name, engines.index(task.engine)
 
     ordered = [results[task] for task in sorted(results, key=place)]
-    limits = [one for one in ordered if isinstance(one, Limit)]
-    maps = [one for one in ordered if isinstance(one, MapOf)]
-    laws = [one for one in ordered if isinstance(one, LawOf)]
-    return StabilityResults(explained(limits), maps, laws, headers[-1])
+    limits = explained([result for result in ordered if isinstance(result, Limit)])
+    maps = [result for result in ordered if isinstance(result, MapOf)]
+    laws = [result for result in ordered if isinstance(result, LawOf)]
+    return StabilityResults(limits, maps, laws, headers[-1])
 
 
 def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
@@ -270,12 +288,10 @@ def engines_now() -> list[str]:
 
 def limit_from(record: dict[str, Any]) -> Limit:
     """The limit in a line of the journal, in which numbers that are not finite are text."""
-    trials = tuple(
-        Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"]
-    )
-    return Limit(
-        **record | floats(record, "works_at", "fails_at", "spacing", "seconds") | {"trials": trials}
-    )
+    trials = (Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
+    numbers = floats(record, "works_at", "fails_at", "spacing", "seconds", "ratio")
+    whole = {"trials": tuple(trials), "mechanisms": tuple(record["mechanisms"])}
+    return Limit(**record | numbers | whole)
 
 
 def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
@@ -310,6 +326,7 @@ def row_of(limit: Limit) -> dict[str, Any]:
     case = case_named(limit.case)
     failing = limit.failing if limit.status == "ok" else limit.trials[0]
     engine, profile = limit.engine.split(":")
+    cause = limit.cause
     return {
         "engine": engine,
         "profile": profile,
@@ -320,16 +337,17 @@ def row_of(limit: Limit) -> dict[str, Any]:
         "unit": case.unit,
         "predicate": failing.broken if failing else case.predicate.name,
         "seeds": max(trial.runs for trial in limit.trials),
-        "reason": limit.why,
+        "reason": cause.sentence if cause else "",
         "verdict": limit.verdict,
         "failed_fraction": failing.failed / failing.runs if failing else 0.0,
         "runs": limit.runs,
         "monotone": limit.monotone,
         "spacing": shortened(limit.spacing),
-        "tested": limit.tested,
-        "source": limit.source,
+        "tested": cause.shown if cause else "",
+        "source": cause.source if cause else "",
         "event": failing.event if failing else "",
         "form": limit.form,
+        "cause": str(cause.kind) if cause else "",
     }
 
 

@@ -77,15 +77,14 @@ def speed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def stability(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The journal of a search: a limit, a law, and a map whose readings are all alike."""
     place = tmp_path_factory.mktemp("stability")
-    (place / "trajectories").mkdir()
     one = MAPS["dt_and_speed"]
     tasks = [
         Task(kind, name, "pymunk:matched", "quick")
         for kind, name in (("limit", "spin"), ("law", "touching_break"), ("map", one.name))
     ]
-    cells = tuple((x, y, 0.1, False, "") for x, y in product(one.x, one.y))
+    cells = tuple((x, y, 0.1, False, "", "") for x, y in product(one.x, one.y))
     found = [
-        found_limit(tasks[0], place),
+        found_limit(tasks[0]),
         law_of(tasks[1].name, tasks[1].engine),
         MapOf(one.name, tasks[2].engine, cells),
     ]
@@ -260,9 +259,9 @@ def test_a_text_that_reads_nan_stays_a_text(speed: Path, stability: Path, tmp_pa
     again = resumed(put(tmp_path, lines))
     assert again[tuple(lines[1]["task"])][0]["reason"] == "nan"
     lines = contents(stability)
-    lines[1]["limit"]["source"] = "nan"
+    lines[1]["limit"]["settings"] = "nan"
     _, results = journalled(put(tmp_path, lines))
-    assert [one.source for one in results.values() if isinstance(one, Limit)] == ["nan"]
+    assert [one.settings for one in results.values() if isinstance(one, Limit)] == ["nan"]
 
 
 def test_every_column_of_text_is_known_and_no_other(speed: Path):
