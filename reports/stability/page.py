@@ -139,16 +139,16 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
         case, of_engine = case_named(name), {limit.engine: limit for limit in members}
         label = name if name in FAMILY_OF else Path(name).name
         kept = ", ".join(f"{symbol} {value}" for symbol, value in held(case).items())
-        notes = [
-            TableCell(text, css="soft") for text in (case.with_unit(case.parameter), kept) if text
-        ]
-        index.append(TableCell(label, title=case.question, notes=tuple(notes)))
+        note = TableCell(
+            "; ".join(filter(None, [case.with_unit(case.parameter), kept])), css="soft"
+        )
+        index.append(TableCell(label, title=case.question, notes=(note,)))
         rows.append([cell_of(case, of_engine.get(engine)) for engine in engines])
         groups.append(FAMILY_OF.get(name, "A scene of your own"))
         opens[label] = case_parts(case, members)
     heads = [TableCell(name.replace(":", ": "), title=name) for name in engines]
     frame = pd.DataFrame(rows, index=index, columns=heads, dtype=object)
-    css = "fixed limits" if len(engines) <= FITS else "plain limits"
+    css = "fixed" if len(engines) <= FITS else "plain"
     marks = "; ".join(f"{mark}: {meaning}" for mark, meaning in MARKS.items())
     says = (
         "Each cell shows the first value, from gentle to harsh, at which an engine fails: the"
