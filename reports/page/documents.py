@@ -21,8 +21,6 @@ from crosscheck2d.reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
-# replays; charts, drawn when they come into view, printed and saved
-CHARTED = (*ENGINE, "page/page.js", "page/paper.js", "page/scrolling.js")
 
 
 def render(
@@ -32,9 +30,7 @@ def render(
     scripts: Sequence[str] = (),
     styles: Sequence[str] = (),
     looks: Mapping[str, style.Look] = MappingProxyType({}),
-    plotly: bool = False,
     connects: bool = False,
-    sheet: str = "page/page.css",
     **fields: Any,
 ) -> str:
     """The page of `template`, which extends base.html.j2, as text; templates, scripts, styles:
@@ -43,14 +39,12 @@ def render(
     Args:
         generator: the command that makes it; it marks the file as one that may be overwritten.
         looks: name -> how it is drawn; `who` and `swatch` of macros.html.j2 show these names.
-        plotly: whether its charts need the library, which is then included, deflated.
         connects: whether its scripts may connect to the server of the page.
         fields: the other names of the template; a missing one raises `jinja2.UndefinedError`.
     """
     sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
-    library = [plotly_source()] if plotly else []
-    text = css(sheet) + "".join((REPORTS / each).read_text(encoding="utf-8") for each in styles)
-    policy = content_policy([*library, *sources]) + ("; connect-src 'self'" if connects else "")
+    text = css() + "".join((REPORTS / each).read_text(encoding="utf-8") for each in styles)
+    policy = content_policy(sources) + ("; connect-src 'self'" if connects else "")
     return fragment(
         template,
         generator=generator,
@@ -61,7 +55,6 @@ def render(
             {name: look._asdict() | {"path": look.path} for name, look in looks.items()}
         ),
         scripts=[Markup(source) for source in sources],
-        library="".join(map(deflated, library)),
         **fields,
     )
 
@@ -69,14 +62,6 @@ def render(
 def fragment(template: str, **fields: Any) -> str:
     """A template as text, filled with `fields`: a page, or a part of one."""
     return environment().get_template(template).render(**fields)
-
-
-def plotly_source() -> str:
-    """The whole library; imported here, because importing takes longer than making a page without
-    charts."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
 
 
 @cache
@@ -94,12 +79,12 @@ def environment() -> Environment:
     return made
 
 
-def css(sheet: str = "page/page.css") -> str:
+def css() -> str:
     """The style sheet of all pages with the colours of style.py in front, for light and for
     dark."""
     light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
     return f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
-        REPORTS / sheet
+        REPORTS / "page" / "kit.css"
     ).read_text(encoding="utf-8")
 
 

@@ -219,7 +219,6 @@ def render_page(page: Page) -> str:
     return render(
         "page/kit.html.j2",
         generator=page.generator,
-        sheet="page/kit.css",
         scripts=SCRIPTS,
         looks={**style.looks_of(page.names), **page.looks},
         page=page,
@@ -234,6 +233,7 @@ def run_section(about: Mapping[str, Any]) -> Section:
         "Seed": about.get("seed", ""),
         "Started": str(about.get("started", ""))[:16].replace("T", " "),
         "Machine": "; ".join(f"{key}: {value}" for key, value in about["machine"].items()),
+        "Engines": "; ".join(about.get("engines", ())),
         "Versions": ", ".join(f"{key} {value}" for key, value in about["versions"].items()),
     }
     facts = {key: str(value) for key, value in facts.items() if value != ""}

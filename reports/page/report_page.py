@@ -4,6 +4,7 @@ replay and its table. What most readers do not need is folded."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,9 +13,12 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
+from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.snippets import write_snippet
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.kit import (
+    Code,
     Page,
     Part,
     Section,
@@ -25,7 +29,7 @@ from crosscheck2d.reports.page.kit import (
     run_section,
 )
 from crosscheck2d.reports.page.links import neighbours
-from crosscheck2d.reports.page.own_solvers import Said
+from crosscheck2d.reports.page.own_solvers import Said, sourced
 from crosscheck2d.reports.page.scene_map import map_section, numbers, remarks, replay, title_of
 from crosscheck2d.reports.page.scenes import is_library, label, long_label
 from crosscheck2d.reports.page.summary import Summary, error_text, step_text
@@ -78,7 +82,7 @@ def report_page(
         *conformance_section(conformance),
         commands_section(),
         trust_section(summary, known_answers),
-        run_section(about),
+        run_section({**about, "engines": engine_versions(summary)}),
     ]
     return render_page(
         Page(
@@ -150,16 +154,7 @@ def engines_table(summary: Summary) -> Table:
 def check_section(name: str, said: Sequence[Said]) -> Section:
     """What `crosscheck check` says of a solver's file, with its lines and the formula."""
     path = name.removesuffix(OWN)
-    items = [
-        Markup("{}{}").format(
-            sentence,
-            Markup("").join(
-                Markup("<br><small>{}: <code>{}</code></small>").format(*line.split(": ", 1))
-                for line in shown
-            ),
-        )
-        for sentence, shown in said
-    ]
+    items = [sourced(sentence, lines) for sentence, lines in said]
     says = f"by crosscheck check {path}, which writes the smallest scene that shows each fault"
     return Section(path, says, [Text(items=items, ordered=len(items) > 1)], id="check")
 
@@ -183,12 +178,19 @@ def settings_section(summary: Summary) -> list[Section]:
             frame = frame[[len(set(map(str, row))) > 1 for row in frame.itertuples(index=False)]]
         note = f"{name.partition(':')[2]} is nearer in {nearer} scenes, farther in {farther}"
         table = Table(frame, css="plain text", corner=label(name))
-        parts.append(Section(label(name), note if len(of) > 1 else "", [table], folded=True))
+        code: list[Part] = []
+        with suppress(Unsupported, ImportError):  # a run of another machine
+            snippet = write_snippet(
+                name, scene.comparison.scenario.scene, scene.comparison.middle_dt
+            )
+            code = [Code(snippet)]
+        parts.append(Section(label(name), note if len(of) > 1 else "", [*code, table], folded=True))
     intro = Text(
         [
-            f"What each engine has in {title_of(scene)}, where its settings differ. The first table"
-            " has one profile for each library in all scenes, because a program runs with one: the"
-            " one that is nearer by more than a factor of 2 in more scenes."
+            f"The settings that each library has in {title_of(scene)}, as code to copy, and those"
+            " that differ between the profiles; adapters/README.md says why. The first table has"
+            " one profile for each library in all scenes, because a program runs with one: the one"
+            " that is nearer by more than a factor of 2 in more scenes."
         ]
     )
     says = "what matched means for each library"
@@ -215,6 +217,13 @@ def conformance_section(conformance: pd.DataFrame) -> list[Section]:
     says = f"{probes} probes before the scenes; {len(rows)} have an answer other than stated"
     table = Table(frame, css="plain text", corner="question")
     return [Section("Conformance", says, [table], folded=True, id="conformance")]
+
+
+def engine_versions(summary: Summary) -> list[str]:
+    """The libraries of each engine with their versions."""
+    runs = [run for scene in summary.scenes for run in scene.comparison.runs if run.versions]
+    found = {run.engine: ", ".join(map(" ".join, run.versions.items())) for run in runs}
+    return [f"{engine}: {versions}" for engine, versions in found.items()]
 
 
 def commands_section() -> Section:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from html import unescape
 from pathlib import Path
 
 import pytest
@@ -14,15 +13,13 @@ from crosscheck2d.reports.page.documents import REPORTS, fragment, render
 from crosscheck2d.reports.page.style import look
 
 TEMPLATES = sorted(REPORTS.glob("*/*.j2"))
-BASE, MACROS = "page/base.html.j2", "page/macros.html.j2"
+BASE = "page/base.html.j2"
 # no pages: they stand inside of one
 PARTS = {
     BASE,
-    MACROS,
     "lessons/conventions.html.j2",
     "game/own_solvers.html.j2",
     "page/kit_parts.html.j2",
-    "speed/budget.html.j2",
 }
 
 LINKS = {"game": "", "lesson": ""}
@@ -43,11 +40,10 @@ def test_every_page_extends_the_base_and_only_the_base_has_a_head(path: Path):
 
 
 def test_no_macro_is_defined_twice():
-    """What two pages need is in macros.html.j2."""
+    """What two pages need is in kit_parts.html.j2."""
     defined = [
         name
         for path in TEMPLATES
-        if short(path) != MACROS  # of pages that are not made of sections yet
         for name in re.findall(r"{% macro (\w+)", path.read_text(encoding="utf-8"))
     ]
 
@@ -66,20 +62,6 @@ def test_templates_are_read_in_one_place():
         users += [short(path)] * any(node.module == "jinja2" for node in imports)
 
     assert users == ["page/documents.py"]
-
-
-def test_the_plotly_library_is_in_a_page_that_asks_for_it_and_may_run_there():
-    """Its hash is one more in the policy; the library stands in the page deflated, in a third of
-    its size."""
-    fields = {"links": LINKS, "groups": {}, "table": "", "generator": "test"}
-    plain, charted = (
-        render("lessons/index.html.j2", plotly=plotly, **fields) for plotly in (False, True)
-    )
-    policies = [re.search(r"script-src ([^;]*);", unescape(page))[1] for page in (plain, charted)]  # type: ignore[index]
-
-    assert [policy.count("sha256-") for policy in policies] == [0, 1]
-    assert 'id="library"' not in plain
-    assert 1e6 < len(charted) - len(plain) < 2e6
 
 
 def test_text_is_escaped_and_a_name_that_nobody_gave_is_an_error():

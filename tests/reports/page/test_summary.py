@@ -160,7 +160,7 @@ def test_three_sentences_say_what_the_table_says(summary: Summary):
     assert all(f"<b>{name}</b>" in first for name in near)
     assert ("a tie" in first) == (len(near) > 1 or len(summary.nearest(FRICTION)) > 1)
     assert "href='#settings'" in rest[0]
-    assert "is exact in 3" in rest[-1]
+    assert "is exact in 3 of 3" in rest[-1]
 
 
 def test_who_breaks_the_protocol_is_not_ranked(comparisons: list[Comparison]):
