@@ -252,6 +252,9 @@ def test_the_page_fits_and_needs_nothing_from_anywhere(page: Page, results: Path
     assert row.inner_text() == "closing speed, m/s; dt 15.6 ms, R 0.25 m"
     cells = page.locator("#slow_collision td").all_inner_texts()
     assert cells == ["–", "0.993"]
+    clear = "(cell) => getComputedStyle(cell).backgroundColor === 'rgba(0, 0, 0, 0)'"
+    shown = [cell.evaluate(clear) for cell in page.locator("#slow_collision td").all()]
+    assert shown == [True, False]  # what fails has a colour, of a class of the kit
 
 
 def test_the_page_says_what_its_counts_count(page: Page):
