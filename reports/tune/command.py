@@ -61,7 +61,7 @@ def tune(engines: Sequence[str], out: Path) -> NoReturn:
         for engine in dict.fromkeys(engines or UNASKED):
             bar.say(f"{engine}: the exact answers, and the present settings")
             search = SettingsSearch(engine, say=bar.note)
-            bar.say(f"{engine}: setting by setting")
+            bar.say(f"{engine}: pairs of settings, and setting by setting")
             found = pd.concat([*tables, search.run()])
             with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):
                 put_text(part / NAME, found.to_csv(index=False))
@@ -77,9 +77,9 @@ def show(table: pd.DataFrame) -> None:
     for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
         numbers = [
             "" if pd.isna(row[name]) else f"{row[name]:.3g}"
-            for name in ("equal_cost", "again", "cost")
+            for name in ("equal_cost", "cost", "harmed")
         ]
         rows.append([f"{row.engine}, {row.setting}: {row.value}", *numbers, row.verdict])
-    headings = ["setting", "error", "on other\nseeds", "cost\nof a step", "verdict"]
+    headings = ["setting", "error", "cost\nof a step", "runs\nworse", "verdict"]
     title = "Errors at equal cost, and costs, as factors of those of the chosen settings"
     print_table(Console(), headings, rows, title, left=headings[-1:])
