@@ -35,8 +35,7 @@ from reports.check.rows import CheckRow
 from reports.check.terminal import print_scene, print_total, sentence_on
 from reports.check.verdict import FileCheck, check_file, named, nothing_in
 from reports.run.made import may_overwrite
-from reports.run.runner import run_all
-from reports.run.worker_process import Failure
+from reports.run.pool import Failure, run_all
 from reports.terminal.counts import counted
 from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
 from reports.terminal.foreign_text import put_text

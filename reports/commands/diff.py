@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from reports.run.diff import FACTOR, ROUNDING, Change, Difference, Timing, difference
-from reports.run.folders import found
+from reports.run.store import Damaged
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
+from reports.terminal.exits import DONE, FAILED, FolderTaken, Unusable, refuse, say
 from reports.terminal.tables import print_list, print_table
 
 SHOWN = 12  # changes, the worst first
@@ -33,10 +33,10 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     """Print the difference; exits 0, 1 (something got worse, or the runs share no cell) or 2 (a
     folder cannot be used)."""
     try:
-        changed = difference(found(before), found(after))
+        changed = difference(before, after)
     except OSError as fault:
         refuse([f"{fault.filename or f'{before}, {after}'}: {fault.strerror or fault}"])
-    except (FolderTaken, ValueError) as fault:
+    except (Damaged, FolderTaken, Unusable) as fault:
         refuse([str(fault)])
     if not changed.shared:
         say(

@@ -13,9 +13,8 @@ from adapters.engines import OWN
 from reports.check.evidence import lines_and_formula
 from reports.check.verdict import check_file
 from reports.page.own_solvers import Said, with_lines
-from reports.run.runner import run_all
-from reports.run.tasks import Check
-from reports.run.worker_process import Failure
+from reports.run.plan import Check
+from reports.run.pool import Failure, run_all
 from reports.terminal.exits import say
 
 CHECKING = 10.0  # s that the game waits for the check of a file, which takes one or two

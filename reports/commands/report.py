@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import NoReturn
 
-from adapters.engines import OWN
+from adapters.engines import OWN, row_of
 from adapters.friction import REFUSAL
 from adapters.run import STATUSES
 from adapters.thrust_grid import off_grid_note
@@ -18,27 +18,30 @@ from reports.compare.comparison import Comparison
 from reports.compare.fast_disks import fast_note
 from reports.lessons.catalogue import LESSONS
 from reports.page import overview
-from reports.page.report import Report, make_report
+from reports.page.report import PAGE, Report, make_report, take_times
 from reports.page.situations import by_friction
-from reports.run.archive import Archive
-from reports.run.arguments import of_main_job, refusing
-from reports.run.folders import found
+from reports.run.arguments import checked_engines, default_engines, opening, started_where
+from reports.run.plan import Means
+from reports.run.results import COMMAND, Results
+from reports.run.suite import take_timings
+from reports.run.timing_pass import cells_to_time
 from reports.terminal.console import Console
 from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, refuse, say
+from reports.terminal.exits import DONE, FAILED, keeping, refuse, say
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_list, print_table
 
 
-def finish(report: Report, out: Path, status: int = DONE) -> NoReturn:
+def finish(report: Report, status: int = DONE) -> NoReturn:
     """Print the summary; exit 1 if an engine or a scene is not compared completely, else
     `status`."""
-    print_summary(report, str((out / "report.html").resolve()))
-    by_name = report.archive.header["engines"] != of_main_job()
+    folder = report.results.folder
+    print_summary(report, str((folder / PAGE).resolve()))
+    by_name = report.results.header["engines"] != default_engines()
     if lost := never_played(report.comparisons, by_name):
         say(
             f"no cell of {', '.join(lost)} was played to its end: see the status column of"
-            f" {out / 'runs.csv'}"
+            f" {folder / 'runs.csv'}"
         )
     for name, why in report.unjudged.items():
         say(f"{name} is not judged: {why}")
@@ -54,24 +57,46 @@ def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
     return sorted(asked - played)
 
 
-def report_again(out: Path, scenes: Sequence[str], printed: bool) -> NoReturn:
-    """Make tables and page from the journal in `out`; `scenes` are printed with the page."""
+def report_again(
+    out: Path, scenes: Sequence[str], printed: bool, timings: float | None
+) -> NoReturn:
+    """Make tables and page of the run in `out` from its rows; `scenes` are printed with the page.
+    With `timings` its engines are timed again, in at most so many s."""
     if scenes and not printed:
         refuse([f"{' '.join(scenes)}: to print scenes with the page, name them after --print"])
     if printed and not scenes:
         refuse(["--print: name the scenes to print; the overview is always printed"])
-    with refusing(str(out)), Progress() as progress:
-        folder = found(out)
-        played = sorted({record["scenario"] for record in Archive.read(folder).records})
-        if missing := [scene for scene in scenes if scene not in played]:
-            refuse(
-                [
-                    f"--print {scene}: not in {out}, which has {', '.join(played)}"
-                    for scene in missing
-                ]
-            )
-        report = make_report(folder, progress.say, LESSONS, tuple(dict.fromkeys(scenes)))
-    finish(report, folder)
+    with opening(out, COMMAND, there=True) as store:
+        with keeping(out, lambda: "The rows are kept."), Progress() as progress:
+            results = Results.read(store)
+            played = sorted({record["scenario"] for record in results.records})
+            if missing := [scene for scene in scenes if scene not in played]:
+                refuse(
+                    [
+                        f"--print {scene}: not in {out}, which has {', '.join(played)}"
+                        for scene in missing
+                    ]
+                )
+            if timings is not None:
+                results = time_again(results, timings, progress)
+            report = make_report(results, progress.say, LESSONS, tuple(dict.fromkeys(scenes)))
+        finish(report)
+
+
+def time_again(results: Results, seconds: float, progress: Progress) -> Results:
+    """The results with new times; exits 2 if the engines have changed since they were played."""
+    with started_where(results.header["folder"]):
+        rows = {name: row_of(name) for name in checked_engines(results.header["engines"])}
+    cells = cells_to_time(results, rows)
+    if not cells:
+        refuse(
+            [
+                f"{results.folder}: its engines have changed since they were played; crosscheck run"
+                " plays them again"
+            ]
+        )
+    take_timings(results.store, cells, seconds, Means(1), progress, again=True)
+    return Results.read(results.store)
 
 
 def print_summary(report: Report, page: str) -> None:
@@ -90,8 +115,8 @@ def print_summary(report: Report, page: str) -> None:
         console,
         [*report.findings, *own_solvers(report.said), *notes(report), statuses(report)],
     )
-    if failed := failures(report, Path(page).parent):
-        console.print(failed, highlight=False, soft_wrap=True)
+    for line in filter(None, (failures(report, Path(page).parent), times(report))):
+        console.print(line, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
 
 
@@ -155,9 +180,19 @@ def statuses(report: Report) -> str:
     counts = report.runs.status.value_counts()
     said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
     ended = counted(len(report.runs), "cell")
-    if report.archive.complete:
+    if report.results.complete:
         return f"{ended} ended: {said}."
     return f"Not finished: {ended} ended so far: {said}."
+
+
+def times(report: Report) -> str:
+    """When the times were taken before this run, and how to take them again; or ""."""
+    taken, again = report.results.timing.get("taken", ""), take_times(report.results.folder)
+    if not taken:
+        return f"No times were taken. To take them: {again}"
+    if taken >= report.results.header["started"]:
+        return ""
+    return f"The times are of {taken}. To take them again: {again}"
 
 
 def failures(report: Report, out: Path) -> str:
@@ -165,7 +200,7 @@ def failures(report: Report, out: Path) -> str:
     runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
     if runs.empty:
         return ""
-    first = next(line for line in report.archive.records if line["cell"] == runs.iloc[0].cell)
+    first = next(line for line in report.results.records if line["cell"] == runs.iloc[0].cell)
     engine = f"{first['engine']}:{first['profile']}"
     words = ["run", first["scene"], "--engine", engine.removesuffix(OWN)]
     words += ["--dt", f"{first['dt_s']:.12g}"]  # as many digits as `with_steps` asks for

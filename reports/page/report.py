@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,10 +25,9 @@ from reports.page.own_solvers import Said, with_lines
 from reports.page.page_tables import page_tables
 from reports.page.panels import MARKED, panels
 from reports.page.sections import by_family, sections_of
-from reports.run.archive import Archive
-from reports.run.made import writing
-from reports.run.tables import TABLES, comparisons_of, make_tables
-from reports.run.timing_pass import noise_floor
+from reports.run.results import Results
+from reports.run.tables import comparisons_of, make_tables
+from reports.run.timing_pass import TIMINGS, noise_floor
 from reports.terminal.counts import counted
 from reports.terminal.foreign_text import put_text
 
@@ -96,7 +96,7 @@ class Report:
     """The results of a run.
 
     Attributes:
-        archive: what it was made from.
+        results: what it was made from.
         comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         findings: the sentences on top.
@@ -107,7 +107,7 @@ class Report:
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
     """
 
-    archive: Archive
+    results: Results
     comparisons: list[Comparison]
     runs: pd.DataFrame
     findings: list[str]
@@ -117,43 +117,31 @@ class Report:
 
 
 def make_report(
-    folder: Path,
+    results: Results,
     say: Callable[[str], None],
     lessons: Mapping[str, Any],
     on_paper: Sequence[str] = (),
 ) -> Report:
-    """From the journal of `folder` write deviations.csv, runs.csv, timings.csv and report.html;
-    `say` is called with what is being done.
+    """From the rows of a run write deviations.csv, runs.csv, timings.csv and report.html; `say` is
+    called with what is being done.
 
     `lessons`: name -> a lesson, for the page's list of them; `on_paper`: scenarios to print with
     the page.
 
     Raises:
         FolderTaken: one of these exists and is not this program's.
-        ValueError: the journal cannot be used, or a scene is not the one that was played.
+        ValueError: no cell has ended, or a scene is not the one that was played.
     """
-    with writing(folder, (*TABLES, PAGE)):
-        return made_report(folder, say, lessons, on_paper)
-
-
-def made_report(
-    folder: Path,
-    say: Callable[[str], None],
-    lessons: Mapping[str, Any],
-    on_paper: Sequence[str] = (),
-) -> Report:
-    """As `make_report`, but overwrites existing files."""
-    archive = Archive.read(folder)
-    header = archive.header
-    tables = make_tables(archive, say)
+    header = results.header
+    tables = make_tables(results, say)
     say("writing the page")
-    comparisons = comparisons_of(archive, tables)
+    comparisons = comparisons_of(results, tables)
     # an interrupt may come first
     began = {run.name for comparison in comparisons for run in comparison.runs}
-    engines = [name for name in header["engines"] if name in began and name in archive.conformance]
-    asked = [archive.conformance[name]["conformance"] for name in engines]
+    engines = [name for name in header["engines"] if name in began and name in results.conformance]
+    asked = [results.conformance[name] for name in engines]
     known = sorted(
-        (line["known_answer"] for line in archive.known_answers),
+        results.known_answers,
         key=lambda row: (row["column"], row["dt_s"], row["made_by"]),
         reverse=True,
     )
@@ -174,33 +162,37 @@ def made_report(
         *findings(comparisons, untrusted),
         *not_counted(others),
     ]
-    checks = {
-        name: archive.checked[name]["checked"]
-        for name in header["engines"]
-        if name in archive.checked
-    }
-    write_page(
-        folder / PAGE,
-        comparisons,
-        findings=sentences,
-        untrusted=untrusted,
-        conformance=pd.DataFrame([row for rows in asked for row in rows]),
-        known_answers=pd.DataFrame(known),
-        about=header | {"seconds": archive.seconds, "unfinished": unfinished(archive)},
-        clock=RunTimes(tables.timed, noise_floor(archive), header["timings"]),
-        lessons=lessons,
-        said={name: with_lines(one["says"], one["shown"]) for name, one in checks.items()},
-        on_paper=on_paper,
-    )
+    checks = results.checked
+    with results.store.exporting(PAGE) as path:
+        write_page(
+            path,
+            comparisons,
+            findings=sentences,
+            untrusted=untrusted,
+            conformance=pd.DataFrame([row for rows in asked for row in rows]),
+            known_answers=pd.DataFrame(known),
+            about=header | {"seconds": results.seconds, "unfinished": unfinished(results)},
+            clock=RunTimes(
+                tables.timed, noise_floor(results), header["timings"], take_times(results.folder)
+            ),
+            lessons=lessons,
+            said={name: with_lines(one["says"], one["shown"]) for name, one in checks.items()},
+            on_paper=on_paper,
+        )
     says = {name: one["says"] for name, one in checks.items()}
-    return Report(archive, comparisons, tables.runs, sentences, untrusted, tables.unjudged, says)
+    return Report(results, comparisons, tables.runs, sentences, untrusted, tables.unjudged, says)
 
 
-def unfinished(archive: Archive) -> str:
+def take_times(folder: Path) -> str:
+    """The command that takes the times of a run."""
+    return shlex.join(["crosscheck", "report", str(folder), "--timings", f"{TIMINGS:g}"])
+
+
+def unfinished(results: Results) -> str:
     """A sentence for the page of a run that has not ended; "" for one that has."""
-    if archive.complete:
+    if results.complete:
         return ""
-    return f"The run was stopped after {counted(len(archive.records), 'cell')}."
+    return f"The run was stopped after {counted(len(results.records), 'cell')}."
 
 
 def how_broken(row: Mapping[str, Any]) -> str:

@@ -20,8 +20,8 @@ from adapters.own_solver.process import keep_processes
 from adapters.play import play_once, unwatched
 from adapters.run import Run
 from reports.run.cells import Cell, source_hash, versions
+from reports.run.pool import allow, leave
 from reports.run.trajectories import packed, parts_of
-from reports.run.worker_process import allow, leave
 from scenarios.model import Scenario, State
 
 # s to import, compile and load an engine: up to 30 on an idle machine, for all engines the first

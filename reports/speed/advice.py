@@ -23,10 +23,10 @@ from reports.compare.verdicts import first_failed
 from reports.compare.view import beside
 from reports.page.style import number
 from reports.run.machine import busy_cores
+from reports.run.pool import Failure
 from reports.run.scenes import open_scene
 from reports.run.stepping import Stepping
 from reports.run.timing import Sample, Timed, interleaved
-from reports.run.worker_process import Failure
 from reports.speed.causes import cause_of
 from reports.speed.effort import doublings
 from reports.speed.measure import done

@@ -16,7 +16,7 @@ from reports.run.arguments import checked_engines, checked_scenes, unknown
 from reports.speed.advice import BUSY, LOUD, Advice, Attempt, Inquiry, NoAdvice
 from reports.speed.purposes import PURPOSES
 from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
+from reports.terminal.exits import DONE, FAILED, refuse, say
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table, print_texts
 
@@ -33,7 +33,7 @@ def give_advice(
     bound = bound_of(error)
     (checked,) = checked_scenes([scene], [], False, seed)
     names = checked_engines(engines, ENGINES)
-    with stoppable(), Progress() as progress:
+    with Progress() as progress:
         try:
             asked = Inquiry(checked, seed, purpose, os.cpu_count() or 1, progress)
             advice = asked.advice(bound, names)

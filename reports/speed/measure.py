@@ -15,10 +15,9 @@ import pandas as pd
 from adapters.engines import row_of
 from adapters.mechanisms.table import MECHANISMS
 from reports.run.machine import busy_cores
-from reports.run.runner import run_all
+from reports.run.pool import Failure, run_all
 from reports.run.scenes import open_scene
 from reports.run.timing import Sample
-from reports.run.worker_process import Failure
 from reports.speed import budget, cheapest, ladder, scored_part, sizes
 from reports.speed.estimate import estimate
 from reports.speed.kept import Kept

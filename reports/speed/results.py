@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import pandas as pd
 
@@ -14,7 +13,6 @@ from reports.run.timing import Noise, noise_of
 from reports.speed import cheapest, explained, tables, versus
 from reports.speed.measure import Measured
 from reports.speed.plan import SpeedPlan
-from reports.terminal.foreign_text import put_text
 from scenarios.model import Scenario
 
 QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
@@ -122,11 +120,6 @@ class Results:
             "speed_versus": self.versus,
         }
         return {f"{name}.csv": table for name, table in tables.items()}
-
-    def write(self, folder: Path) -> None:
-        """The tables as CSV files."""
-        for name, table in self.files.items():
-            put_text(folder / name, table.to_csv(index=False))
 
 
 def poolable(table: pd.DataFrame, asked: dict[str, Scenario]) -> pd.DataFrame:

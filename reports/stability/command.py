@@ -4,7 +4,6 @@ stability.html."""
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,12 +11,10 @@ from typing import NoReturn
 
 import pandas as pd
 
-from adapters.engines import ENGINES, FETCHED, OWN, row_of
+from adapters.engines import ENGINES, OWN, row_of
 from reports.run.arguments import checked_engines, opening, unknown
-from reports.run.folders import given_back, may_go_on, open_part, place_of, replace_folder
-from reports.run.journal import Journal
-from reports.run.made import FolderKind, writing
-from reports.run.runner import affordable
+from reports.run.pool import affordable
+from reports.run.store import Store
 from reports.stability.cases import CASES
 from reports.stability.limits import Limit
 from reports.stability.maps import MAPS
@@ -26,10 +23,9 @@ from reports.stability.page import write_page
 from reports.stability.results import (
     StabilityPlan,
     StabilityResults,
-    Task,
     carry_out,
     case_named,
-    done_before,
+    export_failures,
     read,
     table,
     tasks_of,
@@ -38,8 +34,7 @@ from reports.stability.touching import TOUCHING, AtGap
 from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from reports.stability.vary import VARIES, cannot_vary
 from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
-from reports.terminal.foreign_text import put_text
+from reports.terminal.exits import DONE, FAILED, Unusable, keeping, refuse, say
 from reports.terminal.progress import Progress
 from reports.terminal.tables import print_table, print_texts
 from scenarios.files.scene_file import SceneFileError, read_scene_file
@@ -57,13 +52,8 @@ MARKS = {
     "*": "works again at a harsher value, or also fails at the gentlest value",
 }
 """Mark in the table of limits -> its meaning."""
-LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
-PLAYED_BY = "|".join(re.escape(name.replace(":", "-")) for name in [*ENGINES, *FETCHED])
-STABILITY = FolderKind(
-    "crosscheck stability",
-    rf"journal\.jsonl|trajectories/.+(\.({PLAYED_BY})|-own)[^/.]*\.npz",
-    ("trajectories",),
-)
+LIMITS, LAWS, MAP, PAGE = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
+STABILITY = "crosscheck stability"
 
 
 def find_limits(
@@ -71,7 +61,7 @@ def find_limits(
     vary: Sequence[str],
     engines: Sequence[str],
     full: bool,
-    resume: bool,
+    fresh: bool,
     out: Path,
     workers: int,
     command: str,
@@ -90,54 +80,38 @@ def find_limits(
         cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
     )
     with taking_part(added):
-        find(plan, resume, out)
+        find(plan, fresh, out)
 
 
-def find(plan: StabilityPlan, resume: bool, out: Path) -> NoReturn:
+def find(plan: StabilityPlan, fresh: bool, out: Path) -> NoReturn:
     """Find what was asked for, which was checked; exits as `find_limits`."""
     if not tasks_of(plan) and {*plan.engines} <= {*WITH_FRICTION_ONLY}:
         refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in plan.engines])
-    with opening(out):
-        out = place_of(out)
-        journal = open_part(out, STABILITY)
-        with given_back(journal):
-            done = gone_on_with(journal, plan, resume)
-    part = journal.path.parent
-    kept = f"The finished part is kept in {part}: ask again with --resume"
-    with broken_off(part, lambda: kept), journal, Progress() as progress:
-        carry_out(plan, journal, done, progress)
-        progress.say("writing the tables and the page")
-        try:
-            found = write_files(part)
-        except SceneFileError as fault:  # it was there when all began
-            raise Unusable(str(fault)) from fault
-        journal.close()
-        replace_folder(part, out, STABILITY)
-    finish(found, out)
+    with opening(out, STABILITY, fresh) as store:
+        kept = "The finished part is kept: give the same command again"
+        with keeping(out, lambda: kept), Progress() as progress:
+            carry_out(plan, store, progress)
+            progress.say("writing the tables and the page")
+            try:
+                found = write_files(store)
+            except SceneFileError as fault:  # it was there when all began
+                raise Unusable(str(fault)) from fault
+        finish(found, store.folder)
 
 
-def gone_on_with(journal: Journal, plan: StabilityPlan, resume: bool) -> set[Task]:
-    """The tasks of the plan that an interrupted run finished; raises as `may_go_on`, so that no
-    other results are lost."""
-    had, done = done_before(journal.path.parent, plan)
-    may_go_on(journal.path.parent, had, bool(done), resume)
-    if not done:
-        os.truncate(journal.path, 0)
-    return done
-
-
-def write_files(folder: Path) -> StabilityResults:
-    """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
-    results = read(folder)
+def write_files(store: Store) -> StabilityResults:
+    """limits.csv, maps.csv, laws.csv and stability.html from the rows; returns what they hold."""
+    results = read(store)
     laws = [(one.name, one.engine, *at[:-1]) for one in results.laws for at in one.gaps]
     cells = [(one.name, one.engine, *cell) for one in results.maps for cell in one.cells]
-    with writing(folder, FILES):
-        put_text(folder / LIMITS, table(results.limits).to_csv(index=False))
-        columns = ["scene", "engine", *AtGap._fields[:-1]]
-        put_text(folder / LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
-        columns = ["map", "engine", "x", "y", "reading", "failed", "event"]
-        put_text(folder / MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
-        write_page(folder / PAGE, folder, results)
+    store.export(LIMITS, table(results.limits).to_csv(index=False))
+    columns = ["scene", "engine", *AtGap._fields[:-1]]
+    store.export(LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
+    columns = ["map", "engine", "x", "y", "reading", "failed", "event"]
+    store.export(MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
+    export_failures(store)
+    with store.exporting(PAGE) as path:
+        write_page(path, store.folder, results)
     return results
 
 

@@ -16,27 +16,24 @@ from reports.stability.limits import Limit, Trial
 from reports.stability.search import LimitSearch
 from scenarios.model import Collisions, Scenario, Trajectory, frozen
 from scenarios.no_truth import NoTruth
-from scenarios.truth.cache import UNREADABLE
 
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 
 
-def keep_failure(search: LimitSearch, limit: Limit, folder: Path) -> None:
-    """Save the first failing run of a search, and the trajectory that is shown with it, if there is
-    one."""
+def failure_files(search: LimitSearch, limit: Limit) -> list[bytes]:
+    """The first failing run of a search, and the trajectory that is shown with it, if there is one,
+    as the bytes of files."""
     failing, seen = limit.failing, search.failure(limit)
     if failing is None or seen is None or seen[1].trajectory is None:
-        return
+        return []
     scenario, run = seen
     assert run.trajectory is not None
-    path = file_of(limit, folder)
     shown = near(failing, scenario)
-    path.write_bytes(packed(part_of(run.trajectory, shown, scenario), small=True))
+    trajectories = [run.trajectory]
     with suppress(NoTruth):
         if scenario.truth is not None:
-            companion_file(path).write_bytes(
-                packed(part_of(scenario.truth(scenario.times), shown, scenario), small=True)
-            )
+            trajectories.append(scenario.truth(scenario.times))
+    return [packed(part_of(one, shown, scenario), small=True) for one in trajectories]
 
 
 def kept_failure(
@@ -44,13 +41,13 @@ def kept_failure(
 ) -> tuple[Trajectory, Trajectory | None] | None:
     """The saved failing run and the trajectory shown with it; None if nothing was saved, or the
     file does not fit the scenario."""
-    path = file_of(limit, folder)
+    path = file_of(limit.case, limit.engine, folder)
     if not path.exists() or limit.failing is None:
         return None
     companion = companion_file(path)
     try:
         found = load_trajectory(path), load_trajectory(companion) if companion.exists() else None
-    except UNREADABLE:  # damaged by a crash; the limit itself is in the journal
+    except (OSError, ValueError):
         return None
     most = len(near(limit.failing, scenario))
     return found if all(one is None or of_scenario(one, scenario, most) for one in found) else None
@@ -80,12 +77,12 @@ def of_scenario(one: Trajectory, scenario: Scenario, most: int) -> bool:
     )
 
 
-def file_of(limit: Limit, folder: Path) -> Path:
+def file_of(case: str, engine: str, folder: Path) -> Path:
     """The file of the failing run."""
-    name = f"{limit.case}.{limit.engine}"
+    name = f"{case}.{engine}"
     if "/" in name or len(name) > 200:  # files in two folders may have the same name
         digest = hashlib.sha256(name.encode()).hexdigest()[:8]
-        name = f"{Path(limit.case).name}.{Path(limit.engine).name}-{digest}"[-200:]
+        name = f"{Path(case).name}.{Path(engine).name}-{digest}"[-200:]
     name = name.replace(":", "-")
     return folder / "trajectories" / f"{name}.npz"
 

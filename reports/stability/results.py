@@ -3,14 +3,12 @@ ends, and the table of limits."""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import nan
-from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
@@ -19,21 +17,20 @@ import pandas as pd
 from adapters.engine_row import EngineRow
 from adapters.engines import ENGINES, FETCHED, OWN
 from adapters.npm_packages import version_of
-from reports.run.journal import Journal, lines_of, of_another_version, plain, unusable
+from reports.run.cells import content_key, source_hash
 from reports.run.machine import about
-from reports.run.made import digest_of, writing
-from reports.run.runner import run_all
-from reports.run.worker_process import Failure
+from reports.run.made import digest_of
+from reports.run.pool import Failure, run_all
+from reports.run.store import Store
 from reports.stability.cases import CASES
 from reports.stability.explain import explained, with_replays
-from reports.stability.failures import keep_failure
+from reports.stability.failures import companion_file, failure_files, file_of
 from reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
 from reports.stability.maps import MAPS, MapOf, map_of
 from reports.stability.search import LimitSearch
 from reports.stability.touching import TOUCHING, LawOf, law_of
 from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from reports.stability.vary import case_of_file
-from reports.terminal.foreign_text import put_text
 from reports.terminal.progress import Progress
 
 COLUMNS = (
@@ -57,14 +54,8 @@ COLUMNS = (
     "event",
     "form",
 )
-LINES = {
-    "header": ("seed", "started", "versions", "machine", "form", "files"),
-    "task": (),
-    "footer": ("tasks", "seconds"),
-}
-"""The kinds of lines of the journal -> what they hold: what was asked for, and the versions that
-played it; a `Task`, with a `Limit`, a `MapOf` or a `LawOf` under the name of its kind; how much was
-done."""
+SOURCE = ("reports/stability/**/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
+HEADER = "stability", "plan"  # kind and key of the row with what was asked for
 TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one engine
 SLOWEST_FIRST = (
     "long_gas",
@@ -104,6 +95,14 @@ class StabilityPlan:
         packages = dict.fromkeys(row.package for row in self.added.values() if row.package)
         return {**about("", 0)["versions"], **{name: version_of(name) for name in packages}}
 
+    def key(self, task: Task) -> str:
+        """The key of the row of a task: a hash of all that decides its result."""
+        path = task.name.rpartition(":")[0]
+        row = self.added.get(task.engine)
+        own = row.source if row is not None else ""
+        what = repr(task), repr(self.versions), digest_of(path) if path else "", own
+        return content_key(*what, source_hash(SOURCE))
+
 
 @dataclass(frozen=True)
 class Task:
@@ -115,16 +114,16 @@ class Task:
     engine: str
     form: str
 
-    def __call__(self, folder: Path, added: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
-        """In the worker: do it, with the rows that the plan adds among the others; the first
-        failing run at the limit is saved."""
+    def __call__(self, added: Mapping[str, EngineRow]) -> tuple[Limit | MapOf | LawOf, list[bytes]]:
+        """In the worker: do it, with the rows that the plan adds among the others; with the files
+        of the first failing run at the limit."""
         with taking_part(added):
             if self.kind == "limit":
-                return found_limit(self, folder)
+                return found_limit(self)
             if self.kind == "law":
-                return law_of(self.name, self.engine)
+                return law_of(self.name, self.engine), []
             started = process_time()
-            return replace(map_of(self.name, self.engine), seconds=process_time() - started)
+            return replace(map_of(self.name, self.engine), seconds=process_time() - started), []
 
 
 def case_named(name: str) -> Case:
@@ -132,40 +131,39 @@ def case_named(name: str) -> Case:
     return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
 
 
-def found_limit(task: Task, folder: Path) -> Limit:
-    """Search, and save the first failing run next to the limit."""
+def found_limit(task: Task) -> tuple[Limit, list[bytes]]:
+    """Search; with the files of the first failing run next to the limit."""
     started = process_time()
     search = LimitSearch(case_named(task.name), task.engine, FORMS[task.form])
     limit = with_replays(search, replace(search.limit(), case=task.name))
-    keep_failure(search, limit, folder)
-    return replace(limit, seconds=process_time() - started)
+    files = failure_files(search, limit)
+    return replace(limit, seconds=process_time() - started), files
 
 
-def carry_out(
-    plan: StabilityPlan, journal: Journal, done: Collection[Task], progress: Progress
-) -> None:
-    """Do every task that is not in `done`; all results go into the journal's folder."""
-    folder = journal.path.parent
-    (folder / "trajectories").mkdir(exist_ok=True)
-    named = [*plan.cases, *(name for name in plan.added if name not in FETCHED)]
-    paths = [name.rpartition(":")[0] for name in named]
-    files = {path: digest_of(path) for path in paths if path}
-    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form, "files": files}
-    journal.append({"header": header})
-    with writing(folder, ["machine.json"]):
-        put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
-    wanted = tasks_of(plan)
-    tasks: dict[Any, Callable[[], Any]] = {
-        task: partial(task, folder, plan.added) for task in wanted if task not in done
+def carry_out(plan: StabilityPlan, store: Store, progress: Progress) -> None:
+    """Do every task that has no row yet, and write the row of each as it ends."""
+    tasks = {task: plan.key(task) for task in tasks_of(plan)}
+    rows = {task: store.get(task.kind, key) for task, key in tasks.items()}
+    done = {task for task, row in rows.items() if row and row.value["status"] == "ok"}
+    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form}
+    wanted = [(key, asdict(task)) for task, key in tasks.items()]
+    store.put(*HEADER, header | {"tasks": wanted})
+    work: dict[Any, Callable[[], Any]] = {
+        task: partial(task, plan.added) for task in tasks if task not in done
     }
-    progress.start(len(tasks), len(wanted))
-    with closing(run_all(tasks, plan.workers, TIMEOUT[plan.form])) as results:
+    progress.start(len(work), len(tasks))
+    with closing(run_all(work, plan.workers, TIMEOUT[plan.form])) as results:
         for task, result in results:
-            reason = result.reason if isinstance(result, Failure) else ""
-            result = failed(task, result) if isinstance(result, Failure) else result
-            journal.append({"task": asdict(task), task.kind: asdict(result)})
+            reason, files = "", []
+            if isinstance(result, Failure):
+                reason = result.reason
+                result = failed(task, result)
+            else:
+                result, files = result
+            store.put(task.kind, tasks[task], asdict(result))
+            for number, file in enumerate(files):
+                store.put("failure", f"{tasks[task]}-{number}", None, file)
             progress.done(f"{task.name}  {task.engine}", result.status, reason)
-    journal.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
 
 
 def tasks_of(plan: StabilityPlan) -> list[Task]:
@@ -215,10 +213,20 @@ class StabilityResults(NamedTuple):
         return [*self.limits, *self.maps, *self.laws]
 
 
-def read(folder: Path) -> StabilityResults:
-    """The stability report in a folder, in reading order; raises `ValueError` if its journal
-    cannot be used."""
-    headers, results = journalled(folder)
+def read(store: Store) -> StabilityResults:
+    """The stability report in a folder, in reading order."""
+    plan = store.get(*HEADER)
+    assert plan is not None
+    made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
+        "limit": limit_from,
+        "map": MapOf.from_record,
+        "law": LawOf.from_record,
+    }
+    results: dict[Task, Limit | MapOf | LawOf] = {}
+    for key, wanted in plan.value["tasks"]:
+        task = Task(**wanted)
+        if row := store.get(task.kind, key):
+            results[task] = made[task.kind](row.value)
     order = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
     engines = engines_now()
 
@@ -229,36 +237,23 @@ def read(folder: Path) -> StabilityResults:
     limits = [one for one in ordered if isinstance(one, Limit)]
     maps = [one for one in ordered if isinstance(one, MapOf)]
     laws = [one for one in ordered if isinstance(one, LawOf)]
-    return StabilityResults(explained(limits), maps, laws, headers[-1])
+    return StabilityResults(explained(limits), maps, laws, plan.value)
 
 
-def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
-    """The headers in a folder's journal, and the result of every task; if a task has two lines,
-    the later one counts.
-
-    Raises:
-        ValueError: as `lines_of`, or a line is of an engine that is not asked for.
-    """
-    made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
-        "limit": limit_from,
-        "map": MapOf.from_record,
-        "law": LawOf.from_record,
-    }
-    headers: list[dict[str, Any]] = []
-    results: dict[Task, Limit | MapOf | LawOf] = {}
-    engines = engines_now()
-    for number, kind, line in lines_of(folder, LINES):
-        if kind == "header":
-            headers.append(line["header"])
-        elif kind == "task":
-            try:
-                task = Task(**line["task"])
-                results[task] = made[task.kind](line[task.kind])
-            except (KeyError, TypeError, ValueError):
-                raise of_another_version(folder, number) from None
-            if task.engine not in engines:  # an engine's own file
-                raise unusable(folder, number, f"is of {task.engine}, which is not asked for")
-    return headers, results
+def export_failures(store: Store) -> None:
+    """Write the files of the failing runs, which the page shows."""
+    plan = store.get(*HEADER)
+    assert plan is not None
+    names = {}
+    for key, wanted in plan.value["tasks"]:
+        for number in range(2):
+            if row := store.get("failure", f"{key}-{number}"):
+                path = file_of(wanted["name"], wanted["engine"], store.folder)
+                path = companion_file(path) if number else path
+                name = path.relative_to(store.folder).as_posix()
+                names[name] = key
+                store.export(name, row.blob)
+    store.delete_exports("trajectories", names)
 
 
 def engines_now() -> list[str]:
@@ -281,23 +276,6 @@ def limit_from(record: dict[str, Any]) -> Limit:
 def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
     """These fields of a record as numbers; other fields may hold the text "nan"."""
     return {name: float(record[name]) for name in names}
-
-
-def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
-    """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene
-    files are the same.
-
-    Raises:
-        ValueError: the journal is none of a stability report.
-    """
-    headers, results = journalled(folder)
-    well = {task for task, result in results.items() if result.status == "ok"}
-    same = all(
-        header["versions"] == plan.versions
-        and all(digest_of(path) == digest for path, digest in header["files"].items())
-        for header in headers
-    )
-    return len(well), well & set(tasks_of(plan)) if same else set()
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:

@@ -51,16 +51,16 @@ _KINDS = {
 }
 
 
-def read_scene_file(path: str | Path) -> Scenario:
+def read_scene_file(path: str | Path, content: bytes | None = None) -> Scenario:
     """The scenario in a TOML file; its source is the file's name, its truth comes from the oracle,
-    if there is one.
+    if there is one. `content`: that of the file, if it is known.
 
     Raises:
         SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is
             allowed`, at most `MOST_FAULTS`, and one that says that there are more.
     """
     try:
-        file = _checked(_parsed(Path(path)))
+        file = _checked(_parsed(Path(path), content))
         if not (faults := list(_outside_wrap(file))):
             scenario = _scenario(file, Path(path).name)
             faults = list(_overlaps(scenario.scene, len(file.wall)))
@@ -82,11 +82,13 @@ def read_scene_file(path: str | Path) -> Scenario:
     return scenario
 
 
-def _parsed(path: Path) -> dict[str, Any]:
+def _parsed(path: Path, content: bytes | None) -> dict[str, Any]:
     try:
         text = ""
-        with opened(path) as file:
-            data = file.read(MOST_BYTES + 1)
+        if content is None:
+            with opened(path) as file:
+                content = file.read(MOST_BYTES + 1)
+        data = content
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
             raise SceneFileError([f"larger than {MOST_BYTES} bytes; must be smaller"])

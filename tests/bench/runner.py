@@ -16,17 +16,17 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 
 import numpy as np
+from reports.run.archive import Archive
+from reports.run.journal import Journal
+from reports.run.runner import run_all
+from reports.run.tasks import Means, RunPlan
 
 from adapters.engines import ENGINES
-from reports.run.archive import Archive
 from reports.run.cells import Cell, scene_hash
-from reports.run.journal import Journal
 from reports.run.playing import play_here
 from reports.run.results import keep_cell
-from reports.run.runner import run_all
 from reports.run.suite import begin, carry_out
 from reports.run.tables import make_tables
-from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box

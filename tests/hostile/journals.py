@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.reports.run.journals import contents, put
 
 from tests.hostile.played import Input
 from tests.hostile.small_run import CELL, copied, edited, torn
-from tests.reports.run.journals import contents, put
 
 REPORT, DIFF = ("report", "out"), ("diff", "before", "out")
 RESUME = ("run", "--resume", "out", "--workers", "1")

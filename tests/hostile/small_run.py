@@ -14,8 +14,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tests.hostile.played import CROSSCHECK
 from tests.reports.run.journals import contents, put
+
+from tests.hostile.played import CROSSCHECK
 
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
 MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from reports.run.answers import ExactAnswer, put_answer, read_answer
+
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Scene
 from scenarios.truth import cache as truth_cache

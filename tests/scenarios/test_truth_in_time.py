@@ -11,10 +11,10 @@ from unittest import mock
 
 import numpy as np
 import pytest
-
-from reports.commands import truth
 from reports.run.answers import record_here, record_of
 from reports.run.runner import run_all
+
+from reports.commands import truth
 from scenarios.catalogue import scenario
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from reports.run.scene_tables import read_scene_table
 
 from adapters.engines import ENGINES
 from adapters.play import play
@@ -20,7 +21,6 @@ from reports.page import overview
 from reports.page.charts import CHARTS
 from reports.page.findings import findings
 from reports.run.diff import changed_numbers
-from reports.run.scene_tables import read_scene_table
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reports.run.archive import Archive
+from reports.run.journal import Journal
+from reports.run.tasks import Means, RunPlan
 
 from adapters.engines import ENGINES, UNASKED, told_apart
 from adapters.play import play_once
 from reports.run import bits
-from reports.run.archive import Archive
-from reports.run.journal import Journal
 from reports.run.scenes import open_scene
 from reports.run.suite import carry_out
-from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
 from scenarios.catalogue import SCENARIOS
 from tests.measured import MEASURED, TABLE

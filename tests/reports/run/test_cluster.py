@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-
 from tests.reports.run.sweeps import LONG, assert_nothing_lost, begun, ended_in, undisturbed
+
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 
 pytest.importorskip("distributed")

@@ -11,6 +11,9 @@ from statistics import median
 
 import pandas as pd
 import pytest
+from reports.run.journal import Journal
+from reports.run.tasks import Means, RunPlan
+from tests.reports.run.journals import contents, put
 
 from adapters.engines import ENGINES
 from reports.commands.diff import show_difference
@@ -19,12 +22,9 @@ from reports.page.report import make_report
 from reports.run import suite
 from reports.run.cells import digest
 from reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
-from reports.run.journal import Journal
 from reports.run.suite import carry_out
 from reports.run.tables import seal_of
-from reports.run.tasks import Means, RunPlan
 from reports.terminal.progress import Progress
-from tests.reports.run.journals import contents, put
 
 PLAN = RunPlan(
     ["slow_collision", "near_miss"],

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import cast
 
 import pytest
+from reports.run.archive import LINES
+from reports.run.journal import JOURNAL, Journal
+from reports.run.tasks import Check, RunPlan
+from reports.run.worker_process import Failure
 
 from adapters.own_engine.engine import row_of_file
 from reports.check.verdict import check_file
 from reports.commands.own_solvers import checked, checks_of, lines
-from reports.run.archive import LINES
-from reports.run.journal import JOURNAL, Journal
 from reports.run.results import keep_check
-from reports.run.tasks import Check, RunPlan
-from reports.run.worker_process import Failure
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import MUTANTS
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reports.run.archive import Archive, trajectory_file
 
 from adapters.own_engine.engine import row_of_file
 from adapters.own_solver import process as solver_process
@@ -21,7 +22,6 @@ from adapters.run import Run
 from reports.check.command import make_page, scenes_of
 from reports.check.verdict import check_file
 from reports.run import suite
-from reports.run.archive import Archive, trajectory_file
 from reports.run.cells import Cell
 from reports.run.playing import play_here
 from reports.run.trajectories import load_trajectory

@@ -12,12 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-
-from adapters.engines import ENGINES
-from reports.run import cells, scene_tables, tables
 from reports.run.answers import answer_here, answer_of, no_answer, put_answer, read_answer
 from reports.run.archive import Archive
-from reports.run.cells import ROOT, Cell
 from reports.run.journal import JOURNAL, Journal
 from reports.run.scene_tables import (
     ANSWER,
@@ -29,10 +25,14 @@ from reports.run.scene_tables import (
     name_of,
     scene_table_of,
 )
-from reports.run.suite import carry_out
-from reports.run.tables import comparisons_of, make_tables
 from reports.run.tasks import Means, RunPlan
 from reports.run.worker_process import Failure
+
+from adapters.engines import ENGINES
+from reports.run import cells, scene_tables, tables
+from reports.run.cells import ROOT, Cell
+from reports.run.suite import carry_out
+from reports.run.tables import comparisons_of, make_tables
 from reports.terminal.progress import Progress
 from scenarios.catalogue import scenario
 from scenarios.truth import cache

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from reports.run.archive import Archive
+from tests.reports.run.journals import contents
 
 from adapters.engines import ENGINES
 from reports.run import timing_pass
-from reports.run.archive import Archive
 from reports.run.stepping import Spent, binding_of
 from reports.run.timing import WARM_UP, Timed, interleaved, noise_of
 from reports.run.timing_pass import (
@@ -26,7 +27,6 @@ from reports.run.timing_pass import (
     timed_scenes,
 )
 from scenarios.catalogue import SCENARIOS, scenario
-from tests.reports.run.journals import contents
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # each times a run

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from reports.run.journal import Journal
 
 from adapters.engines import read_row
-from reports.run.journal import Journal
 from reports.speed import ladder, measure
 from reports.speed.command import kept_of
 from reports.speed.effort import QUICK

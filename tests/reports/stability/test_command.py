@@ -11,13 +11,14 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
+from reports.run.folders import RUN, begun
+from reports.run.journal import JOURNAL
+from tests.reports.run.journals import contents, put
 
 from adapters.engines import ENGINES, read_row
 from adapters.own_engine.engine import TEMPLATES
 from reports import cli
 from reports.page.links import PAGES
-from reports.run.folders import RUN, begun
-from reports.run.journal import JOURNAL
 from reports.stability.cases import CASES
 from reports.stability.command import write_files
 from reports.stability.limits import QUICK
@@ -27,7 +28,6 @@ from reports.stability.search import LimitSearch
 from reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.page.figures import check_figures
-from tests.reports.run.journals import contents, put
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from adapters.run import Run
-from reports.page.replay import pack_layers
 from reports.run.journal import plain
 from reports.run.runner import run_all
 from reports.run.worker_process import Failure
+
+from adapters.run import Run
+from reports.page.replay import pack_layers
 from reports.stability.cases import CASES
 from reports.stability.cases_collisions import at_speed
 from reports.stability.cases_gas import gas

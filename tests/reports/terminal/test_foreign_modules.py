@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from reports.run.runner import run_all
+from reports.run.worker_process import Failure
 
 from adapters import safe_path
 from adapters.own_solver.file import read_solver
@@ -21,8 +23,6 @@ from adapters.own_solver.process import SolverProcess
 from reports.run import worker
 from reports.run.cells import Cell
 from reports.run.playing import play_here
-from reports.run.runner import run_all
-from reports.run.worker_process import Failure
 from scenarios.catalogue import scenario
 from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK

@@ -16,14 +16,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from reports.run.folders import RUN, begun, replace_folder
+from tests.reports.run.sweeps import ended_in
+from tests.reports.run.test_kills import alive
 
 from reports.commands.run import what_is_kept
-from reports.run.folders import RUN, begun, replace_folder
 from reports.run.made import Made, put_made
 from reports.terminal.counts import counted
 from reports.terminal.exits import STATUS, Stopped, broken_off, stoppable
-from tests.reports.run.sweeps import ended_in
-from tests.reports.run.test_kills import alive
 from tests.reports.terminal.command_line import crosscheck, wait_for
 from tests.reports.terminal.stopping import AT_MOST, Command, assert_ended, busyness
 

@@ -14,9 +14,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from reports.run.folders import RUN, begun, made_anew, replace_folder
 
 from reports.commands import run as run_command
-from reports.run.folders import RUN, begun, made_anew, replace_folder
 from reports.run.made import (
     MADE,
     FolderKind,
