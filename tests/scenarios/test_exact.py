@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reports.run.answers import record_of
 
+from reports.run.comparing import record_of
 from scenarios.families.placing import box, lay_out
 from scenarios.model import Scenario, Thrust
 from scenarios.no_truth import NoTruth

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from reports.run.scene_tables import read_scene_table
 
 from adapters.engines import ENGINES
 from adapters.play import play
@@ -20,6 +19,7 @@ from reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
 from reports.page import overview
 from reports.page.charts import CHARTS
 from reports.page.findings import findings
+from reports.run.comparing import read_scene_table
 from reports.run.diff import changed_numbers
 from scenarios.catalogue import scenario
 from scenarios.model import Scenario, Trajectory

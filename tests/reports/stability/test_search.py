@@ -15,17 +15,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reports.run.journal import plain
-from reports.run.runner import run_all
-from reports.run.worker_process import Failure
 
 from adapters.run import Run
 from reports.page.replay import pack_layers
+from reports.run.pool import Failure, run_all
 from reports.stability.cases import CASES
 from reports.stability.cases_collisions import at_speed
 from reports.stability.cases_gas import gas
 from reports.stability.explain import explained
-from reports.stability.failures import AFTER, BEFORE, keep_failure, kept_failure, near, part_of
+from reports.stability.failures import (
+    AFTER,
+    BEFORE,
+    failure_files,
+    file_of,
+    kept_failure,
+    near,
+    part_of,
+)
 from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
 from reports.stability.predicates import Predicate, Reading, judge
 from reports.stability.results import Task, failed, limit_from, row_of
@@ -249,13 +255,13 @@ def test_a_worker_that_dies_is_a_row_of_the_table():
     assert "SIGABRT" in row["event"]
 
 
-def test_a_limit_comes_back_from_the_journal_as_it_was():
+def test_a_limit_comes_back_from_its_row_as_it_was():
     """Through JSON, where what is not a number is text."""
     for found in (
         limit_of(case(lambda x, _: x / 17, UP)),
         limit_of(case(lambda _x, _run: 2.0, UP)),
     ):
-        again = limit_from(json.loads(json.dumps(plain(asdict(found)))))
+        again = limit_from(json.loads(json.dumps(asdict(found))))
         assert repr(again) == repr(found)
 
 
@@ -289,7 +295,8 @@ def test_of_a_failing_run_only_what_is_shown_is_kept_and_it_shows_the_same(tmp_p
         CASES["fast_gas"], "reference:exercise", QUICK, seen={0.3: (scenario, run)}
     )
     (tmp_path / "trajectories").mkdir()
-    keep_failure(search, found, tmp_path)
+    (file,) = failure_files(search, found)
+    file_of(found.case, found.engine, tmp_path).write_bytes(file)
     kept = kept_failure(found, tmp_path, scenario)
 
     assert kept is not None

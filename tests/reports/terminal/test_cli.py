@@ -65,22 +65,23 @@ def test_list_explains_every_engine_scenario_and_metric(tmp_path: Path):
 
 
 def test_a_run_writes_its_files(small_run: Path):
-    """Tables, journal, machine, page, and a trajectory a cell."""
+    """Rows, tables, and the page."""
     runs = pd.read_csv(small_run / "runs.csv", keep_default_na=False)
     deviations = pd.read_csv(small_run / "deviations.csv")
-    lines = [json.loads(line) for line in (small_run / "journal.jsonl").read_text().splitlines()]
+    results = read(small_run)
 
     assert list(deviations.columns) == list(COLUMNS)
     assert len(runs) == 2 * 4
     assert set(runs.status) == {"ok"}
-    assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
-    assert "header" in lines[0]
-    assert lines[-1]["footer"]["tasks"] == 8 + 5  # and the conformance of five engines
-    assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
+    assert {record["cell"] for record in results.records} == set(runs.cell)
+    # and the conformance of five engines
+    assert sum(map(len, results.header["tasks"].values())) == 8 + 5
+    assert results.header["seed"] == 0
+    assert results.complete
     assert (small_run / "report.html").stat().st_size < 8e6
 
 
-def test_tables_are_made_again_from_the_journal(small_run: Path):
+def test_tables_are_made_again_from_the_rows(small_run: Path):
     """`report` gives the same bytes."""
     names = ("deviations.csv", "runs.csv")
     before = {name: (small_run / name).read_bytes() for name in names}
@@ -138,7 +139,7 @@ def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
         (["list", "engine"], "did you mean engines"),
         (["truth", "asteroid"], "scenario 'asteroid' is not known; did you mean asteroids"),
         (["truth", "nowhere.toml"], "nowhere.toml"),
-        (["report", "nowhere"], "nowhere: has no journal.jsonl"),
+        (["report", "nowhere"], "nowhere: has no results.sqlite"),
         (["fly"], "fly"),
     ],
 )
@@ -303,12 +304,12 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
         (
             SMALL,
             "limits.csv",
-            "holds limits.csv, and no made.json says that crosscheck run made it",
+            "holds limits.csv, which crosscheck did not make",
         ),
         (
             ["stability", "slow_collision"],
             "runs.csv",
-            "holds runs.csv, and no made.json says that crosscheck stability made",
+            "holds runs.csv, which crosscheck did not make",
         ),
     ],
 )

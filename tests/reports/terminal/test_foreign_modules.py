@@ -4,6 +4,7 @@ imported."""
 from __future__ import annotations
 
 import ast
+import multiprocessing
 import shutil
 import subprocess
 import sys
@@ -14,15 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from reports.run.runner import run_all
-from reports.run.worker_process import Failure
 
 from adapters import safe_path
 from adapters.own_solver.file import read_solver
 from adapters.own_solver.process import SolverProcess
-from reports.run import worker
+from reports.run import pool
 from reports.run.cells import Cell
 from reports.run.playing import play_here
+from reports.run.pool import Failure, run_all
 from scenarios.catalogue import scenario
 from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK
@@ -92,6 +92,21 @@ def in_a_worker() -> Any:
     return ended
 
 
+def start_unsafely(connection: Any, folder: str, memory: int) -> Any:
+    """A worker as multiprocessing starts one."""
+    process = multiprocessing.get_context("spawn").Process(
+        target=pool.serve, args=(connection, folder, memory, ())
+    )
+    process.start()
+    return process
+
+
+@pytest.fixture(autouse=True)
+def spawned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers are new interpreters, as on macOS and Windows: a fork imports nothing."""
+    monkeypatch.setattr(pool, "CONTEXT", multiprocessing.get_context("spawn"))
+
+
 @pytest.mark.parametrize("entry", [[], [""]])
 def test_a_worker_imports_nothing_of_the_folder_it_is_started_in(
     ran, monkeypatch: pytest.MonkeyPatch, entry: list[str]
@@ -108,9 +123,7 @@ def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(
 ):
     """The negative control: the traps work; and what came of it is said to lie outside the
     engine."""
-    monkeypatch.setattr(
-        worker, "python", lambda statements: [sys.executable, "-c", f"import sys; {statements}"]
-    )
+    monkeypatch.setattr(pool, "start_process", start_unsafely)
     ended = in_a_worker()
 
     assert ran() != ""
