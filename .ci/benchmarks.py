@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from adapters.engines import ENGINES
-from reports.speed import figures, sizes
-from reports.speed.tables import summed_up
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.speed import figures, sizes
+from crosscheck2d.reports.speed.tables import summed_up
 
 OUT = Path("reports/out/speed")
 # the fastest of many short samples: CI machines are seldom alone

@@ -10,9 +10,9 @@ from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # the tests are not installed
 
-from reports.commands.serve import application
-from reports.game.command import FIRST
-from reports.game.server import Game
+from crosscheck2d.reports.commands.serve import application
+from crosscheck2d.reports.game.command import FIRST
+from crosscheck2d.reports.game.server import Game
 from tests.reports.page.browsing import chromium, served
 
 LEGEND = """() => Plotly.relayout(document.querySelector('#pooled .plot'), {

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine import Engine
-from scenarios.model import Array, Scenario, Thrust
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.scenarios.model import Array, Scenario, Thrust
 
 
 def advanced(engine: Engine, scenario: Scenario, substeps: int, dt: float) -> Iterator[float]:

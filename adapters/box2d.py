@@ -9,13 +9,13 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from adapters.advance import onto_torus
-from adapters.engine import KEPT, PASSED, ContactImpulse
-from adapters.float32 import must_fit, must_not_be_cut, rounding
-from adapters.friction import of_shapes
-from adapters.library_versions import BOX2D, version
-from adapters.matched import GEOMETRY, Searched
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.advance import onto_torus
+from crosscheck2d.adapters.engine import KEPT, PASSED, ContactImpulse
+from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding
+from crosscheck2d.adapters.friction import of_shapes
+from crosscheck2d.adapters.library_versions import BOX2D, version
+from crosscheck2d.adapters.matched import GEOMETRY, Searched
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 SHIPPED: dict[str, Any] = {
     "velocity_iterations": 8,  # as the manual recommends; `Step` has no defaults

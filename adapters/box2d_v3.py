@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pyb2d3
 
-from adapters.advance import onto_torus
-from adapters.engine import NOT_READABLE, PASSED, ContactImpulse
-from adapters.float32 import must_fit, must_not_be_cut, rounding
-from adapters.friction import of_shapes
-from adapters.library_versions import version
-from adapters.matched import Searched
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.advance import onto_torus
+from crosscheck2d.adapters.engine import NOT_READABLE, PASSED, ContactImpulse
+from crosscheck2d.adapters.float32 import must_fit, must_not_be_cut, rounding
+from crosscheck2d.adapters.friction import of_shapes
+from crosscheck2d.adapters.library_versions import version
+from crosscheck2d.adapters.matched import Searched
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 SHIPPED: dict[str, Any] = {
     "substeps": 4,  # as the manual recommends; `step` has no default

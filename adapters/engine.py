@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:  # importing numpy takes 0.2 s, and the process of an Exercise.js does not need it
-    from scenarios.model import Array, Scene, State
+    from crosscheck2d.scenarios.model import Array, Scene, State
 
 # In `settings`, in place of the resolved value, where the engine does not report it:
 NOT_READABLE = "not readable"  # the binding has no getter

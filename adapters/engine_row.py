@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from adapters.engine import Engine
-from adapters.matched import Searched
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.matched import Searched
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53  # the relative rounding of a number
 

@@ -11,11 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import Engine
-from adapters.engine_row import FLOAT32, FLOAT64, AccuracyParameter, EngineRow, Mark, Variant
-from adapters.library_versions import BOX2D
-from adapters.matched import Searched
-from scenarios.model import Scene
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engine_row import (
+    FLOAT32,
+    FLOAT64,
+    AccuracyParameter,
+    EngineRow,
+    Mark,
+    Variant,
+)
+from crosscheck2d.adapters.library_versions import BOX2D
+from crosscheck2d.adapters.matched import Searched
+from crosscheck2d.scenarios.model import Scene
 
 
 def _made(place: str, *arguments: Any, **settings: Any) -> Engine:
@@ -27,8 +34,8 @@ def _made(place: str, *arguments: Any, **settings: Any) -> Engine:
 
 
 def _reference(variant: str, **settings: Any) -> Engine:
-    solver = import_module(f"reference_impl.{variant}")
-    return _made("adapters.reference.Reference", solver, **settings)
+    solver = import_module(f"crosscheck2d.reference_impl.{variant}")
+    return _made("crosscheck2d.adapters.reference.Reference", solver, **settings)
 
 
 def _searched(module: str) -> Searched:
@@ -37,14 +44,20 @@ def _searched(module: str) -> Searched:
 
 
 def _javascript_searched(name: str) -> Searched:
-    from adapters.javascript.searched import SEARCHED
+    from crosscheck2d.adapters.javascript.searched import SEARCHED
 
     return SEARCHED[name]
 
 
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
     package = FETCHED[f"{name}:{profile}"].package
-    return _made("adapters.javascript.engine.JavaScriptEngine", name, package, profile, **settings)
+    return _made(
+        "crosscheck2d.adapters.javascript.engine.JavaScriptEngine",
+        name,
+        package,
+        profile,
+        **settings,
+    )
 
 
 def _what_moves_is_a_bullet(engine: Any) -> None:
@@ -60,7 +73,7 @@ _Pymunk = partial(
     outside=True,
     distributions=("pymunk",),
     mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
-    searched=partial(_searched, "adapters.pymunk"),
+    searched=partial(_searched, "crosscheck2d.adapters.pymunk"),
     work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
 )
 _Box2D = partial(
@@ -68,7 +81,7 @@ _Box2D = partial(
     outside=True,
     distributions=(BOX2D,),
     mark=Mark("#00876c", "#5be0b5", "square"),
-    searched=partial(_searched, "adapters.box2d"),
+    searched=partial(_searched, "crosscheck2d.adapters.box2d"),
     work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
 )
 _Box2DV3 = partial(
@@ -76,7 +89,7 @@ _Box2DV3 = partial(
     outside=True,
     distributions=("pyb2d3",),
     mark=Mark("#b84fb0", "#c46bd8", "diamond"),
-    searched=partial(_searched, "adapters.box2d_v3"),
+    searched=partial(_searched, "crosscheck2d.adapters.box2d_v3"),
     work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
 )
 _Planck = partial(
@@ -148,14 +161,14 @@ ENGINES: dict[str, EngineRow] = {
         orders_collisions=True,
     ),
     "pymunk:shipped": _Pymunk(
-        partial(_made, "adapters.pymunk.Pymunk", "shipped"),
+        partial(_made, "crosscheck2d.adapters.pymunk.Pymunk", "shipped"),
         "pymunk 7.3 (float64), own defaults: elasticity e on every shape",
         0.0,
         FLOAT64,
         dash=SHIPPED,
     ),
     "pymunk:matched": _Pymunk(
-        partial(_made, "adapters.pymunk.Pymunk", "matched"),
+        partial(_made, "crosscheck2d.adapters.pymunk.Pymunk", "matched"),
         "pymunk, matched: elasticity sqrt(e), small slop",
         0.0,
         FLOAT64,
@@ -174,14 +187,14 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "box2d:shipped": _Box2D(
-        partial(_made, "adapters.box2d.Box2DEngine", "shipped"),
+        partial(_made, "crosscheck2d.adapters.box2d.Box2DEngine", "shipped"),
         "box2d-py 2.3.8 (float32), own defaults: friction, sleep, threshold 1 m/s",
         1.0,
         FLOAT32,
         dash=SHIPPED,
     ),
     "box2d:matched": _Box2D(
-        partial(_made, "adapters.box2d.Box2DEngine", "matched"),
+        partial(_made, "crosscheck2d.adapters.box2d.Box2DEngine", "matched"),
         "box2d-py, matched: units that lift its thresholds; CCD; no sleep; friction as stated",
         1.0,
         FLOAT32,
@@ -202,14 +215,14 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "box2d_v3:shipped": _Box2DV3(
-        partial(_made, "adapters.box2d_v3.Box2DV3", "shipped"),
+        partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3", "shipped"),
         "Box2D 3.1 (pyb2d3, float32), own defaults: friction, sleep, threshold 1 m/s",
         0.625,
         FLOAT32,
         dash=SHIPPED,
     ),
     "box2d_v3:matched": _Box2DV3(
-        partial(_made, "adapters.box2d_v3.Box2DV3", "matched"),
+        partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3", "matched"),
         "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, friction as stated",
         0.625,
         FLOAT32,
@@ -227,7 +240,7 @@ ENGINES: dict[str, EngineRow] = {
         },
     ),
     "event_driven:float64": EngineRow(
-        partial(_made, "adapters.event_driven.engine.EventDriven"),
+        partial(_made, "crosscheck2d.adapters.event_driven.engine.EventDriven"),
         "event-driven, without steps: parabolas and contact times, in float64",
         0.5,
         FLOAT64,
@@ -325,7 +338,7 @@ def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
 def read_row(name: str) -> EngineRow:
     """The row of a solver's file, `PATH:own`, read again; later calls of `row_of` return it. Raises
     `NotASolver`."""
-    from adapters.own_engine.engine import row_of_file
+    from crosscheck2d.adapters.own_engine.engine import row_of_file
 
     _read[name] = row = row_of_file(Path(name.removesuffix(OWN)))
     return row

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from adapters.engine import ContactImpulse, Engine
-from scenarios.model import NO_COLLISIONS, Collisions, Scene, frozen
+from crosscheck2d.adapters.engine import ContactImpulse, Engine
+from crosscheck2d.scenarios.model import NO_COLLISIONS, Collisions, Scene, frozen
 
 
 def collisions_of(engine: Engine, scene: Scene, dt: float) -> Collisions:

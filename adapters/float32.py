@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.engine import Unsupported
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.scenarios.model import Array, Scene
 
 
 def must_fit(scene: Scene, length: float = 1.0, time: float = 1.0) -> None:

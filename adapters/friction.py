@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from adapters.engine import Unsupported
-from scenarios.model import Scene
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.scenarios.model import Scene
 
 REFUSAL = "does not model friction"
 

@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from adapters.engine import Unsupported
+from crosscheck2d.adapters.engine import Unsupported
 
 HERE = Path(__file__).parent / "javascript"
 PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
@@ -60,7 +60,7 @@ def place() -> Path:
     """The folder for the packages of these two files; raises `NotInstalled` if there is no
     cache."""
     # it imports numpy, which the process of an Exercise.js does not need
-    from scenarios.truth.cache import folder
+    from crosscheck2d.scenarios.truth.cache import folder
 
     kept = folder()
     if kept is None:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 
-from adapters.advance import advanced
-from adapters.engine import Engine, NotStarted, Unsupported
-from adapters.first_collisions import collisions_of
-from adapters.run import Run, gather, substeps_of, unplayed_run
-from adapters.runaway import RUNAWAY, fault_of, reach
-from scenarios.model import Scenario, State
+from crosscheck2d.adapters.advance import advanced
+from crosscheck2d.adapters.engine import Engine, NotStarted, Unsupported
+from crosscheck2d.adapters.first_collisions import collisions_of
+from crosscheck2d.adapters.run import Run, gather, substeps_of, unplayed_run
+from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
+from crosscheck2d.scenarios.model import Scenario, State
 
 Watch = Callable[[State], None]  # called with every valid sample
 

@@ -10,10 +10,10 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
-from adapters.advance import onto_torus
-from adapters.engine import ContactImpulse
-from adapters.matched import GEOMETRY, Searched
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.advance import onto_torus
+from crosscheck2d.adapters.engine import ContactImpulse
+from crosscheck2d.adapters.matched import GEOMETRY, Searched
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 FIELDS = (
     batch.BodyFields.POSITION

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import ContactImpulse
-from adapters.friction import must_be_frictionless
-from adapters.library_versions import version
-from reference_impl.blocks import ADVANCE, disks_block, disks_of, world_block, world_of
-from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.engine import ContactImpulse
+from crosscheck2d.adapters.friction import must_be_frictionless
+from crosscheck2d.adapters.library_versions import version
+from crosscheck2d.reference_impl.blocks import ADVANCE, disks_block, disks_of, world_block, world_of
+from crosscheck2d.reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 SPLITS = {BY_INVERSE_MASS: "by inverse mass", EQUAL: "equal", ONE_SIDED: "one-sided"}
 METHODS = {  # a module of reference_impl -> its settings

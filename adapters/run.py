@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from adapters.engine import SILENT
-from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+from crosscheck2d.adapters.engine import SILENT
+from crosscheck2d.scenarios.model import Collisions, Scenario, State, Trajectory, frozen
 
 STATUSES = ("ok", "unsupported", "diverged", "error", "crashed", "timeout")
 

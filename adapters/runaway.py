@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.model import Scenario, State
+from crosscheck2d.scenarios.model import Scenario, State
 
 # times the largest distance of free flight: a disk farther out was thrown by the engine
 RUNAWAY = 1e3

@@ -77,7 +77,7 @@ def python(statements: str) -> list[str]:
     """The command line that runs these statements in a new Python with an equally safe path."""
     names = (*PACKAGES, TESTS) if TESTS in sys.modules else PACKAGES
     begin = (
-        f"import sys; sys.path.insert(0, {PROGRAM!r}); from adapters.safe_path import"
+        f"import sys; sys.path.insert(0, {PROGRAM!r}); from crosscheck2d.adapters.safe_path import"
         " keep_path_safe"
     )
     return [sys.executable, "-P", "-c", f"{begin}; keep_path_safe({names!r}); {statements}"]

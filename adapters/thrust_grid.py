@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.model import Scenario, Thrust
+from crosscheck2d.scenarios.model import Scenario, Thrust
 
 ROUNDING = 1e-9  # of a step: rounding of start / dt, as in `advance`
 

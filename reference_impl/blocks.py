@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from reference_impl import coulomb, exercise, lesson, neighbours, ordered
-from reference_impl.compiled import compiled, inlined
-from reference_impl.state import Disks, World
+from . import coulomb, exercise, lesson, neighbours, ordered
+from .compiled import compiled, inlined
+from .state import Disks, World
 
 
 def disks_block(disks: Disks) -> np.ndarray:

@@ -5,10 +5,10 @@ Read it beside `exercise.py`, from which everything else is taken; with friction
 bits. It asks every pair, so this is for some hundred disks. Compiled by numba, as `exercise` is.
 """
 
-from reference_impl import exercise
-from reference_impl.compiled import inlined, kernel, pasted
-from reference_impl.exercise import direction, integrate, move, nearest_point
-from reference_impl.state import Disks, World
+from . import exercise
+from .compiled import inlined, kernel, pasted
+from .exercise import direction, integrate, move, nearest_point
+from .state import Disks, World
 
 
 @pasted

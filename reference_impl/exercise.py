@@ -7,8 +7,8 @@ source runs as plain Python and gives the same bits.
 
 from math import inf, sqrt
 
-from reference_impl.compiled import inlined, kernel, pasted
-from reference_impl.state import BY_INVERSE_MASS, EQUAL, Disks, World
+from .compiled import inlined, kernel, pasted
+from .state import BY_INVERSE_MASS, EQUAL, Disks, World
 
 
 @pasted

@@ -8,8 +8,8 @@ file, know one method.
 
 from math import inf, sqrt
 
-from reference_impl.compiled import compiled, inlined, pasted
-from reference_impl.state import Disks, World
+from .compiled import compiled, inlined, pasted
+from .state import Disks, World
 
 
 @pasted

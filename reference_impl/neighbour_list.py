@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled, kernel
-from reference_impl.state import World
+from .compiled import compiled, kernel
+from .state import World
 
 LASTS = 16  # steps of the fastest disk for which a list is built, unless fewer steps remain
 HALF = 0.49  # of the skin, not 1/2: the margin is more than the rounding of the distances

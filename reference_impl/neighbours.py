@@ -9,15 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl import exercise
-from reference_impl.compiled import compiled, inlined, kernel, pasted
-from reference_impl.exercise import (
+from . import exercise
+from .compiled import compiled, inlined, kernel, pasted
+from .exercise import (
     collide,
     collide_wall,
     touching_wall,
     wrap,
 )
-from reference_impl.neighbour_list import (
+from .neighbour_list import (
     EDGES,
     PAIRS,
     ROUNDING,
@@ -32,7 +32,7 @@ from reference_impl.neighbour_list import (
     take_step,
     used_up,
 )
-from reference_impl.state import Disks, World
+from .state import Disks, World
 
 WORTH = 64  # disks times steps, from which on a list is cheaper than all pairs
 # disks a new list in mid-step: more of them would cost more than asking all pairs

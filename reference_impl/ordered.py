@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl.compiled import compiled, inlined, kernel, pasted
-from reference_impl.neighbour_list import (
+from .compiled import compiled, inlined, kernel, pasted
+from .neighbour_list import (
     EDGES,
     PAIRS,
     ROUNDING,
@@ -37,8 +37,8 @@ from reference_impl.neighbour_list import (
     take_step,
     used_up,
 )
-from reference_impl.neighbours import moving
-from reference_impl.state import Disks, World
+from .neighbours import moving
+from .state import Disks, World
 
 REST = 1 / 16  # of a step
 MOST = 8  # collisions a disk and step, on average

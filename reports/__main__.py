@@ -1,4 +1,4 @@
-"""The command `crosscheck`, or `python -m reports`: it can be stopped by a signal before it has
+"""The command `crosscheck`, or `python -m crosscheck2d.reports`: it can be stopped by a signal before it has
 imported what it needs."""
 
 import os
@@ -9,11 +9,13 @@ def main() -> None:
     """Do what the command line asks for."""
     # for the next line alone
     sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    from adapters.safe_path import keep_path_safe  # and no adapters.py of the current folder
+    from crosscheck2d.adapters.safe_path import (
+        keep_path_safe,  # and no adapters.py of the current folder
+    )
 
     keep_path_safe()  # before anything else is imported
-    from reports.terminal.exits import ends_on_signals, refuse
-    from reports.terminal.streams import printing
+    from crosscheck2d.reports.terminal.exits import ends_on_signals, refuse
+    from crosscheck2d.reports.terminal.streams import printing
 
     with ends_on_signals(), printing():
         if sys.flags.optimize > 1:
@@ -24,7 +26,7 @@ def main() -> None:
                 ]
             )
         # which takes a second: what is raised while it is imported may be lost
-        from reports.cli import app
+        from crosscheck2d.reports.cli import app
 
         app()
 

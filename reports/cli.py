@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from reports.terminal.exits import refuse
+from crosscheck2d.reports.terminal.exits import refuse
 
 app = typer.Typer(
     name="crosscheck",
@@ -169,7 +169,7 @@ def run(
     ] = False,
 ) -> None:
     """Play scenes through engines, and write the report."""
-    from reports.commands.run import RunRequest, means_of, run_plan
+    from crosscheck2d.reports.commands.run import RunRequest, means_of, run_plan
 
     means = means_of(workers, timeout, memory, scheduler)
     what = scenes or [], engine or [], dt or [], full, seed
@@ -201,7 +201,7 @@ def report(
     They are made from what was played; no scene is played again. With --timings the engines are
     timed again.
     """
-    from reports.commands.report import report_again
+    from crosscheck2d.reports.commands.report import report_again
 
     report_again(out, scenes or [], printed, timings)
 
@@ -216,7 +216,7 @@ def diff(
     Compares how the cells ended, their numbers, and how long they took. The exit status is 1 if
     anything got worse.
     """
-    from reports.commands import diff as diff_command
+    from crosscheck2d.reports.commands import diff as diff_command
 
     diff_command.show_difference(before, after)
 
@@ -242,7 +242,7 @@ def truth(
     error bound. With --at, shows position, velocity, angle and spin of each disk at that time; at
     the instant of a collision, those after it.
     """
-    from reports.commands.truth import show_truth
+    from crosscheck2d.reports.commands.truth import show_truth
 
     show_truth(scene, seed, events, at, as_json, timeout)
 
@@ -337,12 +337,12 @@ def check(
     A solver.py runs with all your permissions. It may import installed packages, and modules beside
     it that are not named like one of those.
     """
-    from reports.check.command import check as check_and_say
-    from reports.check.command import grading_of, outputs_of
+    from crosscheck2d.reports.check.command import check as check_and_say
+    from crosscheck2d.reports.check.command import grading_of, outputs_of
 
     grading = grading_of(points, id_pattern, hints)
     if scaffold:
-        from reports.check.scaffold import write_scaffold
+        from crosscheck2d.reports.check.scaffold import write_scaffold
 
         write_scaffold(scaffold, path, points, hints)
         return
@@ -363,7 +363,7 @@ def play(
 
     All engines get the same thrusts at once; a browser shows how they diverge.
     """
-    from reports.commands import serve
+    from crosscheck2d.reports.commands import serve
 
     serve.play(flight, engine or [], port, opens)
 
@@ -397,11 +397,11 @@ def lesson(
     9.3 lever, 9.4 rolling.
     """
     if export is None:
-        from reports.commands import serve
+        from crosscheck2d.reports.commands import serve
 
         serve.lesson(name, port, opens)
     else:
-        from reports.lessons.command import write_lessons
+        from crosscheck2d.reports.lessons.command import write_lessons
 
         write_lessons(name, export)
 
@@ -433,7 +433,7 @@ def speed(
 
     Let nothing else run on the machine meanwhile.
     """
-    from reports.speed.command import run_speed
+    from crosscheck2d.reports.speed.command import run_speed
 
     run_speed(scenes or [], engine or [], full, fresh, seed, out, as_typed())
 
@@ -460,7 +460,7 @@ def advise(
 
     Also shows which options of an engine the scene does not need, and what they cost in it.
     """
-    from reports.speed.advise import give_advice
+    from crosscheck2d.reports.speed.advise import give_advice
 
     give_advice(scene, error, purpose, engine or [], seed, as_json)
 
@@ -497,7 +497,7 @@ def stability(
     Changes one parameter from gentle to harsh until the engine fails, and shows the failing run
     with its cause.
     """
-    from reports.stability.command import find_limits
+    from crosscheck2d.reports.stability.command import find_limits
 
     find_limits(cases or [], vary or [], engine or [], full, fresh, out, workers, as_typed())
 
@@ -518,7 +518,7 @@ def tune(
 
     Finds those that bring an engine nearest to the exact answers at equal cost.
     """
-    from reports.tune.command import tune as search_settings
+    from crosscheck2d.reports.tune.command import tune as search_settings
 
     search_settings(engine or [], fresh, out)
 
@@ -538,7 +538,7 @@ def new_engine(
 
     It works as it is. Put your own engine in its place, and judge it with --engine NAME.
     """
-    from reports.commands.new_engine import write_engine
+    from crosscheck2d.reports.commands.new_engine import write_engine
 
     write_engine(name)
 
@@ -553,6 +553,6 @@ def list_(
     ] = "",
 ) -> None:
     """List engines, scenarios, metrics, verdicts, cases and lessons, and say what each is."""
-    from reports.commands.listing import explain
+    from crosscheck2d.reports.commands.listing import explain
 
     explain(what)

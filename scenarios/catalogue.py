@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from scenarios.families.crowds import CROWDS
-from scenarios.families.exercise import EXERCISE
-from scenarios.families.friction import FRICTION
-from scenarios.families.lesson import LESSON
-from scenarios.families.pairs import PAIRS
-from scenarios.families.rows import ROWS
-from scenarios.families.thrusts import THRUSTS
-from scenarios.families.walls import WALLS
-from scenarios.model import Scenario
+from crosscheck2d.scenarios.families.crowds import CROWDS
+from crosscheck2d.scenarios.families.exercise import EXERCISE
+from crosscheck2d.scenarios.families.friction import FRICTION
+from crosscheck2d.scenarios.families.lesson import LESSON
+from crosscheck2d.scenarios.families.pairs import PAIRS
+from crosscheck2d.scenarios.families.rows import ROWS
+from crosscheck2d.scenarios.families.thrusts import THRUSTS
+from crosscheck2d.scenarios.families.walls import WALLS
+from crosscheck2d.scenarios.model import Scenario
 
 Build = Callable[..., Scenario]
 FAMILIES: dict[str, dict[str, Build]] = {

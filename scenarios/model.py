@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenarios.faults import check_scenario, check_scene, check_thrust
+from crosscheck2d.scenarios.faults import check_scenario, check_scene, check_thrust
 
 Array = NDArray[np.float64]
 DEFAULT: Any = None  # stands for the default value in the comment of the field

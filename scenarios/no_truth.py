@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 
 class NoTruth(ValueError):

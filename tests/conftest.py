@@ -13,8 +13,8 @@ from hypothesis import settings
 from numba.core.dispatcher import Dispatcher
 from playwright.sync_api import Browser
 
-from adapters.engines import ENGINES
-from reports.run import pool, timing_pass
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import pool, timing_pass
 from tests.compiling import LOCKS, compiling_alone
 from tests.forks import start_worker
 from tests.reports.page.browsing import chromium

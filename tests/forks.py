@@ -17,20 +17,20 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from unittest import mock
 
-from reports.run import pool
+from crosscheck2d.reports.run import pool
 
 ROOT = Path(__file__).parent.parent
 LOADED = [
     "tests.loaded",
-    "reports.cli",
-    "reports.run.arguments",
-    "reports.commands.truth",
-    "reports.commands.diff",
-    "reports.check.command",
-    "reports.speed.command",
-    "reports.stability.command",
-    "reports.lessons.command",
-    "reports.tune.command",
+    "crosscheck2d.reports.cli",
+    "crosscheck2d.reports.run.arguments",
+    "crosscheck2d.reports.commands.truth",
+    "crosscheck2d.reports.commands.diff",
+    "crosscheck2d.reports.check.command",
+    "crosscheck2d.reports.speed.command",
+    "crosscheck2d.reports.stability.command",
+    "crosscheck2d.reports.lessons.command",
+    "crosscheck2d.reports.tune.command",
 ]
 # multiprocessing polls all of its processes whenever it starts one; what one thread has read,
 # another waits for.
@@ -68,7 +68,7 @@ def crosscheck_in(
 ) -> None:
     """In a fork: the command in `cwd`, which leads a group of its own and prints into files in
     `folder`."""
-    from reports.__main__ import main
+    from crosscheck2d.reports.__main__ import main
 
     os.setsid()
     for number, name in ((1, "stdout"), (2, "stderr")):

@@ -8,14 +8,14 @@ from pathlib import Path
 
 from numba.core.dispatcher import Dispatcher
 
-import reports.commands.run
-import reports.run.known_answers
-import reports.run.playing
-import reports.run.tables  # noqa: F401
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare.comparison import compare
-from scenarios.catalogue import scenario
+import crosscheck2d.reports.commands.run
+import crosscheck2d.reports.run.known_answers
+import crosscheck2d.reports.run.playing
+import crosscheck2d.reports.run.tables  # noqa: F401
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.compiling import LOCKS, compiling_alone
 
 if LOCKS in os.environ:

@@ -4,7 +4,7 @@ A new engine is in none of the kept tables until all of them are made again, whi
 machine of its own. The tests of these tables ask them for the engines that are measured.
 """
 
-from reports.run import bits
+from crosscheck2d.reports.run import bits
 
 TABLE = bits.read(bits.KEPT.read_text("utf-8"))
 MEASURED = frozenset(TABLE.engine + ":" + TABLE.profile)

@@ -21,9 +21,9 @@ SOURCE = ("adapters", "reference_impl", "reports", "scenarios")
 TOY = """
 import numpy as np
 
-from adapters.engine import SILENT, Unsupported
-from adapters.friction import must_be_frictionless
-from scenarios.model import State
+from crosscheck2d.adapters.engine import SILENT, Unsupported
+from crosscheck2d.adapters.friction import must_be_frictionless
+from crosscheck2d.scenarios.model import State
 
 
 class Toy:
@@ -139,14 +139,22 @@ ADDED: dict[str, list[Added]] = {
     "a lesson": [
         Added(
             "reports/lessons/toy.py",
-            "from reports.lessons.lesson import LessonChart, Curve, Lesson, Shown\n\n\ndef"
+            "from crosscheck2d.reports.lessons.lesson import LessonChart, Curve, Lesson, Shown\n\n\ndef"
             ' show():\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
             ' return Shown([LessonChart("a toy", "x", "y", [curve])], None, [])\n\n\n'
             'TOY = Lesson("toy", "9", "A toy lesson", "Is it here?", "It is.", [],'
             ' ["toy:plain"], show)\n',
         ),
-        Added("reports/lessons/toy.py", "import numpy as np\n\n", "from reports.lessons.lesson"),
-        Added("reports/lessons/catalogue.py", "from reports.lessons.toy import TOY\n", "\nALL"),
+        Added(
+            "reports/lessons/toy.py",
+            "import numpy as np\n\n",
+            "from crosscheck2d.reports.lessons.lesson",
+        ),
+        Added(
+            "reports/lessons/catalogue.py",
+            "from crosscheck2d.reports.lessons.toy import TOY\n",
+            "\nALL",
+        ),
         Added("reports/lessons/catalogue.py", "    TOY,\n", ")\nLESSONS"),
     ],
     "a mechanism": [
@@ -215,7 +223,7 @@ def test_the_command_after_an_engine_is_the_one_that_is_run_here():
     """As CONTRIBUTING.md and the README of the adapters have it."""
     for page in ("CONTRIBUTING.md", "adapters/README.md"):
         text = (ROOT / page).read_text(encoding="utf-8")
-        assert "uv run python -m adapters.conformance.impact_table NAME" in text, page
+        assert "uv run python -m crosscheck2d.adapters.conformance.impact_table NAME" in text, page
 
 
 def test_nothing_of_it_is_in_the_source_itself():
@@ -237,21 +245,21 @@ import json
 import runpy
 import sys
 import pytest
-from adapters.conformance.conform import conform
-from adapters.engines import ENGINES
-from adapters.mechanisms.options import OPTIONS
-from reports.compare.metrics import METRICS
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.pages import lesson_page
-from reports.page.charts import CHARTS
-from reports.page.style import PALETTE, look, mark_of_file
-from reports.run.cells import versions
-from reports.speed.budget import budget_of
-from reports.stability.variants import DRIVEN_ENGINES
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.adapters.conformance.conform import conform
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.options import OPTIONS
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.pages import lesson_page
+from crosscheck2d.reports.page.charts import CHARTS
+from crosscheck2d.reports.page.style import PALETTE, look, mark_of_file
+from crosscheck2d.reports.run.cells import versions
+from crosscheck2d.reports.speed.budget import budget_of
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 sys.argv[1:] = ["toy"]
-runpy.run_module("adapters.conformance.impact_table", run_name="__main__")
+runpy.run_module("crosscheck2d.adapters.conformance.impact_table", run_name="__main__")
 tests = pytest.main(PYTEST)
 print(json.dumps({
     "names": ["toy:plain" in ENGINES, "toy_scene" in SCENARIOS, "toy_metric" in METRICS,
@@ -302,7 +310,7 @@ def test_a_run_has_them_in_its_tables_and_on_its_page(grown: Path):
         "--out",
         "out",
     )
-    python(grown, "-m", "reports", *words)
+    python(grown, "-m", "crosscheck2d.reports", *words)
     table = pd.read_csv(grown / "out" / "deviations.csv")
     page = (grown / "out" / "report.html").read_text(encoding="utf-8")
     runs = pd.read_csv(grown / "out" / "runs.csv")
@@ -335,7 +343,9 @@ def test_speed_and_stability_have_the_engine_on_their_pages(
     grown: Path, command: str, names: list[str]
 ):
     """In the tables and the charts."""
-    python(grown, "-m", "reports", command, *names, "--engine", "toy", "--out", command)
+    python(
+        grown, "-m", "crosscheck2d.reports", command, *names, "--engine", "toy", "--out", command
+    )
     page = (grown / command / f"{command}.html").read_text(encoding="utf-8")
 
     assert "toy<i>:<wbr>plain" in page

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import ENGINES
 
 ROOT = Path(__file__).parent.parent
 MAY_IMPORT = {
@@ -82,7 +82,7 @@ def imports_of(path: Path) -> frozenset[str]:
 
 
 def of_folder(folder: str, names: Iterable[str]) -> set[str]:
-    """What of a folder is named: `scenarios`, scenarios.truth.exact -> truth."""
+    """What of a folder is named: `scenarios`, crosscheck2d.scenarios.truth.exact -> truth."""
     start = folder.replace("/", ".") + "."
     return {name.removeprefix(start).split(".")[0] for name in names if name.startswith(start)}
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from adapters.conformance.conform import PROBES
-from adapters.engines import ENGINES
-from reports.lessons.catalogue import LESSONS
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.adapters.conformance.conform import PROBES
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS
 

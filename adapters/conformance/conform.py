@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from adapters.conformance.contract import CONTRACT
-from adapters.conformance.laws import LAWS
-from adapters.conformance.physics import PHYSICS
-from adapters.conformance.probe import Probe, ProbeReading
-from adapters.engine import NotLoaded, Unsupported
-from adapters.engine_row import EngineRow
-from adapters.own_solver.process import processes_reused
+from crosscheck2d.adapters.conformance.contract import CONTRACT
+from crosscheck2d.adapters.conformance.laws import LAWS
+from crosscheck2d.adapters.conformance.physics import PHYSICS
+from crosscheck2d.adapters.conformance.probe import Probe, ProbeReading
+from crosscheck2d.adapters.engine import NotLoaded, Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.own_solver.process import processes_reused
 
 PROBES: dict[str, Probe] = CONTRACT | PHYSICS | LAWS
 

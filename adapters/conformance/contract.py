@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from adapters.conformance.probe import (
+from crosscheck2d.adapters.conformance.probe import (
     DT,
     Departure,
     Probe,
@@ -34,9 +34,9 @@ from adapters.conformance.probe import (
     scene_of,
     simplified,
 )
-from adapters.engine import Unsupported
-from adapters.engine_row import FLOAT32, EngineRow
-from adapters.runaway import fault_of
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.engine_row import FLOAT32, EngineRow
+from crosscheck2d.adapters.runaway import fault_of
 
 NONE = np.zeros(2)
 # a scale, an inverse mass, a product, a sum: the most roundings between a force and a velocity

@@ -2,7 +2,7 @@
 of 32 readings, which differ in the phase of the collision within its step and the angles of the
 disks, or in the height of a fall.
 
-`uv run --extra js python -m adapters.conformance.impact_table` asks all engines again, and writes
+`uv run --extra js python -m crosscheck2d.adapters.conformance.impact_table` asks all engines again, and writes
 impact_table.csv and the table of adapters/README.md; it takes half a minute. With names of engines
 behind it, it asks only those, and keeps the rows of all others.
 """
@@ -22,13 +22,13 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.conformance.physics import FRICTION
-from adapters.conformance.probe import DT, scene_of
-from adapters.engine import Engine, Unsupported
-from adapters.engine_row import FLOAT32, EngineRow
-from adapters.engines import ENGINES, FETCHED
-from adapters.friction import Frictionless
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.conformance.physics import FRICTION
+from crosscheck2d.adapters.conformance.probe import DT, scene_of
+from crosscheck2d.adapters.engine import Engine, Unsupported
+from crosscheck2d.adapters.engine_row import FLOAT32, EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.friction import Frictionless
+from crosscheck2d.scenarios.model import Array, Scene
 
 KEPT = Path(__file__).with_name("impact_table.csv")
 README = Path(__file__).parents[1] / "README.md"

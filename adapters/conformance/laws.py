@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.conformance.probe import (
+from crosscheck2d.adapters.conformance.probe import (
     DT,
     EXERCISE,
     Departure,
@@ -28,9 +28,9 @@ from adapters.conformance.probe import (
     one_disk,
     scene_of,
 )
-from adapters.engine import Unsupported
-from adapters.engine_row import EngineRow
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.scenarios.model import Array, Scene
 
 ALLOWED = 0.01  # of what is expected
 # The line of centres of a pair turns by v dt / (2 r) = 0.004 a step; springs touch for a dozen.

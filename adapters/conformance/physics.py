@@ -9,7 +9,7 @@ from functools import partial, wraps
 
 import numpy as np
 
-from adapters.conformance.probe import (
+from crosscheck2d.adapters.conformance.probe import (
     DT,
     Departure,
     Probe,
@@ -22,9 +22,9 @@ from adapters.conformance.probe import (
     scene_of,
     without_spin_and_gravity,
 )
-from adapters.engine_row import EngineRow
-from adapters.friction import Frictionless
-from scenarios.model import Scene
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.friction import Frictionless
+from crosscheck2d.scenarios.model import Scene
 
 SPEEDS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)  # m/s, on both sides of Box2D's threshold of 1
 FRICTION = 0.2  # that the scenes of the probes of friction state

@@ -12,10 +12,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.engine import SILENT, Engine, Unsupported
-from adapters.engine_row import EngineRow
-from adapters.first_collisions import first_collisions
-from scenarios.model import Array, Scene, State, frozen
+from crosscheck2d.adapters.engine import SILENT, Engine, Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.first_collisions import first_collisions
+from crosscheck2d.scenarios.model import Array, Scene, State, frozen
 
 EXERCISE = 0.9  # the restitution that the exercise states
 DT = 1 / 256  # s; a power of two, so that multiples of it are exact

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from numba import njit
 
-from reference_impl.compiled import forget_stale
+from crosscheck2d.reference_impl.compiled import forget_stale
 
 forget_stale(Path(__file__).parent)
 

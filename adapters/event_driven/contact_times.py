@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from adapters.event_driven.compiled import kernel
+from crosscheck2d.adapters.event_driven.compiled import kernel
 
 Quartic = tuple[float, float, float, float, float]
 

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.event_driven.compiled import inlined
-from adapters.event_driven.queue import Tree
-from scenarios.model import Array
+from crosscheck2d.adapters.event_driven.compiled import inlined
+from crosscheck2d.adapters.event_driven.queue import Tree
+from crosscheck2d.scenarios.model import Array
 
 Ints = NDArray[np.int64]
 Links = NDArray[np.uint32]

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import ContactImpulse, Unsupported
-from adapters.event_driven.events import EventEngine
-from adapters.library_versions import version
-from scenarios.model import Array, Scene, State
-from scenarios.no_truth import NoTruth
+from crosscheck2d.adapters.engine import ContactImpulse, Unsupported
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.adapters.library_versions import version
+from crosscheck2d.scenarios.model import Array, Scene, State
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 
 class EventDriven:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from adapters.event_driven import loop as event_loop
-from adapters.event_driven.disks import (
+from crosscheck2d.adapters.event_driven import loop as event_loop
+from crosscheck2d.adapters.event_driven.disks import (
     ACCUMULATION,
     BASE,
     DISK,
@@ -37,10 +37,10 @@ from adapters.event_driven.disks import (
     Scenery,
     Walls,
 )
-from adapters.event_driven.friction import rotation_at
-from adapters.event_driven.queue import empty_queue
-from scenarios.model import Array, Scene
-from scenarios.no_truth import NoTruth
+from crosscheck2d.adapters.event_driven.friction import rotation_at
+from crosscheck2d.adapters.event_driven.queue import empty_queue
+from crosscheck2d.scenarios.model import Array, Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 LOG_ROWS = 1 << 14
 EVENTS = 1 << 14  # in one call of the loop, some ms: in between Python can handle Ctrl-C

@@ -14,11 +14,11 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from adapters.event_driven.compiled import kernel
-from adapters.event_driven.disks import SLIP_END, Arena, Spins
-from adapters.event_driven.rest import normal_component, outward
-from adapters.event_driven.search import ROUNDING, image
-from scenarios.model import Array
+from crosscheck2d.adapters.event_driven.compiled import kernel
+from crosscheck2d.adapters.event_driven.disks import SLIP_END, Arena, Spins
+from crosscheck2d.adapters.event_driven.rest import normal_component, outward
+from crosscheck2d.adapters.event_driven.search import ROUNDING, image
+from crosscheck2d.scenarios.model import Array
 
 
 @kernel

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.event_driven.compiled import inlined, kernel
-from adapters.event_driven.disks import (
+from crosscheck2d.adapters.event_driven.compiled import inlined, kernel
+from crosscheck2d.adapters.event_driven.disks import (
     ACCUMULATION,
     BASE,
     END_DISK,
@@ -25,8 +25,8 @@ from adapters.event_driven.disks import (
     Arena,
     Walls,
 )
-from adapters.event_driven.friction import apply_wall_friction, update_wall_friction
-from adapters.event_driven.rest import (
+from crosscheck2d.adapters.event_driven.friction import apply_wall_friction, update_wall_friction
+from crosscheck2d.adapters.event_driven.rest import (
     COLLISIONS,
     check_rest,
     corner_acceleration,
@@ -36,7 +36,7 @@ from adapters.event_driven.rest import (
     slow,
     touched_part,
 )
-from adapters.event_driven.search import ROUNDING, image
+from crosscheck2d.adapters.event_driven.search import ROUNDING, image
 
 
 @inlined

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.event_driven.compiled import inlined, inlined_early, kernel
-from adapters.event_driven.disks import (
+from crosscheck2d.adapters.event_driven.compiled import inlined, inlined_early, kernel
+from crosscheck2d.adapters.event_driven.disks import (
     ACCUMULATION,
     BASE,
     DONE,
@@ -39,13 +39,13 @@ from adapters.event_driven.disks import (
     link_by_position,
     unlink,
 )
-from adapters.event_driven.friction import (
+from crosscheck2d.adapters.event_driven.friction import (
     apply_disk_friction,
     predict_slip_end,
     roll,
     update_wall_friction,
 )
-from adapters.event_driven.impacts import (
+from crosscheck2d.adapters.event_driven.impacts import (
     collide,
     collide_with_wall,
     count_and_log,
@@ -53,8 +53,8 @@ from adapters.event_driven.impacts import (
     rattles_on_disk,
     set_end,
 )
-from adapters.event_driven.queue import Tree, put
-from adapters.event_driven.rest import (
+from crosscheck2d.adapters.event_driven.queue import Tree, put
+from crosscheck2d.adapters.event_driven.rest import (
     check_rest,
     next_in_line,
     normal_component,
@@ -62,8 +62,8 @@ from adapters.event_driven.rest import (
     take_off,
     update_support,
 )
-from adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
-from scenarios.model import Array
+from crosscheck2d.adapters.event_driven.search import ALL, ROUNDING, find_own, find_pair
+from crosscheck2d.scenarios.model import Array
 
 EPOCH = 256.0  # s after which the clock restarts at 0, so that the last place of times stays small
 

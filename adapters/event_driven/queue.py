@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.event_driven.compiled import inlined
+from crosscheck2d.adapters.event_driven.compiled import inlined
 
 # Time and disk lie in one cache line. The disk is a float, so that the processor selects it without
 # a branch, as it selects the earlier time. With an integer it branches, mispredicts at every other

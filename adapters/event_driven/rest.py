@@ -12,9 +12,9 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from adapters.event_driven.compiled import inlined, kernel
-from adapters.event_driven.disks import Grid, Walls
-from adapters.event_driven.search import ROUNDING
+from crosscheck2d.adapters.event_driven.compiled import inlined, kernel
+from crosscheck2d.adapters.event_driven.disks import Grid, Walls
+from crosscheck2d.adapters.event_driven.search import ROUNDING
 
 # so many collisions of one disk within Rules.accumulation_ulps, or without flights between them,
 # accumulate

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from adapters.event_driven.compiled import inlined, inlined_early, kernel
-from adapters.event_driven.contact_times import curved_time, disk_time, line_time
-from adapters.event_driven.disks import (
+from crosscheck2d.adapters.event_driven.compiled import inlined, inlined_early, kernel
+from crosscheck2d.adapters.event_driven.contact_times import curved_time, disk_time, line_time
+from crosscheck2d.adapters.event_driven.disks import (
     EDGE,
     END,
     NONE,

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from adapters.advance import Foreseen
-from adapters.engine import ContactImpulse, NotLoaded, Unsupported
-from adapters.float32 import must_fit, rounding
-from adapters.javascript.v8 import Packaged
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.advance import Foreseen
+from crosscheck2d.adapters.engine import ContactImpulse, NotLoaded, Unsupported
+from crosscheck2d.adapters.float32 import must_fit, rounding
+from crosscheck2d.adapters.javascript.v8 import Packaged
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 STEP_LIMIT = 60.0  # s that one call for some steps may take
 

@@ -3,7 +3,7 @@ matched profiles, as the files of this folder name them."""
 
 from __future__ import annotations
 
-from adapters.matched import GEOMETRY, Searched
+from crosscheck2d.adapters.matched import GEOMETRY, Searched
 
 STATED = "as the scene states"
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from py_mini_racer import JSEvalException, JSOOMException, JSTimeoutException, MiniRacer
 
-from adapters.npm_packages import NotInstalled, text_of, version_of
-from adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.npm_packages import NotInstalled, text_of, version_of
+from crosscheck2d.adapters.own_solver.file import SolverFailed
 
 HERE = Path(__file__).parent
 HEAP = 512 * 2**20  # bytes; Rapier's text and its WebAssembly take a tenth of it

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.mechanisms import ablated_reference
-from adapters.mechanisms.ablated_reference import STAGES, Parameters
-from adapters.mechanisms.contacts import no_contacts
-from adapters.reference import Reference
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.mechanisms import ablated_reference
+from crosscheck2d.adapters.mechanisms.ablated_reference import STAGES, Parameters
+from crosscheck2d.adapters.mechanisms.contacts import no_contacts
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.scenarios.model import Array, Scene
 
 EXERCISE = ("accelerate", "move", "pairs", "walls")
 POSITION_FIRST = ("move", "pairs", "walls", "accelerate")
@@ -54,7 +54,7 @@ MIXING: dict[str, Callable[[float, float], float]] = {
 
 
 class AblatedReference(Reference):
-    """`adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's
+    """`crosscheck2d.adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's
     solver, to the bit.
 
     order: the stages of a step; substeps: how often the order is repeated in a dt, each with its
@@ -63,7 +63,7 @@ class AblatedReference(Reference):
         has it.
     mixing: how the restitutions of two disks are combined, a key of `MIXING`.
     friction: of a pair; None: the scene's.
-    `parameters`: fields of `adapters.mechanisms.ablated_reference.Parameters`.
+    `parameters`: fields of `crosscheck2d.adapters.mechanisms.ablated_reference.Parameters`.
     """
 
     def __init__(

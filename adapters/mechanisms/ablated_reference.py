@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.mechanisms.contacts import (
+from crosscheck2d.adapters.mechanisms.contacts import (
     Contacts,
     apply_pair,
     by_colour,
@@ -26,11 +26,11 @@ from adapters.mechanisms.contacts import (
     rub,
     turn,
 )
-from adapters.mechanisms.recycling import detect_again
-from reference_impl.compiled import compiled, internal, pasted
-from reference_impl.coulomb import carry_over, collide, collide_wall
-from reference_impl.exercise import touching, touching_wall, wrap
-from reference_impl.state import Disks, World
+from crosscheck2d.adapters.mechanisms.recycling import detect_again
+from crosscheck2d.reference_impl.compiled import compiled, internal, pasted
+from crosscheck2d.reference_impl.coulomb import carry_over, collide, collide_wall
+from crosscheck2d.reference_impl.exercise import touching, touching_wall, wrap
+from crosscheck2d.reference_impl.state import Disks, World
 
 Collision = tuple[int, int, int, float]  # step, i, j or -1 - wall, impulse N s
 STAGES = (

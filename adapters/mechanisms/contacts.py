@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference_impl import compiled as compiling
-from reference_impl.compiled import compiled, forget_stale, internal
-from reference_impl.exercise import direction, move, nearest_point
-from reference_impl.state import Disks, World
+from crosscheck2d.reference_impl import compiled as compiling
+from crosscheck2d.reference_impl.compiled import compiled, forget_stale, internal
+from crosscheck2d.reference_impl.exercise import direction, move, nearest_point
+from crosscheck2d.reference_impl.state import Disks, World
 
 forget_stale(Path(__file__).parent, Path(compiling.__file__).parent)
 

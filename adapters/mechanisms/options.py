@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from adapters.engine import Engine
-from adapters.engine_row import AccuracyParameter
-from adapters.engines import ENGINES, changed
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engine_row import AccuracyParameter
+from crosscheck2d.adapters.engines import ENGINES, changed
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """The engine and a profile that names the swept parameter, as in `reports.page.style`."""
+        """The engine and a profile that names the swept parameter, as in `crosscheck2d.reports.page.style`."""
         return f"{self.engine}+{self.parameter.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:

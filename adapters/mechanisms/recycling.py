@@ -7,9 +7,9 @@ stays without. Compiled by numba, as `exercise` is.
 
 from math import cos, hypot, inf, sin
 
-from adapters.mechanisms.contacts import Contacts, column, gap_of, note, remember
-from reference_impl.compiled import internal
-from reference_impl.state import Disks, World
+from crosscheck2d.adapters.mechanisms.contacts import Contacts, column, gap_of, note, remember
+from crosscheck2d.reference_impl.compiled import internal
+from crosscheck2d.reference_impl.state import Disks, World
 
 TURNED = 0.98  # cos of the rotation after which a body is tested again
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.engines import row_of
-from scenarios.model import Scene
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.scenarios.model import Scene
 
 MOST = 3  # settings that are changed one after the other
 GONE = 0.5  # of the error: a change that leaves more of it does not remove its cause
@@ -167,7 +167,7 @@ def _as_box2d(scene: Scene, sleep: str, edge: str, skin: str) -> list[Setting]:
 
 def _box2d(scene: Scene, dt: float) -> list[Setting]:
     """What is compiled in is moved by the units in which the scene is given."""
-    from adapters.box2d import fastest
+    from crosscheck2d.adapters.box2d import fastest
 
     threshold = "1 unit of length a unit of time, compiled in", "give times in units of 1000 s"
     settings = [
@@ -205,7 +205,7 @@ def _planck(scene: Scene, _dt: float) -> list[Setting]:
 
 
 def _box2d_v3(scene: Scene, dt: float) -> list[Setting]:
-    from adapters.box2d import fastest
+    from crosscheck2d.adapters.box2d import fastest
 
     # contacts are foreseen within 0.02 units: fast disks need more
     radius, wide = float(scene.radius.min()), fastest(scene) * dt / 0.02
@@ -226,7 +226,7 @@ def _box2d_v3(scene: Scene, dt: float) -> list[Setting]:
 
 
 def _rapier2d(scene: Scene, dt: float) -> list[Setting]:
-    from adapters.box2d import fastest
+    from crosscheck2d.adapters.box2d import fastest
 
     radius, fast = float(scene.radius.min()), fastest(scene) / 200  # it cuts at 400 units a second
     units = [0.5 * radius, *([fast] if fast > 2 else [])]

@@ -1,6 +1,6 @@
 """The mechanisms of every engine: how it differs from exact flight with end-of-step detection.
 
-Each can be enabled in `adapters.mechanisms.ablated_reference`; some can be disabled in the
+Each can be enabled in `crosscheck2d.adapters.mechanisms.ablated_reference`; some can be disabled in the
 engine, too. The numbers are read from the engine. With all of its mechanisms the reference
 reproduces the engine, mostly to rounding.
 """
@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import NOT_REPORTED, Engine
-from adapters.engine_row import FLOAT32
-from adapters.engines import row_of
-from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
-from scenarios.model import Scene
+from crosscheck2d.adapters.engine import NOT_REPORTED, Engine
+from crosscheck2d.adapters.engine_row import FLOAT32
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
+from crosscheck2d.scenarios.model import Scene
 
 NAMES = (
     "flight",
@@ -240,7 +240,7 @@ def _friction(name: str, reported: Mapping[str, Any], scene: Scene, **how: bool)
 
 
 def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) -> list[Mechanism]:
-    from adapters.box2d_v3 import MATCHED, SHIPPED
+    from crosscheck2d.adapters.box2d_v3 import MATCHED, SHIPPED
 
     chosen: Mapping[str, Any] = SHIPPED if name.endswith(":shipped") else MATCHED
     # b2_speculativeDistance: four slops of 0.005 units.

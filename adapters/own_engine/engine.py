@@ -12,14 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import SILENT, Unsupported
-from adapters.engine_row import EngineRow
-from adapters.own_engine.features import must_model, refusal
-from adapters.own_engine.surface import is_engine, must_be_either
-from adapters.own_solver.engine import STEP_LIMIT, OwnSolver, row_of_solver
-from adapters.own_solver.file import LONGEST, SolverFailed, SolverText, printable, read_solver
-from adapters.own_solver.restitution import EXERCISE
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.engine import SILENT, Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.own_engine.features import must_model, refusal
+from crosscheck2d.adapters.own_engine.surface import is_engine, must_be_either
+from crosscheck2d.adapters.own_solver.engine import STEP_LIMIT, OwnSolver, row_of_solver
+from crosscheck2d.adapters.own_solver.file import (
+    LONGEST,
+    SolverFailed,
+    SolverText,
+    printable,
+    read_solver,
+)
+from crosscheck2d.adapters.own_solver.restitution import EXERCISE
+from crosscheck2d.scenarios.model import Array, Scene
 
 TEMPLATES = {
     "javascript": Path(__file__).parent / "template.js",
@@ -42,10 +48,10 @@ class EngineText(SolverText):
     def load(self, copies: Path | None) -> Any:
         """The object that answers the commands, in the calling process; raises `SolverFailed`."""
         if self.kind == "javascript":
-            from adapters.own_engine.javascript import JavaScriptFile
+            from crosscheck2d.adapters.own_engine.javascript import JavaScriptFile
 
             return JavaScriptFile(self)
-        from adapters.own_engine.python import PythonFile
+        from crosscheck2d.adapters.own_engine.python import PythonFile
 
         return PythonFile(self, copies)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from adapters.engine import Unsupported
-from adapters.friction import Frictionless
-from adapters.own_solver.file import SolverFailed
-from scenarios.model import Scene
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.friction import Frictionless
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.scenarios.model import Scene
 
 # Word in the line -> its name in a sentence.
 FEATURES = {

@@ -9,10 +9,10 @@ from typing import Any
 
 from py_mini_racer import JSEvalException, JSTimeoutException
 
-from adapters.own_engine.features import features_of
-from adapters.own_engine.surface import ENGINE, HOW
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.javascript import DRIVER, JavaScriptSolver, thrown
+from crosscheck2d.adapters.own_engine.features import features_of
+from crosscheck2d.adapters.own_engine.surface import ENGINE, HOW
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.javascript import DRIVER, JavaScriptSolver, thrown
 
 ENGINE_DRIVER = (Path(__file__).parent / "driver.js").read_text(encoding="utf-8")
 # Evaluated after the file, where its `let` and `const` can be seen too.

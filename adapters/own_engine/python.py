@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.own_engine.features import features_of
-from adapters.own_engine.surface import ENGINE, HOW
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.python import PythonSolver, seed
-from adapters.own_solver.spheres import Fields
+from crosscheck2d.adapters.own_engine.features import features_of
+from crosscheck2d.adapters.own_engine.surface import ENGINE, HOW
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.python import PythonSolver, seed
+from crosscheck2d.adapters.own_solver.spheres import Fields
 
 SHOWN = 60  # characters of a returned value in a message
 COLLISION = "asked are rows [i, j] or [i, j, impulse]: disk i; disk j, or wall w as -1 - w; N s"

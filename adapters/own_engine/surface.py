@@ -7,8 +7,8 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator
 
-from adapters.own_solver.file import NotASolver, SolverText
-from adapters.own_solver.restitution import code_of
+from crosscheck2d.adapters.own_solver.file import NotASolver, SolverText
+from crosscheck2d.adapters.own_solver.restitution import code_of
 
 ENGINE = ("create", "step", "read")
 # Names of the exercise: those that an engine may also use, and those that it does not.

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from adapters.own_solver.spheres import sphere_of
-from adapters.reference import Reference
-from reference_impl.state import Disks, World, make_disks
-from scenarios.model import Scene
+from crosscheck2d.adapters.own_solver.spheres import sphere_of
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.reference_impl.state import Disks, World, make_disks
+from crosscheck2d.scenarios.model import Scene
 
 LOW, HIGH = np.array([-5.0, -3.0]), np.array([5.0, 3.0])  # m, the exercise's box
 

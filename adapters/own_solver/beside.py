@@ -20,7 +20,7 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
-from adapters.safe_path import PACKAGES
+from crosscheck2d.adapters.safe_path import PACKAGES
 
 
 def modules_beside(

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import ContactImpulse, NotLoaded, Unsupported
-from adapters.engine_row import FLOAT64, EngineRow
-from adapters.friction import must_be_frictionless
-from adapters.own_solver.file import SolverFailed, SolverText
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import EXERCISE, restitution_of
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.engine import ContactImpulse, NotLoaded, Unsupported
+from crosscheck2d.adapters.engine_row import FLOAT64, EngineRow
+from crosscheck2d.adapters.friction import must_be_frictionless
+from crosscheck2d.adapters.own_solver.file import SolverFailed, SolverText
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.own_solver.restitution import EXERCISE, restitution_of
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
 STEP_LIMIT = 30.0  # s that one call for several steps may take

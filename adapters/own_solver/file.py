@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from adapters.own_solver.beside import modules_beside
+from crosscheck2d.adapters.own_solver.beside import modules_beside
 
 LARGEST = 2**20  # bytes; the exercise's file has about 5000
 # times its limit that a call may take by the clock: on a busy machine it gets a part of a processor
@@ -156,7 +156,7 @@ def read_library(path: Path, text: str) -> dict[str, str]:
     """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
     `NotASolver`."""
     # it imports numpy, which --help does not need
-    from adapters.own_solver.gl_matrix import gl_matrix_of, where_to
+    from crosscheck2d.adapters.own_solver.gl_matrix import gl_matrix_of, where_to
 
     found = gl_matrix_of(path, text)
     return {} if found is None else {found[0]: decoded(found[1], read_bytes(found[1], where_to()))}

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-from adapters.npm_packages import HOW, file_of, missing
+from crosscheck2d.adapters.npm_packages import HOW, file_of, missing
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")

@@ -19,8 +19,8 @@ from py_mini_racer import (
     MiniRacer,
 )
 
-from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
-from adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, where_to
+from crosscheck2d.adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from crosscheck2d.adapters.own_solver.gl_matrix import NAMES, TAKE_OUT, where_to
 
 HEAP = 64 * 2**20  # bytes; a solver needs a hundredth of it
 LOAD_LIMIT = 2.0  # s

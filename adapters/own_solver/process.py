@@ -16,15 +16,15 @@ from time import monotonic
 from types import TracebackType
 from typing import Any, NamedTuple
 
-from adapters import system
-from adapters.engine import NotStarted
-from adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
-from adapters.own_solver.worker import HERE, MEMORY
-from adapters.safe_path import path_of_this, python
-from scenarios.truth.cache import folder
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.engine import NotStarted
+from crosscheck2d.adapters.own_solver.file import PATIENCE, Loadable, SolverFailed, SolverText
+from crosscheck2d.adapters.own_solver.worker import HERE, MEMORY
+from crosscheck2d.adapters.safe_path import path_of_this, python
+from crosscheck2d.scenarios.truth.cache import folder
 
 STARTING = 14.0  # s for Python, V8 or numba to start on a busy machine, and the file to load
-WORK = "from adapters.own_solver.worker import work; work()"
+WORK = "from crosscheck2d.adapters.own_solver.worker import work; work()"
 INTRUDED = "wrote into the channel that its answers come by"
 TOO_LARGE = "needs more memory than it may use, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27

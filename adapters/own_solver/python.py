@@ -13,10 +13,10 @@ from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
 
-from adapters.own_solver.beside import Neighbours
-from adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
-from adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
-from adapters.system import TimeIsUp, stopped_after
+from crosscheck2d.adapters.own_solver.beside import Neighbours
+from crosscheck2d.adapters.own_solver.file import PATIENCE, SolverFailed, SolverText
+from crosscheck2d.adapters.own_solver.spheres import NAMES, Fields, Traced, sphere_of
+from crosscheck2d.adapters.system import TimeIsUp, stopped_after
 
 LOAD_LIMIT = 3.0  # s; importing numba takes one
 DECIMAL_COMMA = re.compile(r"=\s*\d+,\d+\s*$", re.MULTILINE)
@@ -93,7 +93,7 @@ class PythonSolver:
         }
         self.whole: Any = None  # plays whole scenes with `advance` if the file has it
         if self.surface == "advance":
-            from adapters.own_solver.arrays import Whole, as_functions
+            from crosscheck2d.adapters.own_solver.arrays import Whole, as_functions
 
             self.file, self.whole = as_functions(module), Whole(module)
         self.functions: dict[str, Any] = {k: k in self.file for k in named} | {"replaced": []}

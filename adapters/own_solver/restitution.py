@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass
 from math import nan
 
-from adapters.own_solver.file import SolverFailed, SolverText
-from adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.own_solver.file import SolverFailed, SolverText
+from crosscheck2d.adapters.own_solver.process import SolverProcess
 
 # largest difference between two equal restitutions: that of a constant written 0.9
 SAME = 1e-3

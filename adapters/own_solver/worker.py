@@ -16,8 +16,8 @@ from pathlib import Path
 from threading import Thread
 from typing import IO, Any
 
-from adapters import system
-from adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.own_solver.file import SolverFailed
 
 HERE = "here"  # the first line, before the solver is loaded
 # bytes of data; the address space cannot be limited, because V8 reserves far more than it uses
@@ -87,10 +87,10 @@ def load(solver: Any, copies: Path | None) -> Any:
     if solver.engine:
         return solver.load(copies)
     if solver.kind == "javascript":
-        from adapters.own_solver.javascript import JavaScriptSolver
+        from crosscheck2d.adapters.own_solver.javascript import JavaScriptSolver
 
         return JavaScriptSolver(solver)
-    from adapters.own_solver.python import PythonSolver
+    from crosscheck2d.adapters.own_solver.python import PythonSolver
 
     return PythonSolver(solver, copies)
 

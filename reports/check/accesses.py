@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of
-from reports.check.questions import Question, fresh_world
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.own_solver.restitution import code_of
+from crosscheck2d.reports.check.questions import Question, fresh_world
 
 LIMIT = 0.2  # s a traced call may take: the first accesses are enough for one that never returns
 

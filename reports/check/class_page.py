@@ -9,14 +9,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-from reports.check.marks import Marked, number
-from reports.check.page import GENERATOR
-from reports.check.rows import TASKS
-from reports.check.terminal import results, same_code, sentence_on
-from reports.check.verdict import Tally, headline
-from reports.page.documents import render
-from reports.run.made import sealed
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.check.marks import Marked, number
+from crosscheck2d.reports.check.page import GENERATOR
+from crosscheck2d.reports.check.rows import TASKS
+from crosscheck2d.reports.check.terminal import results, same_code, sentence_on
+from crosscheck2d.reports.check.verdict import Tally, headline
+from crosscheck2d.reports.page.documents import render
+from crosscheck2d.reports.run.made import sealed
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 BINS = 10  # bars of the distribution, each a tenth of the points
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.questions import Ball, SolverAnswer, direction
-from scenarios.model import Array
+from crosscheck2d.reports.check.questions import Ball, SolverAnswer, direction
+from crosscheck2d.scenarios.model import Array
 
 
 class PairCollision(NamedTuple):

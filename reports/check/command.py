@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from unicodedata import combining, normalize
 
-from adapters.own_solver.file import (
+from crosscheck2d.adapters.own_solver.file import (
     KINDS,
     NotASolver,
     SolverFailed,
@@ -25,24 +25,24 @@ from adapters.own_solver.file import (
     printable,
     read_solver,
 )
-from adapters.own_solver.gl_matrix import HANDED_OUT
-from adapters.own_solver.process import SolverProcess, keep_processes
-from reports.check.formats import FORMATS, show
-from reports.check.functions import keeps_state
-from reports.check.marks import Marked, id_of, matched, place_of
-from reports.check.points import DEFAULT, BadPoints, Points, read_points
-from reports.check.rows import CheckRow
-from reports.check.terminal import print_scene, print_total, sentence_on
-from reports.check.verdict import FileCheck, check_file, named, nothing_in
-from reports.run.made import may_overwrite
-from reports.run.pool import Failure, run_all
-from reports.terminal.counts import counted
-from reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
-from reports.terminal.foreign_text import put_text
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.own_solver.gl_matrix import HANDED_OUT
+from crosscheck2d.adapters.own_solver.process import SolverProcess, keep_processes
+from crosscheck2d.reports.check.formats import FORMATS, show
+from crosscheck2d.reports.check.functions import keeps_state
+from crosscheck2d.reports.check.marks import Marked, id_of, matched, place_of
+from crosscheck2d.reports.check.points import DEFAULT, BadPoints, Points, read_points
+from crosscheck2d.reports.check.rows import CheckRow
+from crosscheck2d.reports.check.terminal import print_scene, print_total, sentence_on
+from crosscheck2d.reports.check.verdict import FileCheck, check_file, named, nothing_in
+from crosscheck2d.reports.run.made import may_overwrite
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.progress import Progress
 
 if TYPE_CHECKING:
-    from reports.check.smallest_scene import Smallest
+    from crosscheck2d.reports.check.smallest_scene import Smallest
 
 # Only pages written by this command start with this; they may be overwritten.
 PAGE = b'<meta name="generator" content="crosscheck check">'
@@ -401,8 +401,8 @@ def scenes_of(one: FileCheck) -> list[Smallest]:
 def make_page(path: Path, marked: Sequence[Marked], several: bool) -> None:
     """Write the page of a file, or that of a class, and print its path; exits 2 if that fails."""
     # not needed without a page, and slow to import
-    from reports.check.class_page import write_class_page
-    from reports.check.page import write_page
+    from crosscheck2d.reports.check.class_page import write_class_page
+    from crosscheck2d.reports.check.page import write_page
 
     try:
         write_class_page(path, marked) if several else write_page(path, marked[0])
@@ -417,7 +417,7 @@ def scenes_here(
 ) -> list[Smallest]:
     """In a worker: the smallest scenes that show these faults of a solver; none if the solver
     fails."""
-    from reports.check.smallest import smallest_scenes
+    from crosscheck2d.reports.check.smallest import smallest_scenes
 
     try:
         with SolverProcess(solver) as process:

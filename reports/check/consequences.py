@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from reports.check.detection import NOT_OF_THE_CENTRES
-from reports.check.functions import keeps_state
-from reports.check.impacts import ABSOLUTE_NORMAL
-from reports.check.impulse import ONLY, UNALIKE
-from reports.check.projection import WITHOUT_IMPULSE
-from reports.check.rows import FOLLOWS, TASKS, UNKNOWN, CheckRow
+from crosscheck2d.reports.check.detection import NOT_OF_THE_CENTRES
+from crosscheck2d.reports.check.functions import keeps_state
+from crosscheck2d.reports.check.impacts import ABSOLUTE_NORMAL
+from crosscheck2d.reports.check.impulse import ONLY, UNALIKE
+from crosscheck2d.reports.check.projection import WITHOUT_IMPULSE
+from crosscheck2d.reports.check.rows import FOLLOWS, TASKS, UNKNOWN, CheckRow
 
 # The causes that different tasks report for one mistake in the distance or the normal.
 SAME_MISTAKE = (

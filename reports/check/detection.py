@@ -7,11 +7,11 @@ from itertools import product
 
 import numpy as np
 
-from adapters.own_solver.restitution import code_of
-from reports.check.functions import failed_calls
-from reports.check.questions import Ball, SolverAnswer
-from reports.check.rows import CheckRow, judged, near, shown
-from scenarios.model import Array
+from crosscheck2d.adapters.own_solver.restitution import code_of
+from crosscheck2d.reports.check.functions import failed_calls
+from crosscheck2d.reports.check.questions import Ball, SolverAnswer
+from crosscheck2d.reports.check.rows import CheckRow, judged, near, shown
+from crosscheck2d.scenarios.model import Array
 
 Rule = Callable[[float, float, float, float], bool | None]
 

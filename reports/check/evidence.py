@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reports.check.rows import CheckRow
+from crosscheck2d.reports.check.rows import CheckRow
 
 
 def evidence(row: CheckRow) -> list[str]:

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
-from reports.check import impulse, projection
-from reports.check.detection import detection_rows
-from reports.check.functions import arguments, failed_calls, failure
-from reports.check.lines import SHOWN, Source
-from reports.check.questions import (
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check import impulse, projection
+from crosscheck2d.reports.check.detection import detection_rows
+from crosscheck2d.reports.check.functions import arguments, failed_calls, failure
+from crosscheck2d.reports.check.lines import SHOWN, Source
+from crosscheck2d.reports.check.questions import (
     LIMIT,
     QUESTIONS,
     SolverAnswer,
@@ -22,7 +22,7 @@ from reports.check.questions import (
     fresh_world,
     was_stopped,
 )
-from reports.check.rows import CheckRow
+from crosscheck2d.reports.check.rows import CheckRow
 
 # s that a call may take if others are known not to return; a right one takes microseconds
 SOON = 0.02

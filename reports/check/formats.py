@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from adapters.own_solver.file import printable
-from reports.check.evidence import evidence
-from reports.check.marks import Marked, number
-from reports.check.outcomes import OUTCOMES
-from reports.check.rows import TASKS
-from reports.check.terminal import print_class, print_file
-from reports.check.verdict import Tally
-from reports.run.made import sealed
+from crosscheck2d.adapters.own_solver.file import printable
+from crosscheck2d.reports.check.evidence import evidence
+from crosscheck2d.reports.check.marks import Marked, number
+from crosscheck2d.reports.check.outcomes import OUTCOMES
+from crosscheck2d.reports.check.rows import TASKS
+from crosscheck2d.reports.check.terminal import print_class, print_file
+from crosscheck2d.reports.check.verdict import Tally
+from crosscheck2d.reports.run.made import sealed
 
 TITLE = "crosscheck check\n\n"
 

@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
-from adapters.own_solver.restitution import code_of
-from reports.check.questions import Ball, SolverAnswer, was_stopped
-from reports.check.rows import SAME_AGAIN, CheckRow, judged, near
+from crosscheck2d.adapters.own_solver.restitution import code_of
+from crosscheck2d.reports.check.questions import Ball, SolverAnswer, was_stopped
+from crosscheck2d.reports.check.rows import SAME_AGAIN, CheckRow, judged, near
 
 FUNCTIONS = {"1": "integrate", "2a": "sphereSphereCollisionHandling"}
 MAY_FAIL = ("same centre",)  # judged by its own row

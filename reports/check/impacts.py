@@ -14,13 +14,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.check.collisions import Impulse, PairCollision, changes, collision_of, outcome
-from reports.check.new_speeds import speed_mistakes
-from reports.check.parts import Change, components, damping, scalar_products
-from reports.check.questions import COLLISIONS, SolverAnswer, finite
-from reports.check.restitution import Restitution
-from reports.check.rows import near
-from scenarios.model import Array
+from crosscheck2d.reports.check.collisions import (
+    Impulse,
+    PairCollision,
+    changes,
+    collision_of,
+    outcome,
+)
+from crosscheck2d.reports.check.new_speeds import speed_mistakes
+from crosscheck2d.reports.check.parts import Change, components, damping, scalar_products
+from crosscheck2d.reports.check.questions import COLLISIONS, SolverAnswer, finite
+from crosscheck2d.reports.check.restitution import Restitution
+from crosscheck2d.reports.check.rows import near
+from crosscheck2d.scenarios.model import Array
 
 
 def scaled(factor: Callable[[PairCollision, float], float]) -> Impulse:

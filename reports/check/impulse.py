@@ -8,9 +8,9 @@ from itertools import product
 
 import numpy as np
 
-from adapters.own_solver.restitution import EXERCISE
-from reports.check.collisions import PairCollision, outcome
-from reports.check.impacts import (
+from crosscheck2d.adapters.own_solver.restitution import EXERCISE
+from crosscheck2d.reports.check.collisions import PairCollision, outcome
+from crosscheck2d.reports.check.impacts import (
     IMPULSES,
     MASSLESS,
     NEVER,
@@ -23,10 +23,10 @@ from reports.check.impacts import (
     in_call,
     tangent,
 )
-from reports.check.questions import COLLISIONS, SolverAnswer, finite
-from reports.check.restitution import Restitution
-from reports.check.rows import CheckRow, judged, near, not_asked, shown
-from scenarios.model import Array
+from crosscheck2d.reports.check.questions import COLLISIONS, SolverAnswer, finite
+from crosscheck2d.reports.check.restitution import Restitution
+from crosscheck2d.reports.check.rows import CheckRow, judged, near, not_asked, shown
+from crosscheck2d.scenarios.model import Array
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of
-from reports.check.accesses import (
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.own_solver.restitution import code_of
+from crosscheck2d.reports.check.accesses import (
     LOOPS,
     Access,
     accesses_of,
@@ -17,11 +17,11 @@ from reports.check.accesses import (
     part_of,
     repeated,
 )
-from reports.check.functions import CHANGED, FUNCTIONS
-from reports.check.impacts import APPROACH, AS_IF_EQUAL
-from reports.check.parts import BEFORE
-from reports.check.questions import QUESTIONS
-from reports.check.rows import INTEGRATES, SAME_AGAIN, UNKNOWN, CheckRow
+from crosscheck2d.reports.check.functions import CHANGED, FUNCTIONS
+from crosscheck2d.reports.check.impacts import APPROACH, AS_IF_EQUAL
+from crosscheck2d.reports.check.parts import BEFORE
+from crosscheck2d.reports.check.questions import QUESTIONS
+from crosscheck2d.reports.check.rows import INTEGRATES, SAME_AGAIN, UNKNOWN, CheckRow
 
 # task -> the question that is traced
 SHOWN = {"1": "force", "2": "collision/light on heavy"}

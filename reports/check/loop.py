@@ -9,9 +9,9 @@ from itertools import combinations
 
 import numpy as np
 
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
-from reports.check.questions import (
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check.questions import (
     LIMIT,
     Ball,
     Question,
@@ -20,7 +20,7 @@ from reports.check.questions import (
     ask_in_two_orders,
     fresh_world,
 )
-from reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
+from crosscheck2d.reports.check.rows import FOLLOWS, CheckRow, judged, near, not_asked, shown
 
 DT = 1e-3  # s, the exercise's
 # m, a place beyond each

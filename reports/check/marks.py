@@ -9,15 +9,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from adapters.own_solver.file import printable
-from reports.check.evidence import lines_and_formula
-from reports.check.outcomes import OUTCOMES, Status
-from reports.check.points import Points
-from reports.check.rows import TASKS, UNKNOWN, CheckRow, Verdict
-from reports.check.verdict import WITHOUT_NUMBERS, FileCheck, headline, numbers_of, task_title
+from crosscheck2d.adapters.own_solver.file import printable
+from crosscheck2d.reports.check.evidence import lines_and_formula
+from crosscheck2d.reports.check.outcomes import OUTCOMES, Status
+from crosscheck2d.reports.check.points import Points
+from crosscheck2d.reports.check.rows import TASKS, UNKNOWN, CheckRow, Verdict
+from crosscheck2d.reports.check.verdict import (
+    WITHOUT_NUMBERS,
+    FileCheck,
+    headline,
+    numbers_of,
+    task_title,
+)
 
 if TYPE_CHECKING:
-    from reports.check.smallest_scene import Smallest
+    from crosscheck2d.reports.check.smallest_scene import Smallest
 
 # File names that do not identify the student; then the folder name does.
 ANYBODYS = ("exercise", "solver")

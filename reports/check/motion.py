@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from reports.check.questions import QUESTIONS, Ball, SolverAnswer
-from reports.check.rows import CheckRow, Law, follows, judged, near, not_asked, shown
-from scenarios.model import Array
+from crosscheck2d.reports.check.questions import QUESTIONS, Ball, SolverAnswer
+from crosscheck2d.reports.check.rows import CheckRow, Law, follows, judged, near, not_asked, shown
+from crosscheck2d.scenarios.model import Array
 
 TURNED = ("turned", "turned far", "turned back")
 FORCED = ("force", "force, other numbers", "coast")

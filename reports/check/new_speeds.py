@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from reports.check.collisions import PairCollision
-from reports.check.parts import Change
-from scenarios.model import Array
+from crosscheck2d.reports.check.collisions import PairCollision
+from crosscheck2d.reports.check.parts import Change
+from crosscheck2d.scenarios.model import Array
 
 # (own mass, mass of the other, own speed along n, that of the other, e) -> its new speed, m/s
 Speed = Callable[[float, float, float, float, float], float]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from reports.check.rows import Verdict
+from crosscheck2d.reports.check.rows import Verdict
 
 Status = Verdict | Literal["refused"]
 

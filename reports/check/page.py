@@ -8,19 +8,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
-from adapters.run import Run
-from reports.check.marks import Marked
-from reports.check.rows import TASKS, Verdict, shown
-from reports.check.scene_words import faults_of, scene_lines, together
-from reports.check.smallest_scene import DT, Smallest
-from reports.check.terminal import points_of
-from reports.check.verdict import FileCheck, Tally
-from reports.page import style
-from reports.page.documents import ENGINE, render
-from reports.page.replay import pack_layers, ratio_of
-from reports.run.made import sealed
-from reports.terminal.foreign_text import put_text
-from scenarios.model import Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.check.marks import Marked
+from crosscheck2d.reports.check.rows import TASKS, Verdict, shown
+from crosscheck2d.reports.check.scene_words import faults_of, scene_lines, together
+from crosscheck2d.reports.check.smallest_scene import DT, Smallest
+from crosscheck2d.reports.check.terminal import points_of
+from crosscheck2d.reports.check.verdict import FileCheck, Tally
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.documents import ENGINE, render
+from crosscheck2d.reports.page.replay import pack_layers, ratio_of
+from crosscheck2d.reports.run.made import sealed
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.scenarios.model import Trajectory
 
 GENERATOR = "crosscheck check"
 # distinct from the truth on light and dark pages, by style.py

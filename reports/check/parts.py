@@ -8,9 +8,9 @@ from itertools import product
 
 import numpy as np
 
-from reports.check.collisions import Impulse, PairCollision
-from reports.check.rows import near, shown
-from scenarios.model import Array
+from crosscheck2d.reports.check.collisions import Impulse, PairCollision
+from crosscheck2d.reports.check.rows import near, shown
+from crosscheck2d.scenarios.model import Array
 
 Change = Callable[[PairCollision, Array, float], tuple[Array, Array]]
 # (velocity, of the other axis, of the other sphere, n, n of the other axis) -> one product of (vA -

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from reports.check.rows import TASKS
+from crosscheck2d.reports.check.rows import TASKS
 
 DEFAULT = Path(__file__).parent / "tasks.toml"
 # The questions that may have points, by task. "loop" and "scenes" have none by default: the

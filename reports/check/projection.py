@@ -7,18 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.own_solver.restitution import EXERCISE
-from reports.check.collisions import changes
-from reports.check.impacts import (
+from crosscheck2d.adapters.own_solver.restitution import EXERCISE
+from crosscheck2d.reports.check.collisions import changes
+from crosscheck2d.reports.check.impacts import (
     BACKWARDS,
     HALF_TURNED,
     NORMAL_IN_DEGREES,
     CollisionExplanation,
     in_degrees,
 )
-from reports.check.questions import COLLISIONS, Ball, SolverAnswer, direction, finite
-from reports.check.rows import CheckRow, judged, near, not_asked, shown
-from scenarios.model import Array
+from crosscheck2d.reports.check.questions import COLLISIONS, Ball, SolverAnswer, direction, finite
+from crosscheck2d.reports.check.rows import CheckRow, judged, near, not_asked, shown
+from crosscheck2d.scenarios.model import Array
 
 
 class Shift(NamedTuple):

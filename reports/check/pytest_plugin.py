@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from reports.check.rows import CheckRow
+    from crosscheck2d.reports.check.rows import CheckRow
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -38,8 +38,8 @@ class SolverFile(pytest.File):
 
     def collect(self) -> Iterator[pytest.Item]:
         """A test for each row."""
-        from adapters.own_solver.file import NotASolver
-        from reports.check.solver import check_solver
+        from crosscheck2d.adapters.own_solver.file import NotASolver
+        from crosscheck2d.reports.check.solver import check_solver
 
         try:
             rows = check_solver(Path(self.path))
@@ -76,7 +76,7 @@ class RowItem(pytest.Item):
         """The row in words, because a traceback would show this program and not the solver."""
         if not isinstance(excinfo.value, Fault):
             return str(super().repr_failure(excinfo, *given, **named))
-        from reports.check.evidence import evidence
+        from crosscheck2d.reports.check.evidence import evidence
 
         likely = f"likely: {self.row.cause}"
         return "\n  ".join([self.row.asked, likely, *evidence(self.row)])

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.own_solver.engine import BEGIN_LIMIT
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import Request, SolverProcess
-from reports.check.rows import TOLERANCE
-from scenarios.model import Array
+from crosscheck2d.adapters.own_solver.engine import BEGIN_LIMIT
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.process import Request, SolverProcess
+from crosscheck2d.reports.check.rows import TOLERANCE
+from crosscheck2d.scenarios.model import Array
 
 LIMIT = 1.0  # s a question may take: it needs a few microseconds
 TOGETHER = 50  # fresh worlds in a request, because its time is limited, too

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from adapters.own_solver.restitution import (
+from crosscheck2d.adapters.own_solver.restitution import (
     EXERCISE,
     NAMED,
     OwnRestitution,
@@ -16,8 +16,8 @@ from adapters.own_solver.restitution import (
     own_restitution,
     separation,
 )
-from reports.check.questions import SolverAnswer
-from reports.check.rows import FOLLOWS, CheckRow, judged, near, shown
+from crosscheck2d.reports.check.questions import SolverAnswer
+from crosscheck2d.reports.check.rows import FOLLOWS, CheckRow, judged, near, shown
 
 
 @dataclass(frozen=True)

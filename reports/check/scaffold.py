@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from reports.check.points import DEFAULT, BadPoints, points_text, read_points
-from reports.terminal.exits import refuse, say
+from crosscheck2d.reports.check.points import DEFAULT, BadPoints, points_text, read_points
+from crosscheck2d.reports.terminal.exits import refuse, say
 
 TEMPLATES = Path(__file__).parent / "autograder"
 NEXT = (

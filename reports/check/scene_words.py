@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from reports.check.rows import shown
-from scenarios.model import Scenario
+from crosscheck2d.reports.check.rows import shown
+from crosscheck2d.scenarios.model import Scenario
 
 if TYPE_CHECKING:
-    from reports.check.smallest_scene import Smallest
+    from crosscheck2d.reports.check.smallest_scene import Smallest
 
 
 def scene_lines(scenario: Scenario) -> list[str]:

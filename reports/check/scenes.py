@@ -9,17 +9,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.own_solver.engine import spheres_of
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
-from reports.check.functions import keeps_state
-from reports.check.questions import fresh_world
-from reports.check.rows import FOLLOWS, TOLERANCE, CheckRow, judged, near, not_asked, shown
-from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
-from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import world_thrusts
-from scenarios.truth.exact import OracleTruth
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.adapters.own_solver.engine import spheres_of
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check.functions import keeps_state
+from crosscheck2d.reports.check.questions import fresh_world
+from crosscheck2d.reports.check.rows import (
+    FOLLOWS,
+    TOLERANCE,
+    CheckRow,
+    judged,
+    near,
+    not_asked,
+    shown,
+)
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
+from crosscheck2d.scenarios.truth.exact import OracleTruth
+from crosscheck2d.scenarios.truth.record import TruthRecord
 
 DT = 1e-3  # s, the exercise's
 INTERVAL = 0.02  # s

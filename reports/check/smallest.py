@@ -17,14 +17,20 @@ from hypothesis import strategies as st
 from hypothesis.configuration import set_hypothesis_home_dir
 from hypothesis.errors import Flaky, NoSuchExample
 
-from adapters.own_solver.file import SolverFailed
-from adapters.own_solver.process import SolverProcess
-from reports.check.rows import SAME_AGAIN, TOLERANCE, CheckRow, near, shown
-from reports.check.scenes import SceneAnswer, first_wrong, play_scene, scene_of, truth_of
-from reports.check.smallest_scene import DT, Smallest
-from scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
-from scenarios.no_truth import NoTruth
-from scenarios.truth.exact import computed
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check.rows import SAME_AGAIN, TOLERANCE, CheckRow, near, shown
+from crosscheck2d.reports.check.scenes import (
+    SceneAnswer,
+    first_wrong,
+    play_scene,
+    scene_of,
+    truth_of,
+)
+from crosscheck2d.reports.check.smallest_scene import DT, Smallest
+from crosscheck2d.scenarios.model import Collisions, Scenario, Thrust, Trajectory, frozen
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.exact import computed
 
 SECONDS = 1.5  # s for sampling and shrinking together
 DURATION, INTERVAL = 1.0, 0.02  # s

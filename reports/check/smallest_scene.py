@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 # s, coarse, so that a scene takes milliseconds; a collision found late is judged by the state in
 # which it is found

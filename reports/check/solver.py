@@ -6,14 +6,14 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from adapters.own_solver.file import SolverFailed, SolverText, read_solver
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import code_of, own_text, with_restitution
-from reports.check.consequences import with_consequences
-from reports.check.detection import WRONG_WAY, detection_rows
-from reports.check.failing import rows_until_failure
-from reports.check.functions import failed_calls, implemented, same_again
-from reports.check.impacts import (
+from crosscheck2d.adapters.own_solver.file import SolverFailed, SolverText, read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.own_solver.restitution import code_of, own_text, with_restitution
+from crosscheck2d.reports.check.consequences import with_consequences
+from crosscheck2d.reports.check.detection import WRONG_WAY, detection_rows
+from crosscheck2d.reports.check.failing import rows_until_failure
+from crosscheck2d.reports.check.functions import failed_calls, implemented, same_again
+from crosscheck2d.reports.check.impacts import (
     APPROACH,
     BACKWARDS,
     NEVER,
@@ -21,11 +21,11 @@ from reports.check.impacts import (
     explain,
     in_call,
 )
-from reports.check.impulse import AS_PRINTED, impulse_rows
-from reports.check.lines import Source, named_line
-from reports.check.loop import loop_rows
-from reports.check.motion import TURNED, motion_rows
-from reports.check.projection import (
+from crosscheck2d.reports.check.impulse import AS_PRINTED, impulse_rows
+from crosscheck2d.reports.check.lines import Source, named_line
+from crosscheck2d.reports.check.loop import loop_rows
+from crosscheck2d.reports.check.motion import TURNED, motion_rows
+from crosscheck2d.reports.check.projection import (
     DISPLACES_VELOCITY,
     TAKEN_TO_BE_APART,
     moved_together,
@@ -33,7 +33,7 @@ from reports.check.projection import (
     projection_rows,
     reacts,
 )
-from reports.check.questions import (
+from crosscheck2d.reports.check.questions import (
     APART,
     CLOSER,
     COLLISIONS,
@@ -45,9 +45,9 @@ from reports.check.questions import (
     renew,
     was_stopped,
 )
-from reports.check.restitution import Restitution, restitution_of
-from reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, near, not_asked
-from reports.check.scenes import scene_rows
+from crosscheck2d.reports.check.restitution import Restitution, restitution_of
+from crosscheck2d.reports.check.rows import INTEGRATES, UNKNOWN, CheckRow, judged, near, not_asked
+from crosscheck2d.reports.check.scenes import scene_rows
 
 
 def check_solver(path: Path | str) -> list[CheckRow]:

@@ -10,19 +10,19 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from adapters.own_solver.file import KINDS, printable
-from reports.check.marks import Marked, TaskMark, number
-from reports.check.outcomes import OUTCOMES
-from reports.check.rows import TASKS, CheckRow
-from reports.check.scene_words import faults_of, scene_lines, together
-from reports.check.verdict import FileCheck, Tally, headline, named, numbers_of
-from reports.terminal.console import Console
-from reports.terminal.counts import counted
-from reports.terminal.foreign_text import legible
-from reports.terminal.tables import print_table, print_texts, width_of
+from crosscheck2d.adapters.own_solver.file import KINDS, printable
+from crosscheck2d.reports.check.marks import Marked, TaskMark, number
+from crosscheck2d.reports.check.outcomes import OUTCOMES
+from crosscheck2d.reports.check.rows import TASKS, CheckRow
+from crosscheck2d.reports.check.scene_words import faults_of, scene_lines, together
+from crosscheck2d.reports.check.verdict import FileCheck, Tally, headline, named, numbers_of
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.foreign_text import legible
+from crosscheck2d.reports.terminal.tables import print_table, print_texts, width_of
 
 if TYPE_CHECKING:
-    from reports.check.smallest_scene import Smallest
+    from crosscheck2d.reports.check.smallest_scene import Smallest
 
 STYLE = {
     "right": "green",

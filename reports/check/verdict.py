@@ -10,13 +10,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-from adapters.own_engine.surface import is_engine
-from adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
-from adapters.own_solver.gl_matrix import lacks_gl_matrix
-from adapters.own_solver.restitution import code_of
-from reports.check.functions import FUNCTIONS
-from reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
-from reports.check.solver import examine
+from crosscheck2d.adapters.own_engine.surface import is_engine
+from crosscheck2d.adapters.own_solver.file import NotASolver, SolverText, printable, read_solver
+from crosscheck2d.adapters.own_solver.gl_matrix import lacks_gl_matrix
+from crosscheck2d.adapters.own_solver.restitution import code_of
+from crosscheck2d.reports.check.functions import FUNCTIONS
+from crosscheck2d.reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
+from crosscheck2d.reports.check.solver import examine
 
 ENGINE = "is an engine (create, step, read), and check is for solvers of the exercise"
 RUN_INSTEAD = "to judge it: crosscheck run bouncing_ball_e09 --engine"

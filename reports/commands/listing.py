@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED
-from adapters.npm_packages import missing
-from reports.compare.metrics import METRICS, SCALES, Metric
-from reports.compare.verdicts import VERDICTS, Kind
-from reports.lessons.catalogue import LESSONS
-from reports.run.arguments import unknown
-from reports.stability.cases import CASES
-from reports.terminal.console import Console
-from reports.terminal.exits import refuse
-from reports.terminal.tables import print_texts
-from scenarios.catalogue import RANDOM, SCENARIOS, scenario
-from scenarios.truth.exact import answered_by
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.npm_packages import missing
+from crosscheck2d.reports.compare.metrics import METRICS, SCALES, Metric
+from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.run.arguments import unknown
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import refuse
+from crosscheck2d.reports.terminal.tables import print_texts
+from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
+from crosscheck2d.scenarios.truth.exact import answered_by
 
 
 def explain(what: str) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from adapters.own_engine.engine import TEMPLATES
-from adapters.own_solver.file import KINDS
-from reports.run.arguments import faults_of_file
-from reports.terminal.console import Console
-from reports.terminal.exits import refuse
+from crosscheck2d.adapters.own_engine.engine import TEMPLATES
+from crosscheck2d.adapters.own_solver.file import KINDS
+from crosscheck2d.reports.run.arguments import faults_of_file
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import refuse
 
 
 def write_engine(path: Path) -> None:

@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from adapters.engines import OWN
-from reports.check.evidence import lines_and_formula
-from reports.check.verdict import check_file
-from reports.page.own_solvers import Said, with_lines
-from reports.run.plan import Check
-from reports.run.pool import Failure, run_all
-from reports.terminal.exits import say
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.check.evidence import lines_and_formula
+from crosscheck2d.reports.check.verdict import check_file
+from crosscheck2d.reports.page.own_solvers import Said, with_lines
+from crosscheck2d.reports.run.plan import Check
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.terminal.exits import say
 
 CHECKING = 10.0  # s that the game waits for the check of a file, which takes one or two
 

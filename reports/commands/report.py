@@ -9,27 +9,32 @@ from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import NoReturn
 
-from adapters.engines import OWN, row_of
-from adapters.friction import REFUSAL
-from adapters.run import STATUSES
-from adapters.thrust_grid import off_grid_note
-from reports.commands.own_solvers import lines
-from reports.compare.comparison import Comparison
-from reports.compare.fast_disks import fast_note
-from reports.lessons.catalogue import LESSONS
-from reports.page import overview
-from reports.page.report import PAGE, Report, make_report, take_times
-from reports.page.situations import by_friction
-from reports.run.arguments import checked_engines, default_engines, opening, started_where
-from reports.run.plan import Means
-from reports.run.results import COMMAND, Results
-from reports.run.suite import take_timings
-from reports.run.timing_pass import cells_to_time
-from reports.terminal.console import Console
-from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, keeping, refuse, say
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_list, print_table
+from crosscheck2d.adapters.engines import OWN, row_of
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.adapters.run import STATUSES
+from crosscheck2d.adapters.thrust_grid import off_grid_note
+from crosscheck2d.reports.commands.own_solvers import lines
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.fast_disks import fast_note
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page import overview
+from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times
+from crosscheck2d.reports.page.situations import by_friction
+from crosscheck2d.reports.run.arguments import (
+    checked_engines,
+    default_engines,
+    opening,
+    started_where,
+)
+from crosscheck2d.reports.run.plan import Means
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.suite import take_timings
+from crosscheck2d.reports.run.timing_pass import cells_to_time
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_list, print_table
 
 
 def finish(report: Report, status: int = DONE) -> NoReturn:

@@ -11,24 +11,24 @@ from typing import NoReturn
 
 import psutil
 
-from adapters.engines import row_of
-from reports.commands.own_solvers import checks_of
-from reports.commands.report import finish
-from reports.lessons.catalogue import LESSONS
-from reports.page.report import make_report
-from reports.run.arguments import checked_engines, checked_scenes, of_main_job, opening
-from reports.run.bits import kept_bits, write_bits
-from reports.run.cluster import NoScheduler, connect
-from reports.run.plan import Means, RunPlan
-from reports.run.pool import LEAST_MEMORY, affordable
-from reports.run.results import COMMAND, Results
-from reports.run.store import Store
-from reports.run.suite import OtherVersions, carry_out
-from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, FAILED, keeping, refuse, say
-from reports.terminal.progress import Progress
-from scenarios.catalogue import SCENARIOS
-from scenarios.truth import cache
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.reports.commands.own_solvers import checks_of
+from crosscheck2d.reports.commands.report import finish
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page.report import make_report
+from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, of_main_job, opening
+from crosscheck2d.reports.run.bits import kept_bits, write_bits
+from crosscheck2d.reports.run.cluster import NoScheduler, connect
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.pool import LEAST_MEMORY, affordable
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.run.suite import OtherVersions, carry_out
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import SCENARIOS
+from crosscheck2d.scenarios.truth import cache
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from starlette.applications import Starlette
 
-from adapters.engines import ENGINES
-from reports.commands.own_solvers import said_of
-from reports.game.command import FIRST, game_of
-from reports.game.server import Game, routes
-from reports.lessons.command import checked_lesson
-from reports.lessons.pages import ROUTES
-from reports.page import server
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.commands.own_solvers import said_of
+from crosscheck2d.reports.game.command import FIRST, game_of
+from crosscheck2d.reports.game.server import Game, routes
+from crosscheck2d.reports.lessons.command import checked_lesson
+from crosscheck2d.reports.lessons.pages import ROUTES
+from crosscheck2d.reports.page import server
 
 
 def application(game: Game) -> Starlette:

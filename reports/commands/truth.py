@@ -12,18 +12,18 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from reports.page.style import number
-from reports.run.arguments import checked_scenes
-from reports.run.comparing import compute_record, no_answer
-from reports.run.pool import Failure, run_all
-from reports.run.scenes import open_scene
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, refuse, say
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table, print_texts
-from scenarios.model import Scenario
-from scenarios.truth.exact import CLOSED_FORM
-from scenarios.truth.record import TWO_PRECISIONS, TruthRecord
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.run.arguments import checked_scenes
+from crosscheck2d.reports.run.comparing import compute_record, no_answer
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table, print_texts
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM
+from crosscheck2d.scenarios.truth.record import TWO_PRECISIONS, TruthRecord
 
 SHOWN = 10  # collisions at the start and at the end
 STATE = ("disk", "position_m", "velocity_m_s", "angle_rad", "angular_velocity_rad_s")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws
-from reports.compare.faces import ALONG, interval, on_faces
-from reports.compare.view import View
-from scenarios.model import Array
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.faces import ALONG, interval, on_faces
+from crosscheck2d.reports.compare.view import View
+from crosscheck2d.scenarios.model import Array
 
 LEAST = 5  # sample intervals that the rise to an apex takes; a lower one has too few samples
 FLIES = 0.01  # of g: by so much the acceleration at an apex may differ from it

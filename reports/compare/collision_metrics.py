@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare.collisions import FAR, by_pair, pair_keys
-from reports.compare.faces import SAME, thrown_off
-from reports.compare.restitution import Restitutions
-from reports.compare.view import LEAST_SHARE, Value, View, not_judged
+from crosscheck2d.reports.compare.collisions import FAR, by_pair, pair_keys
+from crosscheck2d.reports.compare.faces import SAME, thrown_off
+from crosscheck2d.reports.compare.restitution import Restitutions
+from crosscheck2d.reports.compare.view import LEAST_SHARE, Value, View, not_judged
 
 UNHEARD = not_judged("an engine reports no collisions")
 STICKS = 0.05  # e of a disk that lies is read as less, even if a step is as long as an interval

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from reports.compare.delays import WINDOW
-from reports.compare.faces import SAME
-from scenarios.model import Array, Collisions
+from crosscheck2d.reports.compare.delays import WINDOW
+from crosscheck2d.reports.compare.faces import SAME
+from crosscheck2d.scenarios.model import Array, Collisions
 
 # Times of collisions are often whole or half multiples of dt. A bound that is such a multiple would
 # leave the decision to rounding, so the bounds are irrational.

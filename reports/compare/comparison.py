@@ -8,15 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from adapters.run import Run
-from reports.compare.against import ENGINE, ITSELF, TRUTH
-from reports.compare.delays import jumps_of
-from reports.compare.metrics import METRICS
-from reports.compare.table import TableRow, deviation_row, status_row, table_of, verdict_row
-from reports.compare.verdicts import verdicts_on
-from reports.compare.view import View, beside, not_judged
-from scenarios.model import Scenario, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.against import ENGINE, ITSELF, TRUTH
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.table import (
+    TableRow,
+    deviation_row,
+    status_row,
+    table_of,
+    verdict_row,
+)
+from crosscheck2d.reports.compare.verdicts import verdicts_on
+from crosscheck2d.reports.compare.view import View, beside, not_judged
+from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from reports.compare import laws
-from reports.compare.faces import SAME
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.faces import SAME
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 WINDOW = 10**0.5
 """dt by which a collision may be late or early: 3.2 steps. It is irrational because collisions

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from reports.compare import laws
-from scenarios.model import Array, Collisions, Scene, Trajectory, frozen
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.scenarios.model import Array, Collisions, Scene, Trajectory, frozen
 
 ALONG = 2.0**-23
 """Fraction of the largest coordinate: an end of a wall this close to the line of another wall lies

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from adapters.run import Run
-from reports.compare import laws
-from reports.compare.comparison import Comparison
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.scenarios.model import Array, Scene
 
 # of a speed: a smaller difference from a cap is rounding
 ROUNDED = 1 - 1e-6

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.compare import laws, scales, violations
-from reports.compare.delays import WINDOW, collision_free
-from reports.compare.faces import SAME, interval
-from reports.compare.view import LEAST_SHARE, Value, View, not_judged
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.reports.compare import laws, scales, violations
+from crosscheck2d.reports.compare.delays import WINDOW, collision_free
+from crosscheck2d.reports.compare.faces import SAME, interval
+from crosscheck2d.reports.compare.view import LEAST_SHARE, Value, View, not_judged
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 ROLLS = 1e-9  # radii, and m/s over the largest speed: the bound of the exact answers
 # of the initial slip: less is rolling, even if the engine's lever arm is off by 2 %

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenarios.model import Array, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.model import Array, Scene, Thrust, Trajectory
 
 Law = TypeVar("Law", bound=Callable[..., Any])
 

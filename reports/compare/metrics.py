@@ -13,13 +13,13 @@ from inspect import getdoc
 
 import numpy as np
 
-from reports.compare import collision_metrics as collisions
-from reports.compare import friction_metrics as friction
-from reports.compare import laws, scales, violations
-from reports.compare.against import ENGINE, ITSELF, TRUTH
-from reports.compare.apexes import bounce_changes
-from reports.compare.view import LEAST_SHARE, Value, View, not_judged
-from scenarios.model import Array
+from crosscheck2d.reports.compare import collision_metrics as collisions
+from crosscheck2d.reports.compare import friction_metrics as friction
+from crosscheck2d.reports.compare import laws, scales, violations
+from crosscheck2d.reports.compare.against import ENGINE, ITSELF, TRUTH
+from crosscheck2d.reports.compare.apexes import bounce_changes
+from crosscheck2d.reports.compare.view import LEAST_SHARE, Value, View, not_judged
+from crosscheck2d.scenarios.model import Array
 
 Measure = Callable[[View], Value | None]
 

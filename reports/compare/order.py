@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array
+from crosscheck2d.scenarios.model import Array
 
 # radii: the finest accuracy asked for; below it a rising or constant error is rounding
 FINEST = 1e-6

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from reports.compare.order import ELSEWHERE
-from reports.compare.pooling import middle_half
-from scenarios.model import Array
+from crosscheck2d.reports.compare.order import ELSEWHERE
+from crosscheck2d.reports.compare.pooling import middle_half
+from crosscheck2d.scenarios.model import Array
 
 NEAR = 0.1  # radii: the accuracy that sentences speak of
 ACCURACIES = {"10 %": 0.1, "1 %": 0.01, "0.1 %": 0.001, "1e-6": 1e-6}  # of a radius

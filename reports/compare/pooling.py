@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from reports.compare.order import FINEST
-from scenarios.model import Array
+from crosscheck2d.reports.compare.order import FINEST
+from crosscheck2d.scenarios.model import Array
 
 WHO = ["engine", "profile"]
 POOLED = "pooled"

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.compare import laws
-from reports.compare.faces import SAME, interval, on_faces
-from scenarios.model import Array, Scene, Trajectory
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.faces import SAME, interval, on_faces
+from crosscheck2d.scenarios.model import Array, Scene, Trajectory
 
 
 class Restitutions(NamedTuple):

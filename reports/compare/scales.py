@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws
-from scenarios.model import Array, Scenario
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.scenarios.model import Array, Scenario
 
 
 @laws.cached

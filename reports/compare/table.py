@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from adapters.run import Run
-from reports.compare.against import ITSELF
-from reports.compare.verdicts import Verdict
-from reports.compare.view import Value
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.against import ITSELF
+from crosscheck2d.reports.compare.verdicts import Verdict
+from crosscheck2d.reports.compare.view import Value
 
 COLUMNS = (
     "scenario",

@@ -25,13 +25,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from adapters.engine_row import FLOAT64
-from adapters.run import Run
-from reports.compare import laws, scales, violations
-from reports.compare.against import ITSELF
-from reports.compare.restitution import TINY
-from reports.compare.view import View, rounding_of
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.engine_row import FLOAT64
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws, scales, violations
+from crosscheck2d.reports.compare.against import ITSELF
+from crosscheck2d.reports.compare.restitution import TINY
+from crosscheck2d.reports.compare.view import View, rounding_of
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 MOST_OVERLAP = 0.1  # radii, beyond what disks approach in two steps
 STAYS = 0.9  # an overlap is not resolved while it is at least this part of that two samples before

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine_row import FLOAT64
-from adapters.engines import ENGINES, FETCHED
-from adapters.run import Run
-from reports.compare import laws
-from reports.compare.collisions import Matched, match
-from reports.compare.delays import (
+from crosscheck2d.adapters.engine_row import FLOAT64
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.collisions import Matched, match
+from crosscheck2d.reports.compare.delays import (
     WINDOW,
     Jumps,
     collision_free,
@@ -21,9 +21,9 @@ from reports.compare.delays import (
     momentum_outside,
     nearest_velocity,
 )
-from reports.compare.faces import SAME, interval, on_faces
-from reports.compare.restitution import Restitutions, effective_restitution
-from scenarios.model import Array, Collisions, Scenario, Trajectory
+from crosscheck2d.reports.compare.faces import SAME, interval, on_faces
+from crosscheck2d.reports.compare.restitution import Restitutions, effective_restitution
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Trajectory
 
 # sample intervals of falling, times (1 + e) / 2: e is known to a tenth even if a step is as long as
 # an interval; irrational, so that no closing speed equals the threshold

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws, scales
-from reports.compare.view import View
-from scenarios.model import Array, Scenario
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.view import View
+from crosscheck2d.scenarios.model import Array, Scenario
 
 
 def momentum(view: View) -> Array | None:

@@ -8,19 +8,19 @@ from contextlib import closing
 from pathlib import Path
 from typing import cast
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED, OWN
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.engine import OwnSolver
-from adapters.own_solver.file import KINDS
-from adapters.own_solver.restitution import EXERCISE
-from reports.game.flight import FRAME, field_scenario
-from reports.game.messages import MOST_ENGINES
-from reports.game.server import Game
-from reports.run.arguments import checked_engines
-from reports.terminal.exits import refuse
-from scenarios.files.scene_file import SceneFileError, read_scene_file
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.own_engine.engine import row_of_file
+from crosscheck2d.adapters.own_solver.engine import OwnSolver
+from crosscheck2d.adapters.own_solver.file import KINDS
+from crosscheck2d.adapters.own_solver.restitution import EXERCISE
+from crosscheck2d.reports.game.flight import FRAME, field_scenario
+from crosscheck2d.reports.game.messages import MOST_ENGINES
+from crosscheck2d.reports.game.server import Game
+from crosscheck2d.reports.run.arguments import checked_engines
+from crosscheck2d.reports.terminal.exits import refuse
+from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
+from crosscheck2d.scenarios.model import Scenario
 
 MOST_DISKS = 200  # of a scene file: more are no longer drawn sixty times a second
 PATIENCE = 2.0  # s that a solver's file may take for a frame, while the others wait for it

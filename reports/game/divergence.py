@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine import ContactImpulse
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.engine import ContactImpulse
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 # m/s: disks whose velocities differ by less have not diverged, they were found a step early or late
 DIVERGED = 0.01

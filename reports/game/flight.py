@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from adapters.advance import advance
-from adapters.engine import Engine
-from adapters.engines import ENGINES
-from adapters.first_collisions import weight_impulse
-from adapters.own_solver.engine import OwnSolver
-from adapters.runaway import RUNAWAY, fault_of, reach
-from reports.compare.laws import nearer_way
-from reports.game.divergence import (
+from crosscheck2d.adapters.advance import advance
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.first_collisions import weight_impulse
+from crosscheck2d.adapters.own_solver.engine import OwnSolver
+from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
+from crosscheck2d.reports.compare.laws import nearer_way
+from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
     Divergence,
@@ -27,10 +27,10 @@ from reports.game.divergence import (
     cause_of,
     differing_since,
 )
-from reports.game.pilot import SHIP, Pilot
-from scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
-from scenarios.model import Array, Scenario, Scene, State
-from scenarios.no_truth import NoTruth
+from crosscheck2d.reports.game.pilot import SHIP, Pilot
+from crosscheck2d.scenarios.families.exercise import HIGH, LOW, SOURCE, asteroid_field
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, State
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 # s; a power of two, so that every instant of a saved flight is a whole number of steps without
 # rounding

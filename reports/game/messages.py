@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from adapters.engines import ENGINES
-from reports.game.flight import SUBSTEPS
-from reports.game.pilot import KEYS
-from reports.page.server import MOST_BYTES
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.game.flight import SUBSTEPS
+from crosscheck2d.reports.game.pilot import KEYS
+from crosscheck2d.reports.page.server import MOST_BYTES
 
 MOST_FRAMES = 4  # that one message may ask for
 MOST_ENGINES = 16  # in a flight

@@ -8,7 +8,7 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from scenarios.model import Array, Scene, Thrust
+from crosscheck2d.scenarios.model import Array, Scene, Thrust
 
 SHIP = 0  # the disk that is steered
 THRUST, TURN = 0.25, 1.0  # m/s2 and rad/s2, of the exercise: force mass 0.25, torque MoI 1.0

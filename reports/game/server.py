@@ -16,15 +16,15 @@ from starlette.responses import HTMLResponse
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from adapters.engines import ENGINES, OWN
-from reports.game.divergence import DIVERGED, WAIT
-from reports.game.flight import FRAME, SUBSTEPS
-from reports.game.session import Session, as_json
-from reports.page.documents import render
-from reports.page.own_solvers import Said
-from reports.page.server import MOST_TABS, NAMES, in_thread
-from reports.page.style import looks_of
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES, OWN
+from crosscheck2d.reports.game.divergence import DIVERGED, WAIT
+from crosscheck2d.reports.game.flight import FRAME, SUBSTEPS
+from crosscheck2d.reports.game.session import Session, as_json
+from crosscheck2d.reports.page.documents import render
+from crosscheck2d.reports.page.own_solvers import Said
+from crosscheck2d.reports.page.server import MOST_TABS, NAMES, in_thread
+from crosscheck2d.reports.page.style import looks_of
+from crosscheck2d.scenarios.model import Scenario
 
 
 def game_page(

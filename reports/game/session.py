@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.advance import turned
-from reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
-from reports.game.messages import Fly, Frames, Key, Message, read_message
-from reports.game.pilot import SHIP
-from scenarios.files.scene_file import scene_text
-from scenarios.model import Array, Scenario
+from crosscheck2d.adapters.advance import turned
+from crosscheck2d.reports.game.flight import EARTH, EARTH_SIZE, Flight, Flyer, field_scenario
+from crosscheck2d.reports.game.messages import Fly, Frames, Key, Message, read_message
+from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.scenarios.files.scene_file import scene_text
+from crosscheck2d.scenarios.model import Array, Scenario
 
 
 class Session:

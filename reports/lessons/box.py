@@ -10,13 +10,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engine import ContactImpulse
-from adapters.engines import ENGINES
-from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, tidy, time_step
-from reports.page.style import TRUTH, number
-from scenarios.families.lesson import falling_box
-from scenarios.model import Array, Scenario, Scene, State, Trajectory
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engine import ContactImpulse
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    Shown,
+    Simulation,
+    Slider,
+    tidy,
+    time_step,
+)
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.lesson import falling_box
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, State, Trajectory
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 SECONDS = 3.0
 EULER = {"reference:lesson": 1, "reference:exercise": -1}  # the sign of its gain in flight

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-from reports.lessons.box import BOX
-from reports.lessons.crowd import COST
-from reports.lessons.friction.bounce import BOUNCE
-from reports.lessons.friction.cone import CONE
-from reports.lessons.friction.lever import LEVER
-from reports.lessons.friction.rolling import ROLLING
-from reports.lessons.horizon import HORIZON
-from reports.lessons.lesson import Lesson
-from reports.lessons.limits import LIMITS
-from reports.lessons.mechanisms.cap import CAP
-from reports.lessons.mechanisms.correction import CORRECTION
-from reports.lessons.mechanisms.digits import DIGITS
-from reports.lessons.mechanisms.float32 import SINGLE
-from reports.lessons.mechanisms.gravity import GRAVITY
-from reports.lessons.mechanisms.javascript import JAVASCRIPT
-from reports.lessons.mechanisms.mixing import MIXING_RULE
-from reports.lessons.mechanisms.order import ORDER
-from reports.lessons.mechanisms.row import ROW
-from reports.lessons.mechanisms.substeps import SUBSTEPS
-from reports.lessons.mechanisms.threshold import THRESHOLD
-from reports.lessons.meeting import MEETING
-from reports.lessons.particle import PARTICLE
-from reports.lessons.thrust import THRUST
+from crosscheck2d.reports.lessons.box import BOX
+from crosscheck2d.reports.lessons.crowd import COST
+from crosscheck2d.reports.lessons.friction.bounce import BOUNCE
+from crosscheck2d.reports.lessons.friction.cone import CONE
+from crosscheck2d.reports.lessons.friction.lever import LEVER
+from crosscheck2d.reports.lessons.friction.rolling import ROLLING
+from crosscheck2d.reports.lessons.horizon import HORIZON
+from crosscheck2d.reports.lessons.lesson import Lesson
+from crosscheck2d.reports.lessons.limits import LIMITS
+from crosscheck2d.reports.lessons.mechanisms.cap import CAP
+from crosscheck2d.reports.lessons.mechanisms.correction import CORRECTION
+from crosscheck2d.reports.lessons.mechanisms.digits import DIGITS
+from crosscheck2d.reports.lessons.mechanisms.float32 import SINGLE
+from crosscheck2d.reports.lessons.mechanisms.gravity import GRAVITY
+from crosscheck2d.reports.lessons.mechanisms.javascript import JAVASCRIPT
+from crosscheck2d.reports.lessons.mechanisms.mixing import MIXING_RULE
+from crosscheck2d.reports.lessons.mechanisms.order import ORDER
+from crosscheck2d.reports.lessons.mechanisms.row import ROW
+from crosscheck2d.reports.lessons.mechanisms.substeps import SUBSTEPS
+from crosscheck2d.reports.lessons.mechanisms.threshold import THRESHOLD
+from crosscheck2d.reports.lessons.meeting import MEETING
+from crosscheck2d.reports.lessons.particle import PARTICLE
+from crosscheck2d.reports.lessons.thrust import THRUST
 
 ALL = (
     PARTICLE,

@@ -10,18 +10,18 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from adapters.engines import ENGINES
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.conventions import table
-from reports.lessons.lesson import Lesson
-from reports.lessons.pages import ALONE, FILES, Links, answer_json, index_page, offline
-from reports.run.arguments import unknown
-from reports.run.made import may_overwrite, sealed
-from reports.run.pool import Failure, run_all
-from reports.run.store import place_of
-from reports.terminal.exits import FAILED, FolderTaken, refuse, say
-from reports.terminal.foreign_text import legible, put_text
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.conventions import table
+from crosscheck2d.reports.lessons.lesson import Lesson
+from crosscheck2d.reports.lessons.pages import ALONE, FILES, Links, answer_json, index_page, offline
+from crosscheck2d.reports.run.arguments import unknown
+from crosscheck2d.reports.run.made import may_overwrite, sealed
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.store import place_of
+from crosscheck2d.reports.terminal.exits import FAILED, FolderTaken, refuse, say
+from crosscheck2d.reports.terminal.foreign_text import legible, put_text
+from crosscheck2d.reports.terminal.progress import Progress
 
 # What a page of ours begins with, and nothing else does: it may be written over.
 MARK = b'<meta name="generator" content="crosscheck lesson">'

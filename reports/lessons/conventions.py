@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from adapters.conformance.conform import PROBES, Finding, conform
-from adapters.engine_row import EngineRow
-from reports.page.style import number
+from crosscheck2d.adapters.conformance.conform import PROBES, Finding, conform
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.reports.page.style import number
 
 ASKED = (
     "free_flight",

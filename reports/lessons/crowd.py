@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from reports.lessons.lesson import (
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -17,10 +17,10 @@ from reports.lessons.lesson import (
     Slider,
     run_of,
 )
-from reports.page.style import TRUTH, number
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario
-from scenarios.truth.exact import MOST_DISKS, with_oracle
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.exact import MOST_DISKS, with_oracle
 
 EVERY_PAIR, LISTED = "reference:exercise", "reference:neighbours"
 EVENTS = "event_driven:float64"

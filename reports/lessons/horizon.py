@@ -9,8 +9,8 @@ from math import log
 
 import numpy as np
 
-from reports.lessons.box import energy
-from reports.lessons.lesson import (
+from crosscheck2d.reports.lessons.box import energy
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -21,11 +21,11 @@ from reports.lessons.lesson import (
     run_of,
     time_step,
 )
-from reports.page.style import TRUTH, number
-from scenarios.families.exercise import asteroid_field
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.exact import with_oracle
-from scenarios.truth.horizon import DIVERGED
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.exercise import asteroid_field
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.truth.horizon import DIVERGED
 
 ROUNDED = "event_driven against itself, start moved by one rounding"
 EVENTS = "event_driven:float64"

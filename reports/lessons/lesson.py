@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from adapters.engine import Engine
-from adapters.engines import row_of
-from adapters.play import play_once
-from adapters.run import Run
-from reports.compare.comparison import Comparison
-from reports.compare.laws import deviation
-from reports.page.replay import name_of, pack_layers, played, ratio_of
-from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.laws import deviation
+from crosscheck2d.reports.page.replay import name_of, pack_layers, played, ratio_of
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 
 POINTS = 400  # of a curve, at most: more than a chart has pixels for
 # A space between a number and its unit.

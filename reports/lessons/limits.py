@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.engines import DISTINCT
-from reports.lessons.lesson import (
+from crosscheck2d.adapters.engines import DISTINCT
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -22,13 +22,13 @@ from reports.lessons.lesson import (
     Simulation,
     Slider,
 )
-from reports.page.style import TRUTH, number
-from reports.stability.cases import CASES
-from reports.stability.explain import explained, with_replays
-from reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
-from reports.stability.overview import bracket, why
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.explain import explained, with_replays
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
+from crosscheck2d.reports.stability.overview import bracket, why
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest
 SECONDS = 4.0  # that a replay lasts

@@ -9,13 +9,21 @@ from functools import cache, partial
 
 import numpy as np
 
-from adapters.box2d import MATCHED
-from adapters.engines import ENGINES, changed
-from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, tidy, time_step
-from reports.page.style import TRUTH, number
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, State
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.box2d import MATCHED
+from crosscheck2d.adapters.engines import ENGINES, changed
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    Shown,
+    Simulation,
+    Slider,
+    tidy,
+    time_step,
+)
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, State
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 ROUNDING = 1e-12  # of float64, over some dozen operations on numbers of the order of 1
 NAMES = ("reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64")

@@ -15,19 +15,19 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from adapters.engines import ENGINES, FETCHED
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.conventions import Convention, table
-from reports.lessons.friction.bounce import CONE as EDGES
-from reports.lessons.horizon import ROUNDED
-from reports.lessons.lesson import Lesson, unbroken
-from reports.lessons.mechanisms.ablation import ABLATED
-from reports.lessons.mechanisms.float32 import BETWEEN
-from reports.lessons.mechanisms.javascript_bounces import CHANGED
-from reports.page.documents import ENGINE, deflated, fragment, render
-from reports.page.server import in_thread
-from reports.page.style import Look, look
-from reports.run.cells import versions
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.conventions import Convention, table
+from crosscheck2d.reports.lessons.friction.bounce import CONE as EDGES
+from crosscheck2d.reports.lessons.horizon import ROUNDED
+from crosscheck2d.reports.lessons.lesson import Lesson, unbroken
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED
+from crosscheck2d.reports.lessons.mechanisms.float32 import BETWEEN
+from crosscheck2d.reports.lessons.mechanisms.javascript_bounces import CHANGED
+from crosscheck2d.reports.page.documents import ENGINE, deflated, fragment, render
+from crosscheck2d.reports.page.server import in_thread
+from crosscheck2d.reports.page.style import Look, look
+from crosscheck2d.reports.run.cells import versions
 
 GENERATOR = "crosscheck lesson"
 STYLES = ["lessons/lesson.css"]

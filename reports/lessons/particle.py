@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.lessons.lesson import (
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Lesson,
     LessonChart,
@@ -19,10 +19,10 @@ from reports.lessons.lesson import (
     swept,
     time_step,
 )
-from reports.page.style import TRUTH, number
-from scenarios.families.lesson import ping_pong
-from scenarios.model import Array, Scenario
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.lesson import ping_pong
+from crosscheck2d.scenarios.model import Array, Scenario
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 STEPS = (64, 32, 16, 8, 4, 2)  # of a sample interval of 1/8 s
 METHODS = ("reference:lesson", "reference:exercise")

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, time_step
-from reports.page.style import TRUTH, number
-from scenarios.families.exercise import ship_thrust
-from scenarios.model import Scenario, Thrust, Trajectory
-from scenarios.truth.closed_forms import world_thrusts
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, time_step
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.exercise import ship_thrust
+from crosscheck2d.scenarios.model import Scenario, Thrust, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
 
 START, STOP = 0.5, 2.5  # s, of the thrust
 

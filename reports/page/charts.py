@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.run import Run
-from reports.compare import laws, scales, violations
-from reports.compare.comparison import Comparison
-from reports.compare.delays import jumps_of
-from reports.compare.view import View, beside
-from reports.page import style
-from reports.page.documents import deflated
-from scenarios.model import Array, Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws, scales, violations
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.view import View, beside
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.documents import deflated
+from crosscheck2d.scenarios.model import Array, Trajectory
 
 ZERO = 1e-17
 """On a log axis 0 and smaller values are drawn here: below the rounding of any number compared."""

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports.compare.order import FINEST
-from reports.compare.pooling import POOLED
-from reports.page import style
-from reports.page.charts import Figure, broken_axis, decades, marked_break, shortened
-from reports.page.cost_points import bare, by_engine, no_nearer
-from reports.terminal.counts import counted
-from scenarios.model import Array
+from crosscheck2d.reports.compare.order import FINEST
+from crosscheck2d.reports.compare.pooling import POOLED
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.charts import Figure, broken_axis, decades, marked_break, shortened
+from crosscheck2d.reports.page.cost_points import bare, by_engine, no_nearer
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.scenarios.model import Array
 
 TIME, STEPS = "engine time (µs per simulated second)", "steps per simulated second"
 ERROR = "largest error (radii)"

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from reports.compare.order import FINEST, NEARER
-from reports.compare.pooling import WHO, without_idle
-from reports.page import style
-from reports.run.timing import Noise, noise_of
-from reports.run.timing_pass import BUSY, COLUMNS
-from scenarios.model import Array
+from crosscheck2d.reports.compare.order import FINEST, NEARER
+from crosscheck2d.reports.compare.pooling import WHO, without_idle
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.run.timing import Noise, noise_of
+from crosscheck2d.reports.run.timing_pass import BUSY, COLUMNS
+from crosscheck2d.scenarios.model import Array
 
 
 class RunTimes(NamedTuple):

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from reports.compare.order import FINEST
-from reports.compare.pareto import NEAR, front, kept_from
-from reports.compare.pooling import UNSURE, middle_half
-from reports.page import style
-from reports.page.cost_points import bare, by_engine, no_nearer
-from reports.run.timing_pass import BUSY
-from reports.terminal.counts import counted
+from crosscheck2d.reports.compare.order import FINEST
+from crosscheck2d.reports.compare.pareto import NEAR, front, kept_from
+from crosscheck2d.reports.compare.pooling import UNSURE, middle_half
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.cost_points import bare, by_engine, no_nearer
+from crosscheck2d.reports.run.timing_pass import BUSY
+from crosscheck2d.reports.terminal.counts import counted
 
 MARGIN = 1 + BUSY  # costs closer than the accepted noise count as equal
 

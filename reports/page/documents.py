@@ -19,9 +19,9 @@ from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, Stric
 from jinja2.bccache import Bucket
 from markupsafe import Markup
 
-from reports.page import style
-from reports.terminal.foreign_text import encoded
-from scenarios.truth.cache import folder
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.terminal.foreign_text import encoded
+from crosscheck2d.scenarios.truth.cache import folder
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay

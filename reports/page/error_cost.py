@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.compare.pooling import POOLED, WHO, pooled
-from reports.page import style
-from reports.page.charts import Drawing
-from reports.page.cost_picture import STEPS, TIME, picture
-from reports.page.cost_points import RunTimes, bare, by_engine, points
-from reports.page.cost_sentences import sentences
-from reports.terminal.counts import counted
+from crosscheck2d.reports.compare.pooling import POOLED, WHO, pooled
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.charts import Drawing
+from crosscheck2d.reports.page.cost_picture import STEPS, TIME, picture
+from crosscheck2d.reports.page.cost_points import RunTimes, bare, by_engine, points
+from crosscheck2d.reports.page.cost_sentences import sentences
+from crosscheck2d.reports.terminal.counts import counted
 
 KEY = "error-cost"  # of its figures in the page
 

@@ -8,16 +8,16 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from adapters.engines import ENGINES
-from adapters.engines import OWN as OWN_PROFILE
-from adapters.friction import REFUSAL
-from reports.compare.comparison import Comparison
-from reports.compare.verdicts import failures_at
-from reports.page import pooled
-from reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
-from reports.page.style import number
-from reports.terminal.counts import counted, listed
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import OWN as OWN_PROFILE
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.verdicts import failures_at
+from crosscheck2d.reports.page import pooled
+from crosscheck2d.reports.page.situations import EXACT, FAR_OFF, RIGHT, YOURS, by_friction, grouped
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 
 PROJECT = {name for name, row in ENGINES.items() if not row.outside}
 FEW = 1  # scenes that are named of each engine that fails

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.compare.comparison import Comparison
-from reports.compare.fast_disks import can_pass
-from reports.page import cost_points, error_cost, pooled, situations
-from reports.page.charts import Drawing, packed_charts
-from reports.page.overview import names_of
-from reports.page.own_solvers import Said
-from reports.page.style import number
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.fast_disks import can_pass
+from crosscheck2d.reports.page import cost_points, error_cost, pooled, situations
+from crosscheck2d.reports.page.charts import Drawing, packed_charts
+from crosscheck2d.reports.page.overview import names_of
+from crosscheck2d.reports.page.own_solvers import Said
+from crosscheck2d.reports.page.style import number
 
 
 @dataclass(frozen=True)

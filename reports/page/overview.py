@@ -9,17 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import OWN
-from adapters.friction import REFUSAL
-from reports.compare import laws
-from reports.compare.against import ITSELF
-from reports.compare.comparison import Comparison
-from reports.compare.metrics import METRICS
-from reports.compare.verdicts import VERDICTS, fails, failures_at
-from reports.compare.view import NOT_JUDGED
-from reports.page import pooled, situations
-from reports.page.style import TRUTH, heat, number
-from reports.terminal.counts import counted
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.against import ITSELF
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.verdicts import VERDICTS, fails, failures_at
+from crosscheck2d.reports.compare.view import NOT_JUDGED
+from crosscheck2d.reports.page import pooled, situations
+from crosscheck2d.reports.page.style import TRUTH, heat, number
+from crosscheck2d.reports.terminal.counts import counted
 
 OUTCOMES = {
     "unsupported": "refused",

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from adapters.conformance.laws import ALLOWED
-from adapters.conformance.probe import Departure
-from adapters.engines import OWN
-from reports.page.style import number
-from reports.terminal.counts import listed
+from crosscheck2d.adapters.conformance.laws import ALLOWED
+from crosscheck2d.adapters.conformance.probe import Departure
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.terminal.counts import listed
 
 Finding = Mapping[str, Any]  # a row of the probes
 

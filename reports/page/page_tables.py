@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.matched import searched
-from reports.compare.comparison import Comparison
-from reports.compare.metrics import METRICS, Metric
-from reports.compare.verdicts import VERDICTS, Kind
-from reports.page import overview, situations, style
-from reports.page.style import number
-from reports.run.known_answers import MEANING
-from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, OracleTruth, answered_by
-from scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
+from crosscheck2d.adapters.matched import searched
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.metrics import METRICS, Metric
+from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
+from crosscheck2d.reports.page import overview, situations, style
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.run.known_answers import MEANING
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, OracleTruth, answered_by
+from crosscheck2d.scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
 
 OUTCOMES = ("keeps", "not asked", "departs", "breaks")
 HOW_COMPUTED = {

@@ -11,18 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.engines import DISTINCT, FETCHED
-from adapters.run import Run
-from reports.compare.comparison import Comparison
-from reports.compare.laws import deviation
-from reports.page.cost_points import RunTimes
-from reports.page.documents import deflated
-from reports.page.overview import NO_FRICTION, OverviewCell
-from reports.page.replay import played
-from reports.page.sections import OWN
-from reports.page.style import number
-from scenarios.catalogue import family_of
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.engines import DISTINCT, FETCHED
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.laws import deviation
+from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.documents import deflated
+from crosscheck2d.reports.page.overview import NO_FRICTION, OverviewCell
+from crosscheck2d.reports.page.replay import played
+from crosscheck2d.reports.page.sections import OWN
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.scenarios.catalogue import family_of
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 FEW = 5  # moving disks at most to draw all of them: more paths hide each other
 NARROW = 0.2  # of the longer side of a path: a narrower path is drawn over time

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 import pandas as pd
 
-from adapters.engines import OWN
-from adapters.run import Run
-from reports.compare.comparison import Comparison
-from reports.compare.verdicts import failures
-from reports.compare.view import LEAST_SHARE, NOT_JUDGED
-from reports.page import situations, style
-from reports.page.charts import ChartLine, Drawing, figure_of
-from scenarios.model import Array
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.verdicts import failures
+from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED
+from crosscheck2d.reports.page import situations, style
+from crosscheck2d.reports.page.charts import ChartLine, Drawing, figure_of
+from crosscheck2d.scenarios.model import Array
 
 KEY = "pooled"  # of their figures in the page
 # times the errors at the neighbouring step sizes: more says where collisions fall in a step

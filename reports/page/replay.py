@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.run import Run
-from reports.page.style import TRUTH
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.page.style import TRUTH
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 if TYPE_CHECKING:
-    from reports.compare.comparison import Comparison
+    from crosscheck2d.reports.compare.comparison import Comparison
 
 FRAMES = 240
 # positions in a layer, so that a crowd of 100 disks fits into the page

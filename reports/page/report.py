@@ -11,25 +11,25 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import OWN
-from reports.compare.comparison import Comparison
-from reports.page import cost_points, overview, style
-from reports.page.charts import NOISE, POINTS
-from reports.page.cost_points import RunTimes
-from reports.page.documents import CHARTED, render
-from reports.page.findings import findings, not_counted
-from reports.page.first_screen import first_screen
-from reports.page.links import neighbours
-from reports.page.own_engines import is_lawless, own_engine_sentences
-from reports.page.own_solvers import Said, with_lines
-from reports.page.page_tables import page_tables
-from reports.page.panels import MARKED, panels
-from reports.page.sections import by_family, sections_of
-from reports.run.results import Results
-from reports.run.tables import comparisons_of, make_tables
-from reports.run.timing_pass import TIMINGS, noise_floor
-from reports.terminal.counts import counted
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.page import cost_points, overview, style
+from crosscheck2d.reports.page.charts import NOISE, POINTS
+from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.documents import CHARTED, render
+from crosscheck2d.reports.page.findings import findings, not_counted
+from crosscheck2d.reports.page.first_screen import first_screen
+from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.own_engines import is_lawless, own_engine_sentences
+from crosscheck2d.reports.page.own_solvers import Said, with_lines
+from crosscheck2d.reports.page.page_tables import page_tables
+from crosscheck2d.reports.page.panels import MARKED, panels
+from crosscheck2d.reports.page.sections import by_family, sections_of
+from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.tables import comparisons_of, make_tables
+from crosscheck2d.reports.run.timing_pass import TIMINGS, noise_floor
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck run"
 PAPER_CHARTS = ("deviation", "convergence")  # of a scene, where it is printed

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from adapters.friction import REFUSAL
-from adapters.run import Run
-from adapters.thrust_grid import off_grid_note
-from reports.compare.comparison import Comparison
-from reports.compare.fast_disks import fast_note
-from reports.page import overview, style
-from reports.page.charts import CHARTS, Drawing, packed_charts
-from reports.page.page_tables import by_name
-from reports.page.replay import frames, name_of, pack, played, ratio_of
-from scenarios.catalogue import SCENARIOS, family_of
-from scenarios.model import Scenario
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.adapters.thrust_grid import off_grid_note
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.fast_disks import fast_note
+from crosscheck2d.reports.page import overview, style
+from crosscheck2d.reports.page.charts import CHARTS, Drawing, packed_charts
+from crosscheck2d.reports.page.page_tables import by_name
+from crosscheck2d.reports.page.replay import frames, name_of, pack, played, ratio_of
+from crosscheck2d.scenarios.catalogue import SCENARIOS, family_of
+from crosscheck2d.scenarios.model import Scenario
 
 OWN = "Scenes of your own"
 

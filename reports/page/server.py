@@ -18,7 +18,7 @@ from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.routing import BaseRoute
 
-from reports.terminal.exits import TERMINATED, refuse, signal_status
+from crosscheck2d.reports.terminal.exits import TERMINATED, refuse, signal_status
 
 T = TypeVar("T")
 HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.engines import ENGINES
-from adapters.engines import OWN as OWN_PROFILE
-from reports.compare.comparison import Comparison
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import OWN as OWN_PROFILE
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION = (
     "Flight",

@@ -9,10 +9,12 @@ from pathlib import PurePath
 from typing import Any, NamedTuple
 from zlib import crc32
 
-from adapters.engine_row import Mark
-from adapters.engines import ENGINES, FETCHED, OWN
-from reports.compare.against import TRUTH as TRUTH  # its curve is drawn like that of an engine
-from reports.terminal.foreign_text import encoded
+from crosscheck2d.adapters.engine_row import Mark
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.reports.compare.against import (
+    TRUTH as TRUTH,  # its curve is drawn like that of an engine
+)
+from crosscheck2d.reports.terminal.foreign_text import encoded
 
 
 class Look(NamedTuple):

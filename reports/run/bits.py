@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.run.cells import versions
-from reports.run.results import Results
-from reports.terminal.console import Console
-from reports.terminal.counts import counted, listed
-from reports.terminal.tables import print_list, print_table
-from scenarios.model import Trajectory
+from crosscheck2d.reports.run.cells import versions
+from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.reports.terminal.tables import print_list, print_table
+from crosscheck2d.scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"
 COLUMNS = ["scenario", "engine", "profile", "dt_s", "status", "bits", "until"]

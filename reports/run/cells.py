@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.scenarios.model import Scenario
 
 # The source that decides a trajectory, and the source that decides what is said of it; including
 # subfolders.

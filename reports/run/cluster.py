@@ -14,8 +14,8 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
 
-from reports.run import pool
-from reports.run.pool import ATTEMPTS, LOST, Failure, Pool
+from crosscheck2d.reports.run import pool
+from crosscheck2d.reports.run.pool import ATTEMPTS, LOST, Failure, Pool
 
 _here = threading.local()
 

@@ -15,22 +15,22 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.run import Run
-from reports.compare.against import TRUTH
-from reports.compare.comparison import compare
-from reports.compare.table import status_row, table_of
-from reports.compare.view import NOT_JUDGED
-from reports.run.cells import digest, judge_hash
-from reports.run.pool import Failure, allow
-from reports.run.scenes import SceneSource, open_scene
-from reports.run.store import Store
-from reports.run.trajectories import load_trajectory
-from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth, answered
-from scenarios.truth.cache import packed, unpacked
-from scenarios.truth.exact import CLOSED_FORM, OracleTruth
-from scenarios.truth.oracle.work import TimeLimit
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.against import TRUTH
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.table import status_row, table_of
+from crosscheck2d.reports.compare.view import NOT_JUDGED
+from crosscheck2d.reports.run.cells import digest, judge_hash
+from crosscheck2d.reports.run.pool import Failure, allow
+from crosscheck2d.reports.run.scenes import SceneSource, open_scene
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.run.trajectories import load_trajectory
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.no_truth import NoTruth, answered
+from crosscheck2d.scenarios.truth.cache import packed, unpacked
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, OracleTruth
+from crosscheck2d.scenarios.truth.oracle.work import TimeLimit
+from crosscheck2d.scenarios.truth.record import TruthRecord
 
 OK, NONE = "ok", "none"
 # share of the time limit; computing the horizon takes up to as long as the events

@@ -13,18 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from reports.compare.metrics import METRICS
-from reports.compare.table import COLUMNS
-from reports.compare.verdicts import VERDICTS
-from reports.compare.view import NOT_JUDGED, rounding_of
-from reports.run.results import COMMAND, Results
-from reports.run.store import reading
-from reports.run.tables import joined
-from reports.run.timing_pass import is_busy, noise_floor
-from reports.terminal.counts import counted, listed
-from reports.terminal.exits import Unusable
-from reports.terminal.foreign_text import encoded
-from scenarios.truth.horizon import DIVERGED
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.table import COLUMNS
+from crosscheck2d.reports.compare.verdicts import VERDICTS
+from crosscheck2d.reports.compare.view import NOT_JUDGED, rounding_of
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import reading
+from crosscheck2d.reports.run.tables import joined
+from crosscheck2d.reports.run.timing_pass import is_busy, noise_floor
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.reports.terminal.exits import Unusable
+from crosscheck2d.reports.terminal.foreign_text import encoded
+from crosscheck2d.scenarios.truth.horizon import DIVERGED
 
 # Measured on two busy cores (load 15 to 20), with 3 scenes and five rounds of timings. Eight runs
 # of one build, compared with each other, gave 280 verdicts from 4200 ratios of rounds: 4 were

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from scenarios.families.placing import lay_out
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.scenarios.families.placing import lay_out
 
 KNOWN_SCENE = "simbenchmark_bouncing"  # a run of this scenario makes this table
 DISKS, MASS, RADIUS, HEIGHT, GRAVITY, DURATION = 49, 10.0, 0.1, 5.0, 9.81, 20.0

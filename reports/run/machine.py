@@ -10,8 +10,8 @@ from typing import Any
 
 import psutil
 
-from adapters.system import LIMITED_BY
-from reports.run.cells import source_hash, versions
+from crosscheck2d.adapters.system import LIMITED_BY
+from crosscheck2d.reports.run.cells import source_hash, versions
 
 
 def about(command: str, seed: int) -> dict[str, Any]:

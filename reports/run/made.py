@@ -7,8 +7,8 @@ import hashlib
 from contextlib import suppress
 from pathlib import Path
 
-from reports.terminal.exits import FolderTaken
-from reports.terminal.foreign_text import encoded
+from crosscheck2d.reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.terminal.foreign_text import encoded
 
 HEAD = 4096  # bytes at the start of a file in which its mark is searched
 

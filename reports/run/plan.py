@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
 
-from adapters.engine_row import EngineRow
-from adapters.engines import told_apart
-from reports.run.cells import CHECK_SOURCE, Cell, content_key, scene_hash, source_hash
-from reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE
-from reports.run.machine import about
-from reports.run.playing import conform_here, play_here
-from reports.run.pool import TIMEOUT
-from reports.run.scenes import SceneSource, open_scene, with_steps
-from scenarios.files.scene_file import scene_text
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import told_apart
+from crosscheck2d.reports.run.cells import CHECK_SOURCE, Cell, content_key, scene_hash, source_hash
+from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.playing import conform_here, play_here
+from crosscheck2d.reports.run.pool import TIMEOUT
+from crosscheck2d.reports.run.scenes import SceneSource, open_scene, with_steps
+from crosscheck2d.scenarios.files.scene_file import scene_text
+from crosscheck2d.scenarios.model import Scenario
 
 
 class Check(NamedTuple):

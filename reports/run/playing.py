@@ -13,16 +13,16 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
-from adapters.conformance.conform import Finding, conform
-from adapters.conformance.probe import loaded, plain
-from adapters.engine_row import EngineRow
-from adapters.own_solver.process import keep_processes
-from adapters.play import play_once, unwatched
-from adapters.run import Run
-from reports.run.cells import Cell, source_hash, versions
-from reports.run.pool import allow, leave
-from reports.run.trajectories import packed, parts_of
-from scenarios.model import Scenario, State
+from crosscheck2d.adapters.conformance.conform import Finding, conform
+from crosscheck2d.adapters.conformance.probe import loaded, plain
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.own_solver.process import keep_processes
+from crosscheck2d.adapters.play import play_once, unwatched
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.run.cells import Cell, source_hash, versions
+from crosscheck2d.reports.run.pool import allow, leave
+from crosscheck2d.reports.run.trajectories import packed, parts_of
+from crosscheck2d.scenarios.model import Scenario, State
 
 # s to import, compile and load an engine: up to 30 on an idle machine, for all engines the first
 # time

@@ -29,9 +29,9 @@ from typing import Any, NamedTuple
 
 import psutil
 
-from adapters import system
-from adapters.safe_path import PACKAGES, PROGRAM, TESTS, keep_path_safe
-from reports.terminal.exits import refuse, say
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.safe_path import PACKAGES, PROGRAM, TESTS, keep_path_safe
+from crosscheck2d.reports.terminal.exits import refuse, say
 
 TIMEOUT = 60.0  # s a task may take
 LONGEST = 1e6  # s, of a task that only ends with the run
@@ -370,7 +370,7 @@ def run_all(
         stack.callback(pool.close_all)
         far = None
         if scheduler:
-            from reports.run.cluster import Cluster
+            from crosscheck2d.reports.run.cluster import Cluster
 
             far = stack.enter_context(Cluster(scheduler, timeout, memory, alone))
 

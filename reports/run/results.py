@@ -20,12 +20,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from reports.run.comparing import COMPARED, file_of, run_of
-from reports.run.scenes import SceneSource
-from reports.run.store import FILE, Store
-from reports.run.trajectories import load_trajectory
-from reports.terminal.exits import Unusable
-from scenarios.model import Trajectory
+from crosscheck2d.reports.run.comparing import COMPARED, file_of, run_of
+from crosscheck2d.reports.run.scenes import SceneSource
+from crosscheck2d.reports.run.store import FILE, Store
+from crosscheck2d.reports.run.trajectories import load_trajectory
+from crosscheck2d.reports.terminal.exits import Unusable
+from crosscheck2d.scenarios.model import Trajectory
 
 COMMAND = "crosscheck run"
 

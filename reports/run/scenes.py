@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from scenarios.catalogue import scenario as from_catalogue
-from scenarios.files.scene_file import read_scene_file
-from scenarios.files.tables import MOST_STEPS
-from scenarios.model import Scenario
+from crosscheck2d.scenarios.catalogue import scenario as from_catalogue
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.files.tables import MOST_STEPS
+from crosscheck2d.scenarios.model import Scenario
 
 
 def open_scene(scene: str, seed: int) -> Scenario:

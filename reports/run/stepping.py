@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
 
-from adapters.advance import advance, thrust_steps
-from adapters.engine import Engine
-from scenarios.families.placing import lay_out
-from scenarios.model import Scenario, Scene
+from crosscheck2d.adapters.advance import advance, thrust_steps
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scenario, Scene
 
 Make = Callable[[], Engine]
 EMPTY_STEPS, CALLS, READS = 1000, 100, 20  # of one run

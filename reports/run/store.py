@@ -15,12 +15,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from adapters.system import BINARY, lock
-from reports.terminal.exits import FolderTaken
-from reports.terminal.exits import say as warn
-from reports.terminal.foreign_text import encoded, whole
-from scenarios.regular import all_of
-from scenarios.rows import Damaged, Row, Rows, digest_of
+from crosscheck2d.adapters.system import BINARY, lock
+from crosscheck2d.reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.terminal.exits import say as warn
+from crosscheck2d.reports.terminal.foreign_text import encoded, whole
+from crosscheck2d.scenarios.regular import all_of
+from crosscheck2d.scenarios.rows import Damaged, Row, Rows, digest_of
 
 FILE, LOCK = "results.sqlite", ".crosscheck.lock"
 OWN = re.compile(

@@ -12,21 +12,21 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from adapters.conformance.conform import not_probed
-from adapters.run import Run
-from reports.run.cells import Cell, content_key, scene_hash
-from reports.run.comparing import ANSWER, COMPARED, SceneTasks
-from reports.run.known_answers import KnownAnswer
-from reports.run.machine import about
-from reports.run.plan import Means, RunPlan, Task, tasks_of
-from reports.run.playing import CellResult, source_and_versions
-from reports.run.pool import Failure, run_all
-from reports.run.results import Results, sources_of
-from reports.run.store import Row, Store
-from reports.run.timing_pass import CellToTime, Pass, cells_to_time
-from reports.run.trajectories import from_trail, packed
-from reports.terminal.progress import Progress
-from scenarios.model import Scenario
+from crosscheck2d.adapters.conformance.conform import not_probed
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.run.cells import Cell, content_key, scene_hash
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, SceneTasks
+from crosscheck2d.reports.run.known_answers import KnownAnswer
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.plan import Means, RunPlan, Task, tasks_of
+from crosscheck2d.reports.run.playing import CellResult, source_and_versions
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.results import Results, sources_of
+from crosscheck2d.reports.run.store import Row, Store
+from crosscheck2d.reports.run.timing_pass import CellToTime, Pass, cells_to_time
+from crosscheck2d.reports.run.trajectories import from_trail, packed
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.model import Scenario
 
 
 class OtherVersions(Exception):

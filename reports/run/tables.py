@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from reports.compare.against import ITSELF
-from reports.compare.comparison import Comparison
-from reports.run.cells import scene_hash
-from reports.run.comparing import (
+from crosscheck2d.reports.compare.against import ITSELF
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.run.cells import scene_hash
+from crosscheck2d.reports.run.comparing import (
     ANSWER,
     PATHS,
     ExactAnswer,
@@ -24,13 +24,13 @@ from reports.run.comparing import (
     read_scene_table,
     rows_not_judged,
 )
-from reports.run.pool import Failure, run_all
-from reports.run.results import Results
-from reports.run.store import FILE
-from reports.run.timing_pass import TABLE, timings
-from reports.terminal.exits import Unusable
-from reports.terminal.foreign_text import encoded
-from scenarios.no_truth import answered
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.store import FILE
+from crosscheck2d.reports.run.timing_pass import TABLE, timings
+from crosscheck2d.reports.terminal.exits import Unusable
+from crosscheck2d.reports.terminal.foreign_text import encoded
+from crosscheck2d.scenarios.no_truth import answered
 
 
 class Tables(NamedTuple):

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.own_solver.process import processes_reused
-from reports.run.stepping import Spent
-from scenarios.model import Array
+from crosscheck2d.adapters.own_solver.process import processes_reused
+from crosscheck2d.reports.run.stepping import Spent
+from crosscheck2d.scenarios.model import Array
 
 # s, least duration of a sample: some 10 000 ticks of the clock, so that reading it costs nothing
 LEAST = 1e-3

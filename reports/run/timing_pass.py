@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from reports.run.cells import Cell
-from reports.run.pool import allow
-from reports.run.results import Results
-from reports.run.stepping import (
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.pool import allow
+from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.stepping import (
     CALL,
     EMPTY,
     READ,
@@ -25,8 +25,8 @@ from reports.run.stepping import (
     binding_of,
     overheads,
 )
-from reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
-from scenarios.model import Scenario
+from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
+from crosscheck2d.scenarios.model import Scenario
 
 TIMINGS = 12.0  # s that it may take unless it is said otherwise
 ROUNDS = 9  # rounds at most, without the warm-up

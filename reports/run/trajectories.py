@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.model import Collisions, Scenario, State, Trajectory, frozen
-from scenarios.regular import all_of
+from crosscheck2d.scenarios.model import Collisions, Scenario, State, Trajectory, frozen
+from crosscheck2d.scenarios.regular import all_of
 
 STATE = ("position", "velocity", "angle", "angular_velocity")
 COLLISIONS = {

@@ -13,30 +13,30 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.engine import Engine
-from adapters.engines import row_of
-from adapters.mechanisms.options import OPTIONS
-from adapters.play import play_once
-from reports.compare.delays import jumps_of
-from reports.compare.pareto import kept_from
-from reports.compare.verdicts import first_failed
-from reports.compare.view import beside
-from reports.page.style import number
-from reports.run.machine import busy_cores
-from reports.run.pool import Failure
-from reports.run.scenes import open_scene
-from reports.run.stepping import Stepping
-from reports.run.timing import Sample, Timed, interleaved
-from reports.speed.causes import cause_of
-from reports.speed.effort import doublings
-from reports.speed.measure import done
-from reports.speed.plan import PLAIN
-from reports.speed.purposes import PURPOSES
-from reports.speed.scored_part import scored
-from reports.speed.tables import summed_up
-from reports.terminal.progress import Progress
-from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.options import OPTIONS
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.pareto import kept_from
+from crosscheck2d.reports.compare.verdicts import first_failed
+from crosscheck2d.reports.compare.view import beside
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.run.machine import busy_cores
+from crosscheck2d.reports.run.pool import Failure
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.stepping import Stepping
+from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
+from crosscheck2d.reports.speed.causes import cause_of
+from crosscheck2d.reports.speed.effort import doublings
+from crosscheck2d.reports.speed.measure import done
+from crosscheck2d.reports.speed.plan import PLAIN
+from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.tables import summed_up
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 PATIENCE, ALL_ROUNDS = 60.0, 600.0  # s that a run, and all timings together, may take
 SEARCH = 180.0  # s for the search of a cause, some ten runs and the error budget

@@ -10,15 +10,15 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, NoReturn
 
-from adapters.engines import ENGINES
-from reports.page.style import number
-from reports.run.arguments import checked_engines, checked_scenes, unknown
-from reports.speed.advice import BUSY, LOUD, Advice, Attempt, Inquiry, NoAdvice
-from reports.speed.purposes import PURPOSES
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, refuse, say
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table, print_texts
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, unknown
+from crosscheck2d.reports.speed.advice import BUSY, LOUD, Advice, Attempt, Inquiry, NoAdvice
+from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table, print_texts
 
 SHOWN = 3  # the cheapest and the next two
 

@@ -14,16 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.engine import Engine
-from adapters.engines import row_of
-from adapters.mechanisms.table import FLIGHT, Mechanism, mechanisms_of, with_mechanisms
-from adapters.play import play_once
-from adapters.run import Run
-from reports.compare import laws, scales
-from reports.compare.view import View, cut
-from reports.run.scenes import open_scene
-from reports.speed.scored_part import scored
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.table import FLIGHT, Mechanism, mechanisms_of, with_mechanisms
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.view import View, cut
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
     "time of collisions",

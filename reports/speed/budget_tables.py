@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from adapters.mechanisms.table import NAMES
-from reports.compare.pooling import WHO
-from reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
-from reports.speed.explained import LEAST, TO
+from crosscheck2d.adapters.mechanisms.table import NAMES
+from crosscheck2d.reports.compare.pooling import WHO
+from crosscheck2d.reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
+from crosscheck2d.reports.speed.explained import LEAST, TO
 
 EXPLAINED = TO[0]  # of the engine's error: a residual below it is said to be none
 FULL, DECADES = 1.0, 6  # radii of a full bar; how many decades below it a bar is empty

@@ -11,25 +11,32 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engines import row_of
-from adapters.mechanisms.ablated import AblatedReference
-from adapters.mechanisms.settings import GONE, find_remedy, settings_of, without_finer
-from adapters.mechanisms.table import AIR, END_OF_STEP, FRICTION, MECHANISMS, SKIN, mechanisms_of
-from adapters.play import play_once
-from reports.compare import laws
-from reports.compare.delays import jumps_of
-from reports.compare.view import beside
-from reports.page.style import number
-from reports.speed.budget import (
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
+from crosscheck2d.adapters.mechanisms.settings import GONE, find_remedy, settings_of, without_finer
+from crosscheck2d.adapters.mechanisms.table import (
+    AIR,
+    END_OF_STEP,
+    FRICTION,
+    MECHANISMS,
+    SKIN,
+    mechanisms_of,
+)
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.view import beside
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.speed.budget import (
     Budget,
     NotPlayed,
     Window,
 )
-from reports.speed.explained import LEAST
-from reports.speed.purposes import PURPOSES
-from reports.speed.scored_part import scored
-from reports.terminal.counts import listed
-from scenarios.model import Scene, Trajectory
+from crosscheck2d.reports.speed.explained import LEAST
+from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.terminal.counts import listed
+from crosscheck2d.scenarios.model import Scene, Trajectory
 
 LATE = "end-of-step detection"
 SWITCHED = (AIR, SKIN)  # by a setting of each library that has them, which was tried

@@ -10,14 +10,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports.compare.pareto import ACCURACIES, FAILED, front
-from reports.compare.pooling import without_idle
-from reports.page import style
-from reports.page.charts import ZERO, Figure, broken_axis, decades, marked_break, shortened, sized
-from reports.page.cost_picture import light_marks
-from reports.page.cost_points import by_engine
-from reports.speed.cheapest import KINDS
-from scenarios.model import Array
+from crosscheck2d.reports.compare.pareto import ACCURACIES, FAILED, front
+from crosscheck2d.reports.compare.pooling import without_idle
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.charts import (
+    ZERO,
+    Figure,
+    broken_axis,
+    decades,
+    marked_break,
+    shortened,
+    sized,
+)
+from crosscheck2d.reports.page.cost_picture import light_marks
+from crosscheck2d.reports.page.cost_points import by_engine
+from crosscheck2d.reports.speed.cheapest import KINDS
+from crosscheck2d.scenarios.model import Array
 
 FRONT, FRONT_OF_STEPS = "Pareto front", "Pareto front of those who take steps"
 COST, ERROR = "engine time (µs per simulated second)", "error (radii)"

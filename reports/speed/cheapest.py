@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports.compare.order import FINEST
-from reports.speed.scored_part import scored
-from scenarios.truth.exact import CLOSED_FORM, answered_by
+from crosscheck2d.reports.compare.order import FINEST
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, answered_by
 
 KINDS = {"event_driven": "collision to collision, float64"}
 STEPS = "step by step"

@@ -11,26 +11,26 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
-from adapters.engines import ENGINES, OWN, row_of
-from reports.compare.pareto import ACCURACIES, said_of_cheaper
-from reports.compare.pooling import said_of_pool
-from reports.page import style
-from reports.run.arguments import checked_engines, checked_scenes, opening
-from reports.run.machine import about
-from reports.run.made import digest_of
-from reports.run.store import Store
-from reports.speed import figures
-from reports.speed.effort import FULL, QUICK
-from reports.speed.explained import sentence
-from reports.speed.kept import Kept
-from reports.speed.measure import Measured, Measuring
-from reports.speed.page import write_page
-from reports.speed.plan import SpeedPlan
-from reports.speed.results import QUIET, Results
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, keeping, say
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_list, print_table, print_texts
+from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
+from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
+from crosscheck2d.reports.compare.pooling import said_of_pool
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.made import digest_of
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.speed import figures
+from crosscheck2d.reports.speed.effort import FULL, QUICK
+from crosscheck2d.reports.speed.explained import sentence
+from crosscheck2d.reports.speed.kept import Kept
+from crosscheck2d.reports.speed.measure import Measured, Measuring
+from crosscheck2d.reports.speed.page import write_page
+from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.reports.speed.results import QUIET, Results
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 
 NEVER, NOT_REACHED = "never", "–"
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"

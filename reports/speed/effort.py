@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenarios.catalogue import RANDOM, SCENARIOS
-from scenarios.model import Scenario
+from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS
+from crosscheck2d.scenarios.model import Scenario
 
 FEWEST_STEP_SIZES, MOST_STEP_SIZES = 3, 9
 

@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.table import MECHANISMS
-from reports.run.scenes import open_scene
-from reports.run.timing import FEWEST_ROUNDS, LEAST, WARM_UP
-from reports.speed.effort import Effort
-from reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
-from reports.terminal.counts import counted
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.timing import FEWEST_ROUNDS, LEAST, WARM_UP
+from crosscheck2d.reports.speed.effort import Effort
+from crosscheck2d.reports.speed.plan import SCENE, Measurement, Reach, SpeedPlan
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.scenarios.model import Scenario
 
 # s, means over the measurements: a step, each disk in it, applying forces in Python, wrapping a
 # disk in Python; a read-out, each disk in it; preparing a sample. On the machine of `figures.csv`;

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from reports.speed.budget import LIMIT, RESIDUAL, TOTAL, WHOSE
-from reports.terminal.counts import counted
+from crosscheck2d.reports.speed.budget import LIMIT, RESIDUAL, TOTAL, WHOSE
+from crosscheck2d.reports.terminal.counts import counted
 
 LEAST = 1e-9  # radii; smaller errors are rounding and need no explanation
 TO = (0.01, 0.001)  # of an error: an error with a smaller residual counts as explained

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from adapters.engines import DISTINCT, ENGINES
-from reports.compare.pareto import YARDSTICK
-from reports.speed.results import Results
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.adapters.engines import DISTINCT, ENGINES
+from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.speed.results import Results
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
 # of the same run, errors only

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from reports.run.cells import digest, source_hash
-from reports.run.store import Store
+from crosscheck2d.reports.run.cells import digest, source_hash
+from crosscheck2d.reports.run.store import Store
 
 SOURCE = (
     "reports/speed/**/*.py",

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from adapters.play import play_once
-from reports.compare import laws
-from reports.compare.verdicts import first_failed
-from reports.compare.view import cut
-from reports.run.scenes import open_scene
-from reports.run.stepping import Make, Stepping, overheads
-from reports.run.timing import Sample, Timed, interleaved
-from reports.run.timing_pass import can
-from reports.speed.scored_part import scored
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.verdicts import first_failed
+from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.stepping import Make, Stepping, overheads
+from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
+from crosscheck2d.reports.run.timing_pass import can
+from crosscheck2d.reports.speed.scored_part import scored
 
 FAILS = "fails"  # the status of a run that was played to its end and fails a verdict
 

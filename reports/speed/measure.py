@@ -12,17 +12,17 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import row_of
-from adapters.mechanisms.table import MECHANISMS
-from reports.run.machine import busy_cores
-from reports.run.pool import Failure, run_all
-from reports.run.scenes import open_scene
-from reports.run.timing import Sample
-from reports.speed import budget, cheapest, ladder, scored_part, sizes
-from reports.speed.estimate import estimate
-from reports.speed.kept import Kept
-from reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.reports.run.machine import busy_cores
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.timing import Sample
+from crosscheck2d.reports.speed import budget, cheapest, ladder, scored_part, sizes
+from crosscheck2d.reports.speed.estimate import estimate
+from crosscheck2d.reports.speed.kept import Kept
+from crosscheck2d.reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
+from crosscheck2d.reports.terminal.progress import Progress
 
 # s, limits for a ladder and for a timing: they only stop engines that hang
 HANGS, ALL_ROUNDS = 600.0, 3600.0

@@ -9,20 +9,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from reports.compare.order import ELSEWHERE, UNSTEADY
-from reports.compare.pareto import ACCURACIES, YARDSTICK, said_of_cheaper
-from reports.compare.pooling import said_of_pool
-from reports.page import situations, style
-from reports.page.charts import Drawing, packed_charts
-from reports.page.documents import CHARTED, render
-from reports.page.links import neighbours
-from reports.run.scenes import open_scene
-from reports.speed import budget_tables, charts, explained, tables
-from reports.speed.budget import RESIDUAL, TOTALS
-from reports.speed.results import QUIET, Results
-from reports.speed.scored_part import scored
-from reports.terminal.counts import counted
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.compare.order import ELSEWHERE, UNSTEADY
+from crosscheck2d.reports.compare.pareto import ACCURACIES, YARDSTICK, said_of_cheaper
+from crosscheck2d.reports.compare.pooling import said_of_pool
+from crosscheck2d.reports.page import situations, style
+from crosscheck2d.reports.page.charts import Drawing, packed_charts
+from crosscheck2d.reports.page.documents import CHARTED, render
+from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed import budget_tables, charts, explained, tables
+from crosscheck2d.reports.speed.budget import RESIDUAL, TOTALS
+from crosscheck2d.reports.speed.results import QUIET, Results
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck speed"
 FLAGGED = (ELSEWHERE, UNSTEADY)

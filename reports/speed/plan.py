@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
-from adapters.engine import Engine
-from adapters.engines import row_of, told_apart
-from adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sweep
-from reports.run.scenes import open_scene
-from reports.speed import ladder
-from reports.speed.effort import Effort
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engines import row_of, told_apart
+from crosscheck2d.adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sweep
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed import ladder
+from crosscheck2d.reports.speed.effort import Effort
 
 SCENE, OPTION, SWEEP = "scene", "option", "sweep"
 PLAIN = ""  # the change of an engine that is not changed

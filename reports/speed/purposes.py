@@ -6,10 +6,10 @@ from collections.abc import Callable
 from math import nan
 from typing import NamedTuple
 
-from reports.compare import laws, scales
-from reports.compare.metrics import METRICS
-from reports.compare.view import View
-from scenarios.model import Scene, Trajectory
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.view import View
+from crosscheck2d.scenarios.model import Scene, Trajectory
 
 
 class Purpose(NamedTuple):

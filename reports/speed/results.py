@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from reports.compare.pareto import ACCURACIES
-from reports.compare.pooling import pooled
-from reports.run.scenes import open_scene
-from reports.run.timing import Noise, noise_of
-from reports.speed import cheapest, explained, tables, versus
-from reports.speed.measure import Measured
-from reports.speed.plan import SpeedPlan
-from scenarios.model import Scenario
+from crosscheck2d.reports.compare.pareto import ACCURACIES
+from crosscheck2d.reports.compare.pooling import pooled
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.timing import Noise, noise_of
+from crosscheck2d.reports.speed import cheapest, explained, tables, versus
+from crosscheck2d.reports.speed.measure import Measured
+from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.scenarios.model import Scenario
 
 QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
-from reports.run.scenes import open_scene
-from scenarios.model import Scenario, Trajectory
-from scenarios.no_truth import NoTruth
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 
 class Scored(NamedTuple):

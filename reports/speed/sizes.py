@@ -7,12 +7,12 @@ from time import perf_counter
 
 import numpy as np
 
-from adapters.engine import Engine, Unsupported
-from reports.compare.order import line_interval
-from reports.run.stepping import Spent
-from reports.run.timing import Sample, Timed, interleaved
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Array, Scene
+from crosscheck2d.adapters.engine import Engine, Unsupported
+from crosscheck2d.reports.compare.order import line_interval
+from crosscheck2d.reports.run.stepping import Spent
+from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Array, Scene
 
 Make = Callable[[], Engine]
 DT, RADIUS, COVERED = 1 / 240, 0.5, 0.3

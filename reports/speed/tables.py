@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.options import SWEEPS
-from reports.compare.order import Order, median_interval, order_of
-from reports.compare.pareto import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.options import SWEEPS
+from crosscheck2d.reports.compare.order import Order, median_interval, order_of
+from crosscheck2d.reports.compare.pareto import (
     ACCURACIES,
     FAILED,
     NOT_REACHED,
@@ -23,15 +23,15 @@ from reports.compare.pareto import (
     paired_cost,
     yardstick_of,
 )
-from reports.compare.pooling import POOLED, WHO, pooled
-from reports.page import style
-from reports.run.stepping import CALL, EMPTY, READ, binding_of
-from reports.run.timing import WARM_UP
-from reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
-from reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
-from reports.speed.sizes import exponent
-from reports.terminal.counts import listed
-from scenarios.model import Scenario
+from crosscheck2d.reports.compare.pooling import POOLED, WHO, pooled
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, binding_of
+from crosscheck2d.reports.run.timing import WARM_UP
+from crosscheck2d.reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
+from crosscheck2d.reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
+from crosscheck2d.reports.speed.sizes import exponent
+from crosscheck2d.reports.terminal.counts import listed
+from crosscheck2d.scenarios.model import Scenario
 
 NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.table import MECHANISMS
-from reports.compare.pareto import YARDSTICK
-from reports.speed.plan import PLAIN
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.speed.plan import PLAIN
 
 COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != YARDSTICK)
 COLUMNS = [

@@ -1,8 +1,8 @@
 """Which mechanisms of an engine are enough to produce its limit: the reference with only these
 works and fails at the same values as the engine.
 
-`adapters.mechanisms.table` lists what an engine does differently from exact flight with
-end-of-step detection, and `adapters.mechanisms.ablated_reference` can enable each of these
+`crosscheck2d.adapters.mechanisms.table` lists what an engine does differently from exact flight with
+end-of-step detection, and `crosscheck2d.adapters.mechanisms.ablated_reference` can enable each of these
 mechanisms. An ablation is the reference with some of them enabled. An ablation that has the
 engine's limit shows its cause.
 """
@@ -15,7 +15,7 @@ from fnmatch import fnmatch
 from functools import partial
 from math import isnan
 
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.mechanisms.table import (
     AIR,
     DIGITS,
     EDGES,
@@ -33,12 +33,12 @@ from adapters.mechanisms.table import (
     mechanisms_of,
     with_mechanisms,
 )
-from reports.stability.limits import Case, Limit
-from reports.stability.predicates import Reading, judge
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DrivenEngine
-from reports.terminal.counts import listed
-from scenarios.model import Scenario
+from crosscheck2d.reports.stability.limits import Case, Limit
+from crosscheck2d.reports.stability.predicates import Reading, judge
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DrivenEngine
+from crosscheck2d.reports.terminal.counts import listed
+from crosscheck2d.scenarios.model import Scenario
 
 END_OF_STEP = "end-of-step detection"  # the ablation without any mechanism
 ACTS_AT_END = "a collision takes effect at the end of the step in which it is found"

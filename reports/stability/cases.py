@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from reports.stability.cases_alone import ALONE
-from reports.stability.cases_collisions import COLLISIONS
-from reports.stability.cases_friction import FRICTION
-from reports.stability.cases_gas import GAS
-from reports.stability.cases_stacks import STACKS
-from reports.stability.cases_suite import SUITE
-from reports.stability.limits import Case
+from crosscheck2d.reports.stability.cases_alone import ALONE
+from crosscheck2d.reports.stability.cases_collisions import COLLISIONS
+from crosscheck2d.reports.stability.cases_friction import FRICTION
+from crosscheck2d.reports.stability.cases_gas import GAS
+from crosscheck2d.reports.stability.cases_stacks import STACKS
+from crosscheck2d.reports.stability.cases_suite import SUITE
+from crosscheck2d.reports.stability.limits import Case
 
 FAMILIES = {
     "One collision": COLLISIONS,

@@ -9,23 +9,23 @@ from math import sqrt
 
 import numpy as np
 
-from adapters.engine import Unsupported
-from adapters.run import Run, gather
-from adapters.runaway import fault_of
-from reports.stability.cases_collisions import of_pair
-from reports.stability.limits import Case
-from reports.stability.phases import EDGE, phase, sampled
-from reports.stability.predicates import (
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.run import Run, gather
+from crosscheck2d.adapters.runaway import fault_of
+from crosscheck2d.reports.stability.cases_collisions import of_pair
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.phases import EDGE, phase, sampled
+from crosscheck2d.reports.stability.predicates import (
     ANGLE_OFF,
     BOUNCES_OFF,
     SCALED_DEVIATION,
     SPRING_GROWS,
     WRONG_DISTANCE,
 )
-from reports.stability.variants import DrivenEngine, with_variant
-from scenarios.families.placing import lay_out
-from scenarios.model import NO_COLLISIONS, Array, Scenario, Scene, State, Trajectory
-from scenarios.truth.closed_forms import answer, bouncing, flight
+from crosscheck2d.reports.stability.variants import DrivenEngine, with_variant
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import NO_COLLISIONS, Array, Scenario, Scene, State, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, bouncing, flight
 
 RADIUS, G = 0.25, 10.0
 HEIGHT = 1.25  # m, so that the fall lasts 0.5 s and ends at 5 m/s

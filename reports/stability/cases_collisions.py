@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from reports.stability.limits import Case
-from reports.stability.phases import phase
-from reports.stability.predicates import (
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.phases import phase
+from crosscheck2d.reports.stability.predicates import (
     COLLISIONS_MISSED,
     COLLISIONS_SPURIOUS,
     RESTITUTION_OFF,
     VELOCITY_OFF,
 )
-from reports.stability.variants import with_variant
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import answer, flight, pair
+from crosscheck2d.reports.stability.variants import with_variant
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, flight, pair
 
 RADIUS, DT = 0.25, 1 / 64
 LEAD, AFTER = 3, 6  # whole steps before the step of the collision, and after it

@@ -11,16 +11,21 @@ from math import ceil, hypot
 
 import numpy as np
 
-from reports.stability.cases_collisions import AFTER, LEAD, stepped
-from reports.stability.limits import Case
-from reports.stability.phases import phase
-from reports.stability.predicates_friction import CREEPS, FRICTION_OFF, ROLLING_OFF, SLIPS
-from reports.stability.variants import WITH_FRICTION_ONLY
-from scenarios.families.friction import IMPACT, ROLL, start_of, turning_answer
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import at_rest
-from scenarios.truth.sliding import bounce, slide, spinning_pair
+from crosscheck2d.reports.stability.cases_collisions import AFTER, LEAD, stepped
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.phases import phase
+from crosscheck2d.reports.stability.predicates_friction import (
+    CREEPS,
+    FRICTION_OFF,
+    ROLLING_OFF,
+    SLIPS,
+)
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY
+from crosscheck2d.scenarios.families.friction import IMPACT, ROLL, start_of, turning_answer
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import at_rest
+from crosscheck2d.scenarios.truth.sliding import bounce, slide, spinning_pair
 
 RADIUS, SOLID, G = 0.25, 2.0, 10.0  # SOLID: m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped

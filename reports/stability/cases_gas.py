@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator, default_rng
 
-from adapters.run import Run
-from reports.stability.limits import RARELY, Case
-from reports.stability.predicates_gas import (
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.stability.limits import RARELY, Case
+from crosscheck2d.reports.stability.predicates_gas import (
     ENERGY_DRIFTS,
     GAS_DIVERGES,
     MOMENTUM_DRIFTS,
     TEMPERATURES_PART,
     WRONG_GAS,
 )
-from reports.stability.variants import DrivenEngine, played, with_variant
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
+from crosscheck2d.reports.stability.variants import DrivenEngine, played, with_variant
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 
 SOURCE = "the hard-disk gas (Alder & Wainwright, J. Chem. Phys. 31, 459, 1959)"
 RADIUS, DT = 0.25, 1 / 240

@@ -8,12 +8,18 @@ from math import sqrt
 import numpy as np
 from numpy.random import default_rng
 
-from reports.stability.limits import RARELY, Case
-from reports.stability.phases import phase
-from reports.stability.predicates_crowds import BURSTS, EJECTED, NOT_AT_REST, STANDS, STILL_OVERLAP
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario
-from scenarios.truth.closed_forms import at_rest
+from crosscheck2d.reports.stability.limits import RARELY, Case
+from crosscheck2d.reports.stability.phases import phase
+from crosscheck2d.reports.stability.predicates_crowds import (
+    BURSTS,
+    EJECTED,
+    NOT_AT_REST,
+    STANDS,
+    STILL_OVERLAP,
+)
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.closed_forms import at_rest
 
 RADIUS, G, DT = 0.25, 10.0, 1 / 64
 FLOOR = [[[-4, 0], [4, 0]]]

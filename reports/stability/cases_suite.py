@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from reports.stability.limits import Case
-from reports.stability.predicates_usable import USABLE
-from scenarios.catalogue import RANDOM, SCENARIOS, scenario
-from scenarios.model import Scenario
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.predicates_usable import USABLE
+from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Scenario
 
 MOST_SAMPLES = 300  # samples at most
 

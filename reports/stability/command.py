@@ -11,16 +11,16 @@ from typing import NoReturn
 
 import pandas as pd
 
-from adapters.engines import ENGINES, OWN, row_of
-from reports.run.arguments import checked_engines, opening, unknown
-from reports.run.pool import affordable
-from reports.run.store import Store
-from reports.stability.cases import CASES
-from reports.stability.limits import Limit
-from reports.stability.maps import MAPS
-from reports.stability.overview import in_words
-from reports.stability.page import write_page
-from reports.stability.results import (
+from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
+from crosscheck2d.reports.run.arguments import checked_engines, opening, unknown
+from crosscheck2d.reports.run.pool import affordable
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import Limit
+from crosscheck2d.reports.stability.maps import MAPS
+from crosscheck2d.reports.stability.overview import in_words
+from crosscheck2d.reports.stability.page import write_page
+from crosscheck2d.reports.stability.results import (
     StabilityPlan,
     StabilityResults,
     carry_out,
@@ -30,14 +30,14 @@ from reports.stability.results import (
     table,
     tasks_of,
 )
-from reports.stability.touching import TOUCHING, AtGap
-from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
-from reports.stability.vary import VARIES, cannot_vary
-from reports.terminal.console import Console
-from reports.terminal.exits import DONE, FAILED, Unusable, keeping, refuse, say
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table, print_texts
-from scenarios.files.scene_file import SceneFileError, read_scene_file
+from crosscheck2d.reports.stability.touching import TOUCHING, AtGap
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
+from crosscheck2d.reports.stability.vary import VARIES, cannot_vary
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, Unusable, keeping, refuse, say
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table, print_texts
+from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
 
 SEE = (
     "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"

@@ -10,18 +10,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from reports.stability.ablations import END_OF_STEP, reason_by_ablation, sufficient_mechanisms
-from reports.stability.cases import CASES
-from reports.stability.interventions import (
+from crosscheck2d.reports.stability.ablations import (
+    END_OF_STEP,
+    reason_by_ablation,
+    sufficient_mechanisms,
+)
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.interventions import (
     FIRST,
     SAYS_SO,
     intervention_of,
     reason_by_intervention,
     with_settings,
 )
-from reports.stability.limits import NEVER_FAILS, Limit
-from reports.stability.reasons import Reason, reason_of
-from reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, Limit
+from crosscheck2d.reports.stability.reasons import Reason, reason_of
+from crosscheck2d.reports.stability.search import LimitSearch
 
 # the factor by which a prediction may be off: the width of the quick form's bracket; and collisions
 # are not all lost at one value

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.page.replay import COLLISIONS
-from reports.run.trajectories import STATE, load_trajectory, packed
-from reports.stability.limits import Limit, Trial
-from reports.stability.search import LimitSearch
-from scenarios.model import Collisions, Scenario, Trajectory, frozen
-from scenarios.no_truth import NoTruth
+from crosscheck2d.reports.page.replay import COLLISIONS
+from crosscheck2d.reports.run.trajectories import STATE, load_trajectory, packed
+from crosscheck2d.reports.stability.limits import Limit, Trial
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory, frozen
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 BEFORE, AFTER = 120, 40  # samples of a failure that are shown
 

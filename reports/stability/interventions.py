@@ -11,19 +11,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adapters.engines import row_of
-from adapters.mechanisms.settings import find_remedy, settings_of, without_finer
-from reports.compare.faces import ALONG, first_on_line
-from reports.stability.ablations import ACTS_AT_END, reason_by_ablation
-from reports.stability.cases_collisions import BULLETS
-from reports.stability.limits import NOT_KNOWN, Limit
-from reports.stability.predicates import judge
-from reports.stability.predicates_usable import GHOST
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DrivenEngine, play_as
-from reports.stability.vary import similar
-from scenarios.model import Array, Scenario, Scene
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.settings import find_remedy, settings_of, without_finer
+from crosscheck2d.reports.compare.faces import ALONG, first_on_line
+from crosscheck2d.reports.stability.ablations import ACTS_AT_END, reason_by_ablation
+from crosscheck2d.reports.stability.cases_collisions import BULLETS
+from crosscheck2d.reports.stability.limits import NOT_KNOWN, Limit
+from crosscheck2d.reports.stability.predicates import judge
+from crosscheck2d.reports.stability.predicates_usable import GHOST
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
+from crosscheck2d.reports.stability.vary import similar
+from crosscheck2d.scenarios.model import Array, Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 FINER = 8
 

@@ -8,11 +8,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import nan, sqrt
 
-from adapters.engines import DISTINCT
-from adapters.run import Run
-from reports.stability.predicates import Predicate
-from reports.stability.variants import DRIVEN_ENGINES, WITH_FRICTION_ONLY, DrivenEngine, played
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import DISTINCT
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.stability.predicates import Predicate
+from crosscheck2d.reports.stability.variants import (
+    DRIVEN_ENGINES,
+    WITH_FRICTION_ONLY,
+    DrivenEngine,
+    played,
+)
+from crosscheck2d.scenarios.model import Scenario
 
 EXACT, NOT_KNOWN = "the exact answer", "not known"
 LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = (

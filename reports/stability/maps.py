@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engines import ENGINES, changed
-from adapters.play import play_once
-from adapters.run import Run
-from reports.stability.cases_collisions import flyby
-from reports.stability.cases_gas import gas
-from reports.stability.cases_stacks import column
-from reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
-from reports.stability.predicates_crowds import STANDS
-from reports.stability.predicates_gas import ENERGY_DRIFTS
-from reports.stability.variants import play_as
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES, changed
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.stability.cases_collisions import flyby
+from crosscheck2d.reports.stability.cases_gas import gas
+from crosscheck2d.reports.stability.cases_stacks import column
+from crosscheck2d.reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
+from crosscheck2d.reports.stability.predicates_crowds import STANDS
+from crosscheck2d.reports.stability.predicates_gas import ENERGY_DRIFTS
+from crosscheck2d.reports.stability.variants import play_as
+from crosscheck2d.scenarios.model import Scenario
 
 
 @dataclass(frozen=True)

@@ -9,16 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from reports.page.situations import ENGINE, FAR_OFF, grouped
-from reports.page.style import number
-from reports.stability.cases_friction import FRICTION
-from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND, Case, Limit
-from reports.stability.maps import MAPS, MapOf
-from reports.stability.touching import AT_ONCE, PAIRS, AtGap
-from reports.terminal.counts import counted, listed
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.page.situations import ENGINE, FAR_OFF, grouped
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.stability.cases_friction import FRICTION
+from crosscheck2d.reports.stability.limits import (
+    LIMIT,
+    NEVER_FAILS,
+    NEVER_WORKS,
+    ONLY_BEYOND,
+    Case,
+    Limit,
+)
+from crosscheck2d.reports.stability.maps import MAPS, MapOf
+from crosscheck2d.reports.stability.touching import AT_ONCE, PAIRS, AtGap
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario
 
 WITH_FRICTION = {case.name for case in FRICTION}
 

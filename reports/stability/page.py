@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from adapters.run import Run
-from reports.page import style
-from reports.page.charts import ChartLine, Drawing, figure_of, packed_charts, shortened
-from reports.page.documents import CHARTED, render
-from reports.page.links import neighbours
-from reports.page.replay import pack_layers, ratio_of
-from reports.stability import overview
-from reports.stability.cases import FAMILY_OF
-from reports.stability.failures import kept_failure, near
-from reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
-from reports.stability.maps import MAPS
-from reports.stability.results import StabilityResults, case_named
-from reports.stability.touching import GAPS, TOUCHING
-from reports.terminal.foreign_text import put_text
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.page.charts import ChartLine, Drawing, figure_of, packed_charts, shortened
+from crosscheck2d.reports.page.documents import CHARTED, render
+from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.replay import pack_layers, ratio_of
+from crosscheck2d.reports.stability import overview
+from crosscheck2d.reports.stability.cases import FAMILY_OF
+from crosscheck2d.reports.stability.failures import kept_failure, near
+from crosscheck2d.reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
+from crosscheck2d.reports.stability.maps import MAPS
+from crosscheck2d.reports.stability.results import StabilityResults, case_named
+from crosscheck2d.reports.stability.touching import GAPS, TOUCHING
+from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 GENERATOR = "crosscheck stability"
 SECONDS = 5.0  # a replay lasts

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.run import Run
-from reports.compare import laws
-from reports.compare.verdicts import MOST_BOUNCE
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.verdicts import MOST_BOUNCE
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 
 class Reading(NamedTuple):

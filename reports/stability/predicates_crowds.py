@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws
-from reports.compare.verdicts import MOST_JITTER, MOST_RESIDUAL, MOST_SINKING, own_speed
-from reports.stability.predicates import Predicate, Reading, first_above, largest
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.verdicts import (
+    MOST_JITTER,
+    MOST_RESIDUAL,
+    MOST_SINKING,
+    own_speed,
+)
+from crosscheck2d.reports.stability.predicates import Predicate, Reading, first_above, largest
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 
 def _stands(scenario: Scenario, played: Trajectory) -> Reading:

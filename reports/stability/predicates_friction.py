@@ -5,9 +5,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare.verdicts import SETTLED
-from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.reports.compare.verdicts import SETTLED
+from crosscheck2d.reports.stability.predicates import (
+    Predicate,
+    Reading,
+    first_above,
+    largest,
+    truth_of,
+)
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 
 def _friction_off(scenario: Scenario, played: Trajectory) -> Reading:

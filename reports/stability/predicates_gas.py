@@ -10,10 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.compare import laws
-from reports.compare.verdicts import MOST_MOMENTUM
-from reports.stability.predicates import Predicate, Reading, first_above, largest, truth_of
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.verdicts import MOST_MOMENTUM
+from crosscheck2d.reports.stability.predicates import (
+    Predicate,
+    Reading,
+    first_above,
+    largest,
+    truth_of,
+)
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 # B_k / B_2^(k-1) of hard disks, k = 1 .. 10 (Clisby & McCoy, J. Stat. Phys. 122, 15, 2006).
 VIRIALS = (

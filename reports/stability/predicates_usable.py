@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.compare import laws
-from reports.compare.collisions import match, pair_keys, who
-from reports.compare.faces import on_faces, thrown_off
-from reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
-from reports.compare.view import cut
-from reports.stability.predicates import Predicate, Reading, largest
-from scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.collisions import match, pair_keys, who
+from crosscheck2d.reports.compare.faces import on_faces, thrown_off
+from crosscheck2d.reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
+from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.stability.predicates import Predicate, Reading, largest
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 
 GHOST = "ghost collision"
 LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding

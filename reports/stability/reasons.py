@@ -7,7 +7,7 @@ from fnmatch import fnmatch
 from math import atan, pi, sqrt
 from typing import NamedTuple
 
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.mechanisms.table import (
     DIGITS,
     FLIGHT,
     FRICTION,
@@ -15,14 +15,14 @@ from adapters.mechanisms.table import (
     POSITION_CORRECTION,
     RESTITUTION,
 )
-from reports.stability.ablations import (
+from crosscheck2d.reports.stability.ablations import (
     B2_SETTINGS,
     END_OF_STEP,
     THRESHOLD,
     THRESHOLDS,
 )
-from reports.stability.cases import CASES
-from reports.stability.limits import NEVER_FAILS, Limit
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, Limit
 
 
 class Reason(NamedTuple):
@@ -35,7 +35,7 @@ class Reason(NamedTuple):
         predicts: the limit that follows from it.
         variant: an engine that differs in this alone, or in little else, and must get farther;
             "+bullets": the engine itself with bullets.
-        mechanism: the one that the sentence is about, of `adapters.mechanisms.table`, or
+        mechanism: the one that the sentence is about, of `crosscheck2d.adapters.mechanisms.table`, or
             `END_OF_STEP`; an ablation that has the limit must have it.
     """
 

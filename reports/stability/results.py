@@ -14,24 +14,24 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED, OWN
-from adapters.npm_packages import version_of
-from reports.run.cells import content_key, source_hash
-from reports.run.machine import about
-from reports.run.made import digest_of
-from reports.run.pool import Failure, run_all
-from reports.run.store import Store
-from reports.stability.cases import CASES
-from reports.stability.explain import explained, with_replays
-from reports.stability.failures import companion_file, failure_files, file_of
-from reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
-from reports.stability.maps import MAPS, MapOf, map_of
-from reports.stability.search import LimitSearch
-from reports.stability.touching import TOUCHING, LawOf, law_of
-from reports.stability.variants import WITH_FRICTION_ONLY, taking_part
-from reports.stability.vary import case_of_file
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.npm_packages import version_of
+from crosscheck2d.reports.run.cells import content_key, source_hash
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.made import digest_of
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.explain import explained, with_replays
+from crosscheck2d.reports.stability.failures import companion_file, failure_files, file_of
+from crosscheck2d.reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
+from crosscheck2d.reports.stability.maps import MAPS, MapOf, map_of
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.touching import TOUCHING, LawOf, law_of
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
+from crosscheck2d.reports.stability.vary import case_of_file
+from crosscheck2d.reports.terminal.progress import Progress
 
 COLUMNS = (
     "engine",

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite, isnan, nan
 
-from adapters.run import Run
-from reports.stability.limits import (
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.stability.limits import (
     ALL,
     LIMIT,
     NEVER_FAILS,
@@ -19,9 +19,9 @@ from reports.stability.limits import (
     Limit,
     Trial,
 )
-from reports.stability.predicates import Reading, judge
-from reports.stability.variants import DRIVEN_ENGINES
-from scenarios.model import Scenario
+from crosscheck2d.reports.stability.predicates import Reading, judge
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.scenarios.model import Scenario
 
 
 @dataclass

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reports.stability.cases_collisions import LEAD, RADIUS
-from reports.stability.variants import play_as
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.reports.stability.cases_collisions import LEAD, RADIUS
+from crosscheck2d.reports.stability.variants import play_as
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 # of the incoming speed; an engine whose velocities differ by more from every law follows none
 NEAR = 0.02

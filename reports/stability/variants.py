@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
-from adapters.engine import Engine
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, changed, row_of
-from adapters.play import play_once
-from adapters.run import Run
-from scenarios.model import Scenario, Scene
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, changed, row_of
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.scenarios.model import Scenario, Scene
 
 
 class DrivenEngine(NamedTuple):

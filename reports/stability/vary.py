@@ -10,14 +10,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.page.style import number
-from reports.stability.cases_suite import dense_ladder, in_steps, ladder
-from reports.stability.limits import Case
-from reports.stability.predicates_usable import USABLE
-from reports.stability.variants import WITH_FRICTION_ONLY
-from scenarios.files.scene_file import read_scene_file
-from scenarios.model import Array, Collisions, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.stability.cases_suite import dense_ladder, in_steps, ladder
+from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.predicates_usable import USABLE
+from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.model import (
+    Array,
+    Collisions,
+    Scenario,
+    Scene,
+    Thrust,
+    Trajectory,
+    frozen,
+)
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 
 def at_speed(one: Scenario, x: float) -> Scenario:

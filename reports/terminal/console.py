@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console as RichConsole
 from rich.text import Text
 
-from reports.terminal.foreign_text import legible
+from crosscheck2d.reports.terminal.foreign_text import legible
 
 
 class Console(RichConsole):

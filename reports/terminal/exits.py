@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from reports.terminal.foreign_text import legible
+from crosscheck2d.reports.terminal.foreign_text import legible
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 STATUS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}

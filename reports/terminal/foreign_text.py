@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from adapters.own_solver.file import printable
+from crosscheck2d.adapters.own_solver.file import printable
 
 
 def legible(text: str) -> str:

@@ -12,8 +12,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from reports.terminal.console import Console
-from reports.terminal.foreign_text import legible
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.foreign_text import legible
 
 QUIET = 30.0  # s between two lines if there is no terminal
 BAR, GAP = 10, 2  # columns

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from errno import EPIPE
 from typing import Any
 
-from reports.terminal.exits import DONE, FAILED, say
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, say
 
 
 class Outlet(io.FileIO):

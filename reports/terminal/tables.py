@@ -9,8 +9,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from reports.terminal.console import Console
-from reports.terminal.foreign_text import legible
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.foreign_text import legible
 
 GAPS = 2, 1  # gap between two columns of a table: the wider one if all fits
 TEXT = 28  # least width of a text beside its name

@@ -10,15 +10,23 @@ from typing import NoReturn
 
 import pandas as pd
 
-from reports.run.arguments import opening, unknown
-from reports.run.cells import content_key, source_hash
-from reports.run.store import Store
-from reports.terminal.console import Console
-from reports.terminal.counts import counted
-from reports.terminal.exits import DONE, keeping, refuse
-from reports.terminal.progress import Progress
-from reports.terminal.tables import print_table
-from reports.tune.search import BETTER, BREAKS, CHOSEN, NO_BETTER, TUNED, UNASKED, SettingsSearch
+from crosscheck2d.reports.run.arguments import opening, unknown
+from crosscheck2d.reports.run.cells import content_key, source_hash
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import DONE, keeping, refuse
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.tables import print_table
+from crosscheck2d.reports.tune.search import (
+    BETTER,
+    BREAKS,
+    CHOSEN,
+    NO_BETTER,
+    TUNED,
+    UNASKED,
+    SettingsSearch,
+)
 
 NAME, TUNE = "matched.csv", "crosscheck tune"
 SOURCE = ("reports/tune/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")

@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.advance import advance
-from adapters.engine import Engine
-from adapters.javascript.engine import JavaScriptEngine
-from adapters.play import play_once
-from reports.compare import laws, scales
-from reports.compare.collisions import match
-from scenarios.families.tuning import FAMILIES, LADDER, one_of
-from scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.adapters.advance import advance
+from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.javascript.engine import JavaScriptEngine
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.collisions import match
+from crosscheck2d.scenarios.families.tuning import FAMILIES, LADDER, one_of
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 FLOOR = 1e-6  # radii: below the finest accuracy that any page asks for, an error is as good as none
 # times as much energy as before, and so much of that at hand, may be wrong

@@ -11,12 +11,20 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from adapters.conformance.conform import conform
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED
-from adapters.matched import Searched
-from reports.tune.score import Against, Make, TrialScores, against, cost_of, measured, posed
-from scenarios.families.tuning import FAMILIES
+from crosscheck2d.adapters.conformance.conform import conform
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.matched import Searched
+from crosscheck2d.reports.tune.score import (
+    Against,
+    Make,
+    TrialScores,
+    against,
+    cost_of,
+    measured,
+    posed,
+)
+from crosscheck2d.scenarios.families.tuning import FAMILIES
 
 SEEDS, OTHER_SEEDS = (0, 1), (2, 3)  # what is chosen on, and what has to bear it out
 # times the error: what gains less is kept as it is, as other seeds may read as much more

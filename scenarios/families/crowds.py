@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.families.placing import box, lay_out, scatter
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import answer, bouncing
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, bouncing
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 
 def simbenchmark_bouncing() -> Scenario:

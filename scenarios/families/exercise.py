@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.families.placing import lay_out, scatter
-from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
-from scenarios.truth.closed_forms import world_thrusts
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.families.placing import lay_out, scatter
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 SOURCE = 'Visual Computing, exercise 11, "Physics based simulation"'
 LOW, HIGH = [-5.0, -3.0], [5.0, 3.0]

@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from scenarios.families.placing import box, lay_out, scatter, tag
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import Collision, answer
-from scenarios.truth.exact import with_oracle
-from scenarios.truth.sliding import between_plates, bounce, slide, spinning_pair
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter, tag
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import Collision, answer
+from crosscheck2d.scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.truth.sliding import between_plates, bounce, slide, spinning_pair
 
 G = 9.81
 FLOOR = [[[-10, 0], [10, 0]]]

@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from scenarios.families.placing import box, lay_out, scatter
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import answer, flight, to_and_fro
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, flight, to_and_fro
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 SOURCE = 'the lesson "Simple body dynamics"'
 

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scenarios.families.placing import lay_out, tag
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import Collision, Motion, answer, pair
+from crosscheck2d.scenarios.families.placing import lay_out, tag
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import Collision, Motion, answer, pair
 
 SOURCE = (
     "momentum, and Newton's restitution along the line of centres (Landau & Lifshitz,"

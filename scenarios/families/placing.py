@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scenarios.model import Array, Scene
+from crosscheck2d.scenarios.model import Array, Scene
 
 
 def lay_out(**fields: Any) -> Scene:

@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import Motion, answer
-from scenarios.truth.exact import with_oracle
-from scenarios.truth.lines import galperin, galperin_collisions, row, row_collisions
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import Motion, answer
+from crosscheck2d.scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.truth.lines import galperin, galperin_collisions, row, row_collisions
 
 EPS = float(np.finfo(float).eps)
 

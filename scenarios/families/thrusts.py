@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Thrust, Trajectory
-from scenarios.truth.closed_forms import answer, body_thrust, flight, world_thrusts
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Thrust, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, body_thrust, flight, world_thrusts
 
 INTERVAL = 1 / 60
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.closed_forms import answer, at_rest, bouncing, flight, stacked
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, at_rest, bouncing, flight, stacked
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 SAMPLE_INTERVAL = 1 / 60  # s
 LADDER = (1, 2, 4)  # steps in it

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import (
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import (
     answer,
     at_rest,
     bouncing,
@@ -17,7 +17,7 @@ from scenarios.truth.closed_forms import (
     stacked,
     to_and_fro,
 )
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 G = 9.81
 FLOOR = [[[-10, 0], [10, 0]]]

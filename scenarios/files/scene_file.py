@@ -18,11 +18,11 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from scenarios.families.placing import box
-from scenarios.files.tables import TABLES, SceneToml
-from scenarios.model import Array, Scenario, Scene, Thrust
-from scenarios.regular import opened
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.files.tables import TABLES, SceneToml
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust
+from crosscheck2d.scenarios.regular import opened
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 MOST_BYTES = 5_000_000
 LONG_NUMBER = re.compile(r"(?<![\w.])\d[\d_]{4000,}")

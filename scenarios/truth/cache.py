@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from platformdirs import user_cache_path
 
-from scenarios.model import Scenario, frozen
-from scenarios.rows import Damaged, Rows
+from crosscheck2d.scenarios.model import Scenario, frozen
+from crosscheck2d.scenarios.rows import Damaged, Rows
 
 HERE = Path(__file__).parent
 FILE, KIND = "exact_answers.sqlite", "record"

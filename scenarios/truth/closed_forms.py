@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scenarios.model import Array, Collisions, Scene, Thrust, Trajectory, frozen
+from crosscheck2d.scenarios.model import Array, Collisions, Scene, Thrust, Trajectory, frozen
 
 Collision = tuple[float, int, int, float]
 """t s, disk, other disk or -1 - wall, impulse N s."""

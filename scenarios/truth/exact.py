@@ -9,16 +9,22 @@ from math import ceil
 
 import numpy as np
 
-from scenarios.model import Array, Scenario, Thrust, Trajectory
-from scenarios.no_truth import NoTruth
-from scenarios.truth.cache import keep, key_of, look_up
-from scenarios.truth.oracle.bodies import Leg
-from scenarios.truth.oracle.events import trace, turns_with_disk
-from scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
-from scenarios.truth.oracle.path import Path
-from scenarios.truth.oracle.resting import FOR_SERIES
-from scenarios.truth.oracle.work import TimeLimit, WorkLimit
-from scenarios.truth.record import CERTIFIED, TWO_PRECISIONS, TruthRecord, last_time, record_of
+from crosscheck2d.scenarios.model import Array, Scenario, Thrust, Trajectory
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.cache import keep, key_of, look_up
+from crosscheck2d.scenarios.truth.oracle.bodies import Leg
+from crosscheck2d.scenarios.truth.oracle.events import trace, turns_with_disk
+from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
+from crosscheck2d.scenarios.truth.oracle.path import Path
+from crosscheck2d.scenarios.truth.oracle.resting import FOR_SERIES
+from crosscheck2d.scenarios.truth.oracle.work import TimeLimit, WorkLimit
+from crosscheck2d.scenarios.truth.record import (
+    CERTIFIED,
+    TWO_PRECISIONS,
+    TruthRecord,
+    last_time,
+    record_of,
+)
 
 FEWEST_BITS, MOST_BITS = 128, 8192  # the tie is 2^-(bits / 2), below the eps of float64
 LEAST_GAIN = 1.05  # 1.5 times the bits must reach 1.05 times as far, else more bits do not help

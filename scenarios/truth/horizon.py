@@ -30,9 +30,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array, Scenario, Scene
-from scenarios.truth.oracle.bodies import Hop, Leg
-from scenarios.truth.oracle.path import Event, Path
+from crosscheck2d.scenarios.model import Array, Scenario, Scene
+from crosscheck2d.scenarios.truth.oracle.bodies import Hop, Leg
+from crosscheck2d.scenarios.truth.oracle.path import Event, Path
 
 EPS = float(np.finfo(float).eps)
 DIVERGED = 1e-9

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.model import Array
-from scenarios.truth.closed_forms import Collision, Motion
+from crosscheck2d.scenarios.model import Array
+from crosscheck2d.scenarios.truth.closed_forms import Collision, Motion
 
 
 def fold(place: Array, length: float) -> tuple[Array, Array]:

@@ -15,12 +15,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array, Scenario
-from scenarios.truth.horizon import DIVERGED, EPS, TangentVectors
-from scenarios.truth.oracle.bodies import Bodies
-from scenarios.truth.oracle.numbers import digits
-from scenarios.truth.oracle.path import Event, Path
-from scenarios.truth.oracle.ties import ENDLESS, TOO_MANY, Contact, TieOutcome, Touch, Velocities
+from crosscheck2d.scenarios.model import Array, Scenario
+from crosscheck2d.scenarios.truth.horizon import DIVERGED, EPS, TangentVectors
+from crosscheck2d.scenarios.truth.oracle.bodies import Bodies
+from crosscheck2d.scenarios.truth.oracle.numbers import digits
+from crosscheck2d.scenarios.truth.oracle.path import Event, Path
+from crosscheck2d.scenarios.truth.oracle.ties import (
+    ENDLESS,
+    TOO_MANY,
+    Contact,
+    TieOutcome,
+    Touch,
+    Velocities,
+)
 
 DEVIATIONS = 4  # a gap is within the rounding below so many of its deviations: 1 start in 16000 not
 CLOSE = 1e-6  # radii of the smallest disk; no deviation is as large before a disk diverges

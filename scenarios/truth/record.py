@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
-from scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
-from scenarios.truth.horizon import DIVERGED
-from scenarios.truth.oracle.bodies import nearest
-from scenarios.truth.oracle.jets import count_pieces, push
-from scenarios.truth.oracle.path import Event, Path
-from scenarios.truth.order import float64_horizon
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust, Trajectory, frozen
+from crosscheck2d.scenarios.truth.closed_forms import Collision, answer, flight, world_thrusts
+from crosscheck2d.scenarios.truth.horizon import DIVERGED
+from crosscheck2d.scenarios.truth.oracle.bodies import nearest
+from crosscheck2d.scenarios.truth.oracle.jets import count_pieces, push
+from crosscheck2d.scenarios.truth.oracle.path import Event, Path
+from crosscheck2d.scenarios.truth.order import float64_horizon
 
 EPS = float(np.finfo(float).eps)
 # relative to `reach`: a few roundings, of the start of a leg, of a time and of a sample

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.model import Array, Scene
-from scenarios.truth.closed_forms import Legs, pair
+from crosscheck2d.scenarios.model import Array, Scene
+from crosscheck2d.scenarios.truth.closed_forms import Legs, pair
 
 
 def friction_kick(slip: Array, inverse_mass: Array | float, most: Array) -> Array:

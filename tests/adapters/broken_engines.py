@@ -9,12 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from adapters.engine import ContactImpulse, Engine, Unsupported
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES
-from adapters.reference import Reference
-from reference_impl import exercise, ordered
-from scenarios.model import State
+from crosscheck2d.adapters.engine import ContactImpulse, Engine, Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.reference_impl import exercise, ordered
+from crosscheck2d.scenarios.model import State
 
 
 class Sound(Reference):

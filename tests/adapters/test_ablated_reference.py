@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, FETCHED
-from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D, BOX2D_V3, PYMUNK, AblatedReference
+from crosscheck2d.adapters.mechanisms.table import (
     END_OF_STEP,
     FLIGHT,
     IMPULSE,
@@ -25,13 +25,13 @@ from adapters.mechanisms.table import (
     mechanisms_of,
     with_mechanisms,
 )
-from adapters.play import play
-from adapters.reference import Reference
-from adapters.run import Run
-from reference_impl import exercise
-from scenarios.catalogue import scenario
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reference_impl import exercise
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario
 
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 ORDERS = {"pymunk": PYMUNK, "box2d": BOX2D, "box2d_v3": BOX2D_V3}
@@ -204,8 +204,8 @@ def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
 
 PLAIN = """
 import sys, numpy as np
-from adapters.mechanisms.ablated import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, AblatedReference
-from scenarios.families.placing import box, lay_out
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, AblatedReference
+from crosscheck2d.scenarios.families.placing import box, lay_out
 grid = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 2) * 1.0
 n = np.arange(9)
 velocity = np.where(n == 4, 0, 1)[:, None] * np.stack([np.sin(1.0 + n), np.cos(2.0 * n)], -1)

@@ -10,11 +10,16 @@ from math import atan, sqrt
 import numpy as np
 import pytest
 
-from adapters.conformance.conform import PROBES, conform
-from adapters.conformance.physics import restitution
-from adapters.conformance.probe import head_on, loaded, one_disk
-from adapters.engines import ENGINES
-from adapters.mechanisms.table import FRICTION, Mechanism, mechanisms_of, with_mechanisms
+from crosscheck2d.adapters.conformance.conform import PROBES, conform
+from crosscheck2d.adapters.conformance.physics import restitution
+from crosscheck2d.adapters.conformance.probe import head_on, loaded, one_disk
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.table import (
+    FRICTION,
+    Mechanism,
+    mechanisms_of,
+    with_mechanisms,
+)
 from tests.adapters.broken_engines import CAUGHT_BY, RaisesInStep, RefusesAll, Sound, row_of
 from tests.tolerances import DEPARTURES
 

@@ -12,20 +12,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.advance import thrust_steps
-from adapters.conformance.probe import first_difference, history, loaded, one_disk, plain
-from adapters.engine import NOT_REPORTED, Unsupported
-from adapters.engines import ENGINES
-from adapters.mechanisms import ablated_reference
-from adapters.play import play
-from adapters.reference import METHODS, Reference
-from adapters.run import STATUSES
-from reference_impl import exercise
-from reference_impl.blocks import ADVANCE
-from reports.run.cells import Cell
-from reports.run.playing import play_cell
-from scenarios.catalogue import scenario as from_catalogue
-from scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.adapters.advance import thrust_steps
+from crosscheck2d.adapters.conformance.probe import (
+    first_difference,
+    history,
+    loaded,
+    one_disk,
+    plain,
+)
+from crosscheck2d.adapters.engine import NOT_REPORTED, Unsupported
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms import ablated_reference
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.reference import METHODS, Reference
+from crosscheck2d.adapters.run import STATUSES
+from crosscheck2d.reference_impl import exercise
+from crosscheck2d.reference_impl.blocks import ADVANCE
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.playing import play_cell
+from crosscheck2d.scenarios.catalogue import scenario as from_catalogue
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from tests.adapters.broken_engines import NanAtStep7, RaisesInStep
 
 FLOAT32_ENGINES = [name for name, row in ENGINES.items() if row.rounding > 2.0**-53]
@@ -241,7 +247,7 @@ def test_a_value_beyond_float32_in_the_units_of_matched_box2d_is_refused(change)
 )
 def test_a_missing_library_is_a_refusal_with_its_name(name, library, monkeypatch):
     """A cell of that engine says so; nothing else fails."""
-    adapter = f"adapters.{name.split(':')[0]}"
+    adapter = f"crosscheck2d.adapters.{name.split(':')[0]}"
     monkeypatch.delitem(sys.modules, adapter, raising=False)
     monkeypatch.setitem(sys.modules, library, None)
     run = play_cell(Cell("free_fall", 1, name, 1), ENGINES[name], from_catalogue("free_fall"))
@@ -338,7 +344,7 @@ def test_a_hand_written_solver_says_its_integrator_and_is_entered_with_two_array
 
 def test_matched_pymunk_resolves_slop_and_iterations_as_asked():
     """A share of the smallest radius, and a number."""
-    from adapters.pymunk import MATCHED
+    from crosscheck2d.adapters.pymunk import MATCHED
 
     with loaded(ENGINES["pymunk:matched"], plain()) as engine:
         slop = 0.25 * MATCHED["slop"]

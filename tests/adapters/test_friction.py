@@ -8,11 +8,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, told_apart
-from adapters.mechanisms.table import FRICTION, Mechanism, mechanisms_of, with_mechanisms
-from adapters.play import play
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario, Scene
+from crosscheck2d.adapters.engines import ENGINES, told_apart
+from crosscheck2d.adapters.mechanisms.table import (
+    FRICTION,
+    Mechanism,
+    mechanisms_of,
+    with_mechanisms,
+)
+from crosscheck2d.adapters.play import play
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario, Scene
 from tests.reports.terminal.command_line import crosscheck
 
 FLOAT32 = 2.0**-24

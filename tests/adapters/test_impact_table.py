@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adapters.conformance import impact_table
-from adapters.conformance.impact_table import (
+from crosscheck2d.adapters.conformance import impact_table
+from crosscheck2d.adapters.conformance.impact_table import (
     COLUMNS,
     COUNT,
     PHASES,
@@ -24,10 +24,10 @@ from adapters.conformance.impact_table import (
     pairs,
     rows_of_table,
 )
-from adapters.conformance.probe import DT
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED, changed, row_of
-from adapters.npm_packages import missing
+from crosscheck2d.adapters.conformance.probe import DT
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, changed, row_of
+from crosscheck2d.adapters.npm_packages import missing
 
 ROWS = ENGINES | FETCHED
 TABLE = kept().set_index(["engine", "dt"])
@@ -66,7 +66,7 @@ def drifted(name: str, row: EngineRow) -> list[str]:
 
 @pytest.mark.parametrize("name", EACH)
 def test_an_engine_reads_what_is_kept_of_it(name):
-    """With the same versions; else `python -m adapters.conformance.impact_table` writes it anew."""
+    """With the same versions; else `python -m crosscheck2d.adapters.conformance.impact_table` writes it anew."""
     assert drifted(name, ROWS[name]) == []
 
 

@@ -19,25 +19,32 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from adapters import npm_packages as packages
-from adapters.advance import advance
-from adapters.conformance.conform import ask, conform
-from adapters.conformance.probe import history, loaded, plain, scene_of
-from adapters.engine import Unsupported
-from adapters.engines import ENGINES, FETCHED, UNASKED
-from adapters.javascript.engine import IDLE, JavaScriptEngine
-from adapters.mechanisms import table as mechanisms
-from adapters.mechanisms.table import mechanisms_of, with_mechanisms
-from adapters.npm_packages import NotInstalled, fetch, integrity, missing, pinned, text_of
-from adapters.own_solver import gl_matrix
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
-from adapters.play import play_once
-from reports.run import arguments
-from reports.speed.budget import RESIDUAL, TOTAL, budget_of
-from reports.speed.plan import middle
-from reports.tune import score
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters import npm_packages as packages
+from crosscheck2d.adapters.advance import advance
+from crosscheck2d.adapters.conformance.conform import ask, conform
+from crosscheck2d.adapters.conformance.probe import history, loaded, plain, scene_of
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, UNASKED
+from crosscheck2d.adapters.javascript.engine import IDLE, JavaScriptEngine
+from crosscheck2d.adapters.mechanisms import table as mechanisms
+from crosscheck2d.adapters.mechanisms.table import mechanisms_of, with_mechanisms
+from crosscheck2d.adapters.npm_packages import (
+    NotInstalled,
+    fetch,
+    integrity,
+    missing,
+    pinned,
+    text_of,
+)
+from crosscheck2d.adapters.own_solver import gl_matrix
+from crosscheck2d.adapters.own_solver.file import read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.run import arguments
+from crosscheck2d.reports.speed.budget import RESIDUAL, TOTAL, budget_of
+from crosscheck2d.reports.speed.plan import middle
+from crosscheck2d.reports.tune import score
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import HERE as SOLVERS
 from tests.tolerances import share_that_sticks
@@ -289,7 +296,7 @@ def test_a_refusal_comes_at_its_own_sample_though_it_was_played_ahead():
 @fetched
 def test_an_engine_that_never_comes_back_is_a_time_out(monkeypatch):
     """The status of the run, and its process is not used again."""
-    monkeypatch.setattr("adapters.javascript.engine.STEP_LIMIT", 0.05)
+    monkeypatch.setattr("crosscheck2d.adapters.javascript.engine.STEP_LIMIT", 0.05)
     IDLE.clear()
     one = scenario("head_on_equal_e09")
     run = play_once(

@@ -13,16 +13,16 @@ import numpy as np
 import psutil
 import pytest
 
-from adapters.conformance.conform import ask, conform
-from adapters.engine_row import EngineRow
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_engine.features import FEATURES
-from adapters.own_solver.file import NotASolver
-from adapters.own_solver.process import SolverProcess
-from adapters.play import play, play_once
-from adapters.run import Run
-from reports.compare.comparison import compare
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.conformance.conform import ask, conform
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.own_engine.engine import TEMPLATES, row_of_file
+from crosscheck2d.adapters.own_engine.features import FEATURES
+from crosscheck2d.adapters.own_solver.file import NotASolver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.play import play, play_once
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.conformance.conform import ask, conform
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver.process import SolverProcess
-from adapters.own_solver.restitution import own_restitution
-from adapters.play import play
-from scenarios.catalogue import scenario
-from scenarios.families.exercise import asteroid_field
+from crosscheck2d.adapters.conformance.conform import ask, conform
+from crosscheck2d.adapters.own_engine.engine import row_of_file
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.own_solver.restitution import own_restitution
+from crosscheck2d.adapters.play import play
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.exercise import asteroid_field
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
-from adapters.engines import ENGINES
-from adapters.first_collisions import first_collisions
-from adapters.play import play, play_once
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engine import ContactImpulse, Engine, NotStarted, Unsupported
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.first_collisions import first_collisions
+from crosscheck2d.adapters.play import play, play_once
+from crosscheck2d.scenarios.catalogue import scenario
 
 NAME, SCENE = "reference:exercise", scenario("slow_collision")
 DT = SCENE.dt(SCENE.substeps[0])

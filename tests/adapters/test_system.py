@@ -15,9 +15,9 @@ from types import ModuleType, SimpleNamespace
 import psutil
 import pytest
 
-from adapters import system
-from adapters.own_solver.file import SolverFailed, read_solver
-from adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.own_solver.file import SolverFailed, read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
 PORTABLE = os.environ | {"CROSSCHECK_SYSTEM": "portable"}
@@ -44,7 +44,7 @@ for package in ("adapters", "reference_impl", "reports", "scenarios"):
     for path in sorted(pathlib.Path(package).rglob("*.py")):
         if "out" not in path.parts and path.name not in ("__main__.py",):
             importlib.import_module(".".join(path.with_suffix("").parts).removesuffix(".__init__"))
-from adapters import system
+from crosscheck2d.adapters import system
 assert not system.KERNEL and not system.ALARMS
 try:
     import fcntl
@@ -58,7 +58,7 @@ print("all imported")
 MARKED = """
 import psutil
 psutil.Process.kill = lambda self: os.kill(self.pid, 9)
-from reports.__main__ import main
+from crosscheck2d.reports.__main__ import main
 sys.argv = ["crosscheck", "check", "CLASS", "--format", "csv", "--out", "CLASS.csv"]
 main()
 """

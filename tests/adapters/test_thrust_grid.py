@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.thrust_grid import off_grid, off_grid_note
-from scenarios.files.scene_file import scene_text
-from scenarios.model import Scenario, Scene, Thrust
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.thrust_grid import off_grid, off_grid_note
+from crosscheck2d.scenarios.files.scene_file import scene_text
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.reports.terminal.command_line import crosscheck
 
 EXACT = ("reference:ordered", "event_driven:float64")  # they are right to rounding but for this

@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.advance import onto_torus
-from adapters.engines import FETCHED, UNASKED, row_of
-from adapters.mechanisms.ablated import AblatedReference
-from adapters.mechanisms.table import EDGES, mechanisms_of, with_mechanisms
-from adapters.npm_packages import missing
-from adapters.play import play
-from adapters.run import Run
-from reports.compare.laws import deviation
-from reports.compare.metrics import METRICS
-from scenarios.model import Scenario, Scene
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.advance import onto_torus
+from crosscheck2d.adapters.engines import FETCHED, UNASKED, row_of
+from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
+from crosscheck2d.adapters.mechanisms.table import EDGES, mechanisms_of, with_mechanisms
+from crosscheck2d.adapters.npm_packages import missing
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.laws import deviation
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.reports.compare.answers import beside_truth
 
 SPEED, SIDE, END, SAMPLE = 3.1, 4.0, 5.0, 0.02

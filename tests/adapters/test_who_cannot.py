@@ -12,8 +12,8 @@ import pyb2d3
 import pymunk
 import pytest
 
-from adapters.library_versions import version
-from adapters.npm_packages import missing, pinned, place
+from crosscheck2d.adapters.library_versions import version
+from crosscheck2d.adapters.npm_packages import missing, pinned, place
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "adapters" / "README.md").read_text(encoding="utf-8")

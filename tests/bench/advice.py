@@ -14,16 +14,16 @@ import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from math import log
 
-from adapters.engines import ENGINES
-from reports.speed.advice import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.speed.advice import (
     LOUD,
     Inquiry,
     NoAdvice,
     those_that_keep,
 )
-from reports.speed.plan import PLAIN
-from reports.terminal.progress import Progress
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.reports.speed.plan import PLAIN
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 
 BOUND, PURPOSE, SEED = 0.01, "trajectory", 0
 

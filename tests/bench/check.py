@@ -13,7 +13,7 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from time import monotonic
 
-from reports.check.verdict import check_file
+from crosscheck2d.reports.check.verdict import check_file
 from tests.reports.check.confusion import judged
 from tests.solvers.mutants import CORRECT, MUTANTS
 

@@ -16,9 +16,9 @@ from time import perf_counter
 
 import numpy as np
 
-from adapters.event_driven.events import EventEngine
-from scenarios.families.placing import box
-from scenarios.model import Scene
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.model import Scene
 from tests.adapters.event_driven.gases import gas
 
 REPEATS = 5
@@ -120,7 +120,7 @@ def memory() -> float:
     """MB at most, of a process that plays 100 000 disks, Python and numba included."""
     return alone(
         "from tests.bench.events import peak; from tests.adapters.event_driven.gases import gas; "
-        "from adapters.event_driven.events import EventEngine; "
+        "from crosscheck2d.adapters.event_driven.events import EventEngine; "
         "engine = EventEngine(*gas(100_000, 0.3)); engine.advance(1.0); print(peak())"
     )
 
@@ -135,7 +135,7 @@ def compile_time() -> float:
     with tempfile.TemporaryDirectory() as empty:
         return alone(
             "from tests.adapters.event_driven.gases import gas; from time import process_time;from"
-            " adapters.event_driven.events import EventEngine; start = process_time();engine ="
+            " crosscheck2d.adapters.event_driven.events import EventEngine; start = process_time();engine ="
             " EventEngine(*gas(100, 0.3)); engine.advance(1.0);"
             " engine.motion_at(1.0);engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0);"
             " print(process_time() - start)",

@@ -31,7 +31,7 @@ ENGINES = (
 PLAYER = f"""
 import sys
 from time import thread_time
-from adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import ENGINES
 from tests.adapters.event_driven.gases import boxed_gas
 
 scene, dt, engines, counts = boxed_gas({DISKS}, 0.3), 1 / 240, {{}}, {{}}

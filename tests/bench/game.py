@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from playwright.sync_api import Browser
 
-from reports.commands.serve import application
-from reports.game.command import game_of
-from reports.game.flight import FRAME
+from crosscheck2d.reports.commands.serve import application
+from crosscheck2d.reports.game.command import game_of
+from crosscheck2d.reports.game.flight import FRAME
 from tests.reports.page.browsing import chromium, opened, served
 
 # What the page itself does, timed: a picture every animation frame, an answer for every question.

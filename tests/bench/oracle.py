@@ -17,12 +17,12 @@ from time import process_time
 
 import numpy as np
 
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario
-from scenarios.truth.exact import accuracy_of, computed, difference
-from scenarios.truth.oracle.events import trace
-from scenarios.truth.oracle.numbers import digits
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.exact import accuracy_of, computed, difference
+from crosscheck2d.scenarios.truth.oracle.events import trace
+from crosscheck2d.scenarios.truth.oracle.numbers import digits
+from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.scenarios.exercise_box import boxed, lasting
 
 FIGURES = Path(__file__).parents[2] / "tests" / "data" / "oracle_figures.csv"

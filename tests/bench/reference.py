@@ -29,13 +29,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from adapters.box2d import Box2DEngine
-from adapters.box2d_v3 import Box2DV3
-from adapters.pymunk import Pymunk
-from adapters.reference import Reference
-from reference_impl import exercise, neighbours, ordered
-from reports.run.machine import about, busy_cores
-from scenarios.model import Scene
+from crosscheck2d.adapters.box2d import Box2DEngine
+from crosscheck2d.adapters.box2d_v3 import Box2DV3
+from crosscheck2d.adapters.pymunk import Pymunk
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.reference_impl import exercise, neighbours, ordered
+from crosscheck2d.reports.run.machine import about, busy_cores
+from crosscheck2d.scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
 from tests.reference_impl.test_ordered import CASES, off
 

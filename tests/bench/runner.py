@@ -17,20 +17,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from reports.run.cells import Cell, scene_hash
-from reports.run.plan import Means, RunPlan, Task
-from reports.run.playing import play_here
-from reports.run.pool import run_all
-from reports.run.results import COMMAND, Results
-from reports.run.store import writing
-from reports.run.suite import Suite, carry_out
-from reports.run.tables import make_tables
-from reports.terminal.progress import Progress
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box
-from scenarios.files.scene_file import scene_text
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run.cells import Cell, scene_hash
+from crosscheck2d.reports.run.plan import Means, RunPlan, Task
+from crosscheck2d.reports.run.playing import play_here
+from crosscheck2d.reports.run.pool import run_all
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.run.suite import Suite, carry_out
+from crosscheck2d.reports.run.tables import make_tables
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.files.scene_file import scene_text
+from crosscheck2d.scenarios.model import Scenario
 from tests.adapters.event_driven.gases import gas
 
 ROUNDS = 3

@@ -11,9 +11,9 @@ import csv
 import numpy as np
 import pytest
 
-from scenarios.model import Scenario
-from scenarios.truth.exact import ACCURACY, computed
-from scenarios.truth.oracle.numbers import has_balls
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.exact import ACCURACY, computed
+from crosscheck2d.scenarios.truth.oracle.numbers import has_balls
 from tests.bench.oracle import FIGURES, FLOORS, questions, said
 from tests.scenarios.test_catalogue import smallest_gap
 

@@ -255,7 +255,11 @@ LINES: dict[str, tuple[str, tuple[int, ...], str]] = {
         (0,),
         "",
     ),
-    "a command by its module": ("cd /; $python -m reports truth slow_collision", (0,), "horizon"),
+    "a command by its module": (
+        "cd /; $python -m crosscheck2d.reports truth slow_collision",
+        (0,),
+        "horizon",
+    ),
 }
 STREAMS = [
     Input(

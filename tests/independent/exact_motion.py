@@ -20,7 +20,7 @@ from typing import NamedTuple
 import gmpy2
 from gmpy2 import mpc, mpfr
 
-from scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 
 BITS = 420
 TINY = mpfr(2) ** -380  # s: two times that are closer are the same; 420 bits hold 10 s to 2 ** -416

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array, Scene
+from crosscheck2d.scenarios.model import Array, Scene
 
 
 class Motion(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.families.placing import box, scatter
-from scenarios.model import Scene
+from crosscheck2d.scenarios.families.placing import box, scatter
+from crosscheck2d.scenarios.model import Scene
 
 # Sides a, b and hypotenuse c of right triangles in whole numbers: on a wall along (b, a) a disk of
 # radius c k rests exactly in float64, as its centre is at k (-a, b).

@@ -17,7 +17,7 @@ import numpy as np
 import pyb2d3
 import pymunk
 
-from scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.model import Scenario, Scene
 
 Samples = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Row = tuple[float, ...]  # x, y, vx, vy, angle, angular velocity of one disk

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 
 RESTITUTIONS = (1.0, 0.9, 0.5, 0.1)
 # m; no coordinate is 8 m or more but the walls', see `nudges` of the horizon

@@ -13,7 +13,7 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
-from scenarios.model import Array, Scene
+from crosscheck2d.scenarios.model import Array, Scene
 
 BITS = 400
 LEFT = mpfr(10) ** -30  # m/s, and m: slower and nearer is at rest

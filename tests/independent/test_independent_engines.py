@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from scenarios import catalogue
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.scenarios import catalogue
+from crosscheck2d.scenarios.model import Scenario
 from tests.independent.plain_engines import KNOWN, PLAIN, Samples
 
 pytestmark = pytest.mark.independent

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth
-from scenarios.truth.exact import computed
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.exact import computed
+from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.independent.exact_motion import Motion
 from tests.independent.random_scenes import RESTITUTIONS, SURROUNDINGS, random_scene
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenarios.model import Scenario, Scene, Trajectory
-from scenarios.truth.exact import computed
+from crosscheck2d.scenarios.model import Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.exact import computed
 from tests.independent.frictional_motion import Motion, collisions, sliding
 from tests.independent.frictional_scenes import flying, lying
 

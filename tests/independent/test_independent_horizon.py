@@ -23,9 +23,9 @@ import numpy as np
 import pytest
 from gmpy2 import mpc
 
-from scenarios import catalogue
-from scenarios.model import Scenario, Scene
-from scenarios.truth.exact import computed
+from crosscheck2d.scenarios import catalogue
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import computed
 from tests.independent.exact_motion import Motion, Vector
 from tests.independent.random_scenes import box, placed, scenario
 

@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare.comparison import compare
-from scenarios import catalogue
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.scenarios import catalogue
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 pytestmark = pytest.mark.independent
 

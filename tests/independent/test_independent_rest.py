@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.model import Scenario, Scene
-from scenarios.truth.exact import computed
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import computed
 from tests.independent.resting_motion import ball_on_slope, column, stepped
 
 pytestmark = pytest.mark.independent

@@ -11,9 +11,9 @@ import pytest
 
 SCENE = """
 import sys, numpy as np
-from reference_impl import exercise, lesson, neighbours, ordered
-from reference_impl.neighbour_list import FEW
-from reference_impl.state import World, make_disks
+from crosscheck2d.reference_impl import exercise, lesson, neighbours, ordered
+from crosscheck2d.reference_impl.neighbour_list import FEW
+from crosscheck2d.reference_impl.state import World, make_disks
 SOLVERS = ((exercise, 4, 600), (lesson, 4, 600), (ordered, 4, 600), (neighbours, 9, 200))
 for solver, side, steps in SOLVERS:
     grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)

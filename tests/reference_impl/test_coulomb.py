@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.engine import Unsupported
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.reference import Reference
-from reference_impl import coulomb, exercise, lesson, neighbours, ordered
-from scenarios.catalogue import scenario
-from scenarios.model import Scene
+from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.reference_impl import coulomb, exercise, lesson, neighbours, ordered
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scene
 
 ROUNDING = 2.0**-53
 FLOOR = [[[-8.0, 0.0], [8.0, 0.0]]]

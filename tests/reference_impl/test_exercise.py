@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from reference_impl import exercise, lesson
-from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
+from crosscheck2d.reference_impl import exercise, lesson
+from crosscheck2d.reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 
 ROUNDING = 2.0**-53  # what one operation in float64 may be off, relative
 VARIANTS = [exercise, lesson]

@@ -11,9 +11,9 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from reference_impl import exercise, neighbours
-from reference_impl.compiled import forget_stale
-from reference_impl.neighbour_list import (
+from crosscheck2d.reference_impl import exercise, neighbours
+from crosscheck2d.reference_impl.compiled import forget_stale
+from crosscheck2d.reference_impl.neighbour_list import (
     FEW,
     HALF_SKIN,
     LASTS,
@@ -24,7 +24,7 @@ from reference_impl.neighbour_list import (
     empty_list,
     holds,
 )
-from reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
+from crosscheck2d.reference_impl.state import BY_INVERSE_MASS, EQUAL, ONE_SIDED, World, make_disks
 from tests.adapters.event_driven.gases import boxed_gas
 
 forget_stale(Path(__file__).parent, Path(neighbours.__file__).parent)

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.event_driven.events import EventEngine
-from adapters.reference import Reference
-from reference_impl import neighbours, ordered
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box
-from scenarios.model import Scenario, Scene
-from scenarios.truth.exact import computed
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.adapters.reference import Reference
+from crosscheck2d.reference_impl import neighbours, ordered
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import computed
 from tests.adapters.event_driven.gases import boxed_asteroids
 
 ROUNDING = 2.0**-53

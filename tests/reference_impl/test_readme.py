@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import ENGINES
 
 FOLDER = Path(__file__).parents[2] / "reference_impl"
 README = (FOLDER / "README.md").read_text("utf-8")

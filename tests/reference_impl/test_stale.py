@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from reference_impl.compiled import forget_stale
+from crosscheck2d.reference_impl.compiled import forget_stale
 
 ROOT = Path(__file__).parents[2]
 OUTER = """
@@ -32,7 +32,7 @@ def number():
 """
 FORGET = """
 from pathlib import Path
-from reference_impl.compiled import forget_stale
+from crosscheck2d.reference_impl.compiled import forget_stale
 forget_stale(Path(__file__).parent)
 """
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
-from scenarios.families.placing import box, lay_out, scatter
-from scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
+from crosscheck2d.scenarios.model import Scenario, Scene
 
 COUNT = 20
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from scenarios.families.placing import box
-from scenarios.model import Array, Scenario, Scene, Thrust
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust
 
 Draw = np.random.Generator
 

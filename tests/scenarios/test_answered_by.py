@@ -9,9 +9,15 @@ from collections.abc import Callable
 
 import pytest
 
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.truth import exact as oracle
-from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN, NOTHING, answered_by, computed
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.truth import exact as oracle
+from crosscheck2d.scenarios.truth.exact import (
+    CLOSED_FORM,
+    EVENT_DRIVEN,
+    NOTHING,
+    answered_by,
+    computed,
+)
 
 MODELS = {name: answered_by(scenario(name)) for name in SCENARIOS}
 

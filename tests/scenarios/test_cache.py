@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario, Scene
-from scenarios.truth import cache as truth_cache
-from scenarios.truth import exact as oracle
-from scenarios.truth.exact import OracleTruth, TruthRecord
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth import cache as truth_cache
+from crosscheck2d.scenarios.truth import exact as oracle
+from crosscheck2d.scenarios.truth.exact import OracleTruth, TruthRecord
 
 
 @pytest.fixture

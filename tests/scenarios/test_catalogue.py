@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.catalogue import RANDOM, SCENARIOS, scenario
+from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 
 ANSWERED = [name for name in SCENARIOS if scenario(name).truth]
 # Among the hundreds of collisions of a random scene some fall on a step, with every seed.

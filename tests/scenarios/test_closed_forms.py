@@ -7,9 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scene
-from scenarios.truth.exact import OracleTruth
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.truth.exact import OracleTruth
 
 ANSWERED = [
     name

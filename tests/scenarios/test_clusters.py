@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenarios.families.placing import lay_out
-from scenarios.model import Thrust
-from scenarios.truth.exact import computed
-from scenarios.truth.oracle.clusters import collapse, complementary
-from scenarios.truth.oracle.numbers import digits, has_balls, mpfr
-from scenarios.truth.oracle.work import TimeLimit, WorkLimit
-from scenarios.truth.record import CERTIFIED, SEARCHED
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Thrust
+from crosscheck2d.scenarios.truth.exact import computed
+from crosscheck2d.scenarios.truth.oracle.clusters import collapse, complementary
+from crosscheck2d.scenarios.truth.oracle.numbers import digits, has_balls, mpfr
+from crosscheck2d.scenarios.truth.oracle.work import TimeLimit, WorkLimit
+from crosscheck2d.scenarios.truth.record import CERTIFIED, SEARCHED
 from tests.scenarios.random_scenes import random_scenario
 from tests.scenarios.test_oracle import asked, states
 

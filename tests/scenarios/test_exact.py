@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reports.run.comparing import record_of
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario, Thrust
-from scenarios.no_truth import NoTruth
-from scenarios.truth import exact as oracle
-from scenarios.truth import record as oracle_record
-from scenarios.truth.exact import computed, with_oracle
-from scenarios.truth.horizon import DIVERGED
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.reports.run.comparing import record_of
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Scenario, Thrust
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth import exact as oracle
+from crosscheck2d.scenarios.truth import record as oracle_record
+from crosscheck2d.scenarios.truth.exact import computed, with_oracle
+from crosscheck2d.scenarios.truth.horizon import DIVERGED
+from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.reports.compare.metamorphic import Change
 from tests.scenarios.exercise_box import boxed, lasting
 
@@ -159,10 +159,12 @@ def test_the_horizon_and_the_end_of_an_answer_are_the_same_in_other_units(units:
 def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
     """The control: diverged by a nanometre, whatever the radius."""
     change, one = UNITS["lengths x 1000"], with_oracle(lasting(boxed(1), 12.0))
-    monkeypatch.setattr("scenarios.truth.horizon.DIVERGED", 1e-9 / one.scene.radius.max())
+    monkeypatch.setattr(
+        "crosscheck2d.scenarios.truth.horizon.DIVERGED", 1e-9 / one.scene.radius.max()
+    )
     before = computed(one)
     monkeypatch.setattr(
-        "scenarios.truth.horizon.DIVERGED", 1e-12 / one.scene.radius.max()
+        "crosscheck2d.scenarios.truth.horizon.DIVERGED", 1e-12 / one.scene.radius.max()
     )  # of radii a thousand times as large
     after = computed(with_oracle(change.scenario(replace(one, truth=None))))
     assert after.float64_horizon < 0.99 * before.float64_horizon

@@ -10,17 +10,17 @@ from pathlib import Path as File
 import numpy as np
 import pytest
 
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Array, Scenario, Scene, Thrust
-from scenarios.truth import horizon as of_horizon
-from scenarios.truth.exact import computed
-from scenarios.truth.horizon import DIVERGED, EPS, TangentVectors, roundings
-from scenarios.truth.oracle.events import trace
-from scenarios.truth.oracle.numbers import digits
-from scenarios.truth.oracle.path import Path
-from scenarios.truth.order import float64_horizon
-from scenarios.truth.record import record_of
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust
+from crosscheck2d.scenarios.truth import horizon as of_horizon
+from crosscheck2d.scenarios.truth.exact import computed
+from crosscheck2d.scenarios.truth.horizon import DIVERGED, EPS, TangentVectors, roundings
+from crosscheck2d.scenarios.truth.oracle.events import trace
+from crosscheck2d.scenarios.truth.oracle.numbers import digits
+from crosscheck2d.scenarios.truth.oracle.path import Path
+from crosscheck2d.scenarios.truth.order import float64_horizon
+from crosscheck2d.scenarios.truth.record import record_of
 from tests.scenarios.exercise_box import boxed, lasting
 
 NEAR = 1e-7

@@ -8,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from scenarios.catalogue import scenario
-from scenarios.families.placing import lay_out
-from scenarios.model import Scene, Thrust
-from scenarios.truth.exact import computed
-from scenarios.truth.oracle.numbers import decimals, mpfr
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scene, Thrust
+from crosscheck2d.scenarios.truth.exact import computed
+from crosscheck2d.scenarios.truth.oracle.numbers import decimals, mpfr
 from tests.scenarios.test_oracle import asked, states
 
 ALONE = Scene(

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box, lay_out, scatter
-from scenarios.model import Scenario, Scene, Thrust
-from scenarios.truth.exact import ACCURACY, TruthRecord, computed
-from scenarios.truth.oracle import events as oracle_events
-from scenarios.truth.oracle.events import Path, trace
-from scenarios.truth.oracle.numbers import balls, decimals, has_balls, mpfr
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.truth.exact import ACCURACY, TruthRecord, computed
+from crosscheck2d.scenarios.truth.oracle import events as oracle_events
+from crosscheck2d.scenarios.truth.oracle.events import Path, trace
+from crosscheck2d.scenarios.truth.oracle.numbers import balls, decimals, has_balls, mpfr
 from tests.scenarios.test_catalogue import smallest_gap
 from tests.scenarios.test_closed_forms import FLYING, simulate
 
@@ -263,8 +263,8 @@ def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
 
 def test_used_up_digits_end_the_truth(monkeypatch: pytest.MonkeyPatch):
     """With too few bits for the scene the truth ends early, and says so."""
-    monkeypatch.setattr("scenarios.truth.exact.FEWEST_BITS", 56)
-    monkeypatch.setattr("scenarios.truth.exact.MOST_BITS", 100)
+    monkeypatch.setattr("crosscheck2d.scenarios.truth.exact.FEWEST_BITS", 56)
+    monkeypatch.setattr("crosscheck2d.scenarios.truth.exact.MOST_BITS", 100)
     one = scenario("falling_box")
     record = computed(one)
 

@@ -9,15 +9,15 @@ import gmpy2
 import numpy as np
 import pytest
 
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario, Scene
-from scenarios.no_truth import NoTruth
-from scenarios.truth.exact import computed, with_oracle
-from scenarios.truth.oracle import contact_finder
-from scenarios.truth.oracle.numbers import mpfr
-from scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.exact import computed, with_oracle
+from crosscheck2d.scenarios.truth.oracle import contact_finder
+from crosscheck2d.scenarios.truth.oracle.numbers import mpfr
+from crosscheck2d.scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch
+from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.scenarios.test_oracle import asked, states
 
 ROW = lay_out(

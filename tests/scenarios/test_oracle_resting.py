@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario, Scene, Thrust
-from scenarios.truth.exact import ACCURACY, computed
-from scenarios.truth.oracle import contact_finder
-from scenarios.truth.oracle import resting as oracle_resting
-from scenarios.truth.oracle.contact_finder import collinear, points_in_line
-from scenarios.truth.oracle.events import trace
-from scenarios.truth.oracle.numbers import has_balls, mpfr
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.truth.exact import ACCURACY, computed
+from crosscheck2d.scenarios.truth.oracle import contact_finder
+from crosscheck2d.scenarios.truth.oracle import resting as oracle_resting
+from crosscheck2d.scenarios.truth.oracle.contact_finder import collinear, points_in_line
+from crosscheck2d.scenarios.truth.oracle.events import trace
+from crosscheck2d.scenarios.truth.oracle.numbers import has_balls, mpfr
+from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.scenarios.exercise_box import boxed, lasting
 from tests.scenarios.test_catalogue import smallest_gap
 from tests.scenarios.test_oracle import asked, sampled, states

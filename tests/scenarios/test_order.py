@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene
-from scenarios.truth.exact import computed
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import computed
+from crosscheck2d.scenarios.truth.record import TruthRecord
 
 MEET = 1 - 0.25 / np.cos(np.pi / 6)  # s, when three disks of radius 0.25 m meet at the origin
 UNDECIDED = "rounding decides the order of the collisions of disk"

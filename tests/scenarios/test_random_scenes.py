@@ -9,13 +9,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from adapters.event_driven.engine import EventDriven
-from adapters.play import play
-from adapters.run import Run
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario, Scene
-from scenarios.no_truth import NoTruth
-from scenarios.truth.exact import computed
+from crosscheck2d.adapters.event_driven.engine import EventDriven
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.exact import computed
 from tests.scenarios.random_scenes import LAYOUTS, random_scenario, random_scenarios, toward
 from tests.scenarios.time_limits import each_within
 

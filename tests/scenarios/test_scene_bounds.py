@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.files import tables
-from scenarios.files.scene_file import SceneFileError, read_scene_file
-from scenarios.files.tables import MOST_WALLS
+from crosscheck2d.scenarios.files import tables
+from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
+from crosscheck2d.scenarios.files.tables import MOST_WALLS
 
 HEAD = "name = 'many'\nduration = 1.0\nsample_interval = 0.1\nrestitution = 1.0\n"
 DISK = "[[disk]]\nposition = [0.0, {y}]\nradius = 0.1\nmass = 1.0\nvelocity = [0.0, 0.0]\n"

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from scenarios.files.scene_file import SceneFileError, read_scene_file, scene_text
-from scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file, scene_text
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from tests.scenarios.scene_faults import DISK, FAULTS, SCENES, THRUST, TWO
 
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reports.run.scenes import with_steps
-from scenarios.files.scene_file import SceneFileError, read_scene_file
+from crosscheck2d.reports.run.scenes import with_steps
+from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
 from tests.scenarios.scene_faults import TWO
 
 # Every number that a scene may hold.

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.event_driven.engine import EventDriven
-from adapters.play import play
-from scenarios.catalogue import FAMILIES, scenario
-from scenarios.families.placing import lay_out
-from scenarios.model import Scenario, Trajectory
-from scenarios.truth.closed_forms import Legs
-from scenarios.truth.exact import OracleTruth, computed
-from scenarios.truth.sliding import bounced, slide
+from crosscheck2d.adapters.event_driven.engine import EventDriven
+from crosscheck2d.adapters.play import play
+from crosscheck2d.scenarios.catalogue import FAMILIES, scenario
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import Legs
+from crosscheck2d.scenarios.truth.exact import OracleTruth, computed
+from crosscheck2d.scenarios.truth.sliding import bounced, slide
 
 NAMES = [name for name in FAMILIES["Friction"] if not isinstance(scenario(name).truth, OracleTruth)]
 FIELDS = ("position", "velocity", "angle", "angular_velocity")

@@ -12,21 +12,21 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from reports.commands import truth
-from reports.run.comparing import compute_record, record_of
-from reports.run.pool import run_all
-from scenarios.catalogue import scenario
-from scenarios.families.placing import box, lay_out
-from scenarios.model import Scenario
-from scenarios.no_truth import NoTruth
-from scenarios.truth import cache as truth_cache
-from scenarios.truth import exact as oracle
-from scenarios.truth.exact import computed, with_oracle
-from scenarios.truth.oracle import work as oracle_work
-from scenarios.truth.oracle.events import trace
-from scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
-from scenarios.truth.oracle.work import TimeLimit
-from scenarios.truth.record import TruthRecord
+from crosscheck2d.reports.commands import truth
+from crosscheck2d.reports.run.comparing import compute_record, record_of
+from crosscheck2d.reports.run.pool import run_all
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth import cache as truth_cache
+from crosscheck2d.scenarios.truth import exact as oracle
+from crosscheck2d.scenarios.truth.exact import computed, with_oracle
+from crosscheck2d.scenarios.truth.oracle import work as oracle_work
+from crosscheck2d.scenarios.truth.oracle.events import trace
+from crosscheck2d.scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
+from crosscheck2d.scenarios.truth.oracle.work import TimeLimit
+from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.reports.terminal.command_line import crosscheck
 
 REASON, CUT = "the limit of 5 s was reached", 20.0

@@ -13,4 +13,4 @@ uv venv --quiet --python 3.11 "$home/venv"
 # uv.toml names what the build of box2d-py needs
 uv pip install --quiet --config-file uv.toml --python "$home/venv" "$(echo crosscheck2d-*.whl)[js]"
 # gl-matrix, which students' files may call: held to its version and SHA-512
-CROSSCHECK_CACHE="$home/cache" "$home/venv/bin/python" -c "from adapters.npm_packages import fetch; fetch()"
+CROSSCHECK_CACHE="$home/cache" "$home/venv/bin/python" -c "from crosscheck2d.adapters.npm_packages import fetch; fetch()"

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reports.lessons.friction.thrown import FALL, ROUGH, Taken, taken, thrown
-from reports.lessons.lesson import (
+from crosscheck2d.reports.lessons.friction.thrown import FALL, ROUGH, Taken, taken, thrown
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -18,9 +18,9 @@ from reports.lessons.lesson import (
     Slider,
     tidy,
 )
-from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scene
-from scenarios.truth.sliding import friction_kick
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Array, Scene
+from crosscheck2d.scenarios.truth.sliding import friction_kick
 
 CONE = "friction cone"
 BOX2D, BOX2D_V3 = "box2d:shipped", "box2d_v3:shipped"

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
-from reports.lessons.lesson import (
+from crosscheck2d.reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -17,9 +17,9 @@ from reports.lessons.lesson import (
     swept,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import ABLATED, distances, lies_on
-from reports.page.style import TRUTH, number
-from scenarios.model import Array, Scene, Trajectory
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED, distances, lies_on
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Array, Scene, Trajectory
 
 BOX2D_V3 = "box2d_v3:shipped"
 LIMITS = {"µ × whole impulse": True, "µ × impulse before restitution": False}

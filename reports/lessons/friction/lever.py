@@ -7,8 +7,8 @@ from math import ceil
 
 import numpy as np
 
-from reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
-from reports.lessons.lesson import (
+from crosscheck2d.reports.lessons.friction.thrown import FALL, ROUGH, ablated_beside, taken, thrown
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -18,9 +18,9 @@ from reports.lessons.lesson import (
     swept,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, distances, lies_on
-from reports.page.style import TRUTH, number
-from scenarios.model import Scene
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, distances, lies_on
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Scene
 
 BOX2D = "box2d:shipped"
 WHERE = {"the surface of the disk": 0.0, "the middle": 0.5, "the surface of the skin": 1.0}

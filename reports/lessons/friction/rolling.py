@@ -7,16 +7,25 @@ from functools import cache
 
 import numpy as np
 
-from adapters.mechanisms.ablated import MIXING
-from adapters.mechanisms.table import IMPULSE, Mechanism
-from reports.lessons.friction.thrown import ROUGH
-from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider, run_of, tidy, time_step
-from reports.lessons.mechanisms.ablation import ablated_as
-from reports.page.style import TRUTH, number
-from scenarios.families.friction import G, slide_on_floor
-from scenarios.model import Array, Scenario, Trajectory
-from scenarios.truth.closed_forms import Legs
-from scenarios.truth.sliding import slide
+from crosscheck2d.adapters.mechanisms.ablated import MIXING
+from crosscheck2d.adapters.mechanisms.table import IMPULSE, Mechanism
+from crosscheck2d.reports.lessons.friction.thrown import ROUGH
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    Shown,
+    Simulation,
+    Slider,
+    run_of,
+    tidy,
+    time_step,
+)
+from crosscheck2d.reports.lessons.mechanisms.ablation import ablated_as
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.friction import G, slide_on_floor
+from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import Legs
+from crosscheck2d.scenarios.truth.sliding import slide
 
 SHIPPED, MATCHED = "pymunk:shipped", "pymunk:matched"
 BOX2D, BOX2D_V3 = "box2d:shipped", "box2d_v3:shipped"

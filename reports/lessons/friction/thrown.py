@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from adapters.mechanisms.table import FRICTION, Mechanism
-from reports.lessons.lesson import Simulation
-from reports.lessons.mechanisms.ablation import ablated_as
-from scenarios.families.friction import bounce_on_floor
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.adapters.mechanisms.table import FRICTION, Mechanism
+from crosscheck2d.reports.lessons.lesson import Simulation
+from crosscheck2d.reports.lessons.mechanisms.ablation import ablated_as
+from crosscheck2d.scenarios.families.friction import bounce_on_floor
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 FALL = 5.0  # m/s towards the floor, of every disk that is thrown
 ROUGH = "reference:coulomb"

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from adapters.engines import changed
-from adapters.mechanisms.ablated import AblatedReference
-from adapters.mechanisms.table import Mechanism, mechanisms_of, with_mechanisms
-from adapters.run import Run
-from reports.lessons.lesson import Claim, LessonChart, Makes, run_of
-from reports.page.style import TRUTH, number
-from scenarios.model import Scenario, Scene
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import changed
+from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
+from crosscheck2d.adapters.mechanisms.table import Mechanism, mechanisms_of, with_mechanisms
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.lessons.lesson import Claim, LessonChart, Makes, run_of
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 ABLATED, PLAIN, NO_CCD = "reference:ablated", "reference:exercise", "box2d:matched+no_ccd"
 ROUNDING = 1e-13  # of float64, in any unit of these pages

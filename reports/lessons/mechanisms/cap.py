@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.mechanisms.ablated import BOX2D
-from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider, time_step
-from reports.lessons.mechanisms.ablation import (
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+    time_step,
+)
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     PLAIN,
@@ -16,8 +24,8 @@ from reports.lessons.mechanisms.ablation import (
     lies_on,
     setting_rows,
 )
-from reports.page.style import TRUTH, number
-from scenarios.families.placing import lay_out
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.placing import lay_out
 
 NAMES = ("box2d:shipped", PLAIN, ABLATED)
 SECONDS = 3.0  # that the tenth of a second of the page on the cap is replayed for

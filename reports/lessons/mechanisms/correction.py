@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from adapters.mechanisms.ablated import BOX2D
-from reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider
-from reports.lessons.mechanisms.ablation import (
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D
+from crosscheck2d.reports.lessons.lesson import Claim, Lesson, Shown, Simulation, Slider
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     NO_CCD,
@@ -19,8 +19,8 @@ from reports.lessons.mechanisms.ablation import (
     lies_on,
     unswept,
 )
-from reports.page.style import number
-from scenarios.families.placing import lay_out
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.scenarios.families.placing import lay_out
 
 NAMES = (NO_CCD, PLAIN, ABLATED)
 

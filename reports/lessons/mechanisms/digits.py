@@ -6,10 +6,25 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
-from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, asked, distances, lies_on
-from reports.page.style import TRUTH, number
-from scenarios.families.placing import lay_out
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+)
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
+    ABLATED,
+    PLAIN,
+    ablated,
+    asked,
+    distances,
+    lies_on,
+)
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.placing import lay_out
 
 NAMES = ("box2d:shipped", PLAIN, ABLATED)
 PRECISION = {53: np.float64, 24: np.float32}

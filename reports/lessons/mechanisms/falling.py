@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from reports.lessons.lesson import Claim, Makes, Shown, Simulation
-from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, distances
-from scenarios.families.lesson import free_fall
-from scenarios.model import Array
+from crosscheck2d.reports.lessons.lesson import Claim, Makes, Shown, Simulation
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED, PLAIN, distances
+from crosscheck2d.scenarios.families.lesson import free_fall
+from crosscheck2d.scenarios.model import Array
 
 ROUNDING_MM = 1e-9  # of some 400 float64 additions of metres, in mm
 

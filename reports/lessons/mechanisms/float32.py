@@ -7,8 +7,16 @@ from functools import cache
 
 import numpy as np
 
-from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
-from reports.lessons.mechanisms.planck import (
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+)
+from crosscheck2d.reports.lessons.mechanisms.planck import (
     BOX2D,
     COMMAND,
     KEPT,
@@ -21,9 +29,9 @@ from reports.lessons.mechanisms.planck import (
     played,
     whole,
 )
-from reports.lessons.mechanisms.recorded import made_with, table_in
-from reports.page.style import TRUTH, number
-from scenarios.model import Array
+from crosscheck2d.reports.lessons.mechanisms.recorded import made_with, table_in
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Array
 
 BETWEEN = "between the two"
 ALIKE = 0.02  # of an error: where float32 changes none of a scene by more, one sentence says so

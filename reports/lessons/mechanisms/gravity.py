@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK
-from reports.lessons.lesson import (
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D, EXERCISE, PYMUNK
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -17,7 +17,7 @@ from reports.lessons.lesson import (
     Slider,
     time_step,
 )
-from reports.lessons.mechanisms.ablation import (
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     NO_CCD,
@@ -27,9 +27,9 @@ from reports.lessons.mechanisms.ablation import (
     lies_on,
     unswept,
 )
-from reports.page.style import TRUTH, number
-from scenarios.families.walls import bouncing_ball_e1
-from scenarios.model import Array, Scene
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.walls import bouncing_ball_e1
+from crosscheck2d.scenarios.model import Array, Scene
 
 NAMES = (NO_CCD, "box2d:matched", "pymunk:matched", PLAIN, ABLATED)
 ORDERS = {"as the exercise": EXERCISE, "aimed before gravity": PYMUNK, "aimed after gravity": BOX2D}

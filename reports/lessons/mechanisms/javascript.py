@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.lesson import Claim, Curve, Lesson, LessonChart, Shown, Simulation, Slider
-from reports.lessons.mechanisms.ablation import PLAIN
-from reports.lessons.mechanisms.javascript_bounces import (
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Curve,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+)
+from crosscheck2d.reports.lessons.mechanisms.ablation import PLAIN
+from crosscheck2d.reports.lessons.mechanisms.javascript_bounces import (
     COMMAND,
     ENGINES,
     KEPT,
@@ -15,9 +23,9 @@ from reports.lessons.mechanisms.javascript_bounces import (
     name_in,
     ratios,
 )
-from reports.lessons.mechanisms.pairs import CLOSING, SECONDS, at_all_speeds
-from reports.lessons.mechanisms.recorded import made_with
-from reports.page.style import TRUTH, number
+from crosscheck2d.reports.lessons.mechanisms.pairs import CLOSING, SECONDS, at_all_speeds
+from crosscheck2d.reports.lessons.mechanisms.recorded import made_with
+from crosscheck2d.reports.page.style import TRUTH, number
 
 KEPT_E = 1e-3  # by how much e may be off for a sentence to say that it is kept
 STUCK = 0.25  # of e: a collision that gives less is called cut, one that gives more is not

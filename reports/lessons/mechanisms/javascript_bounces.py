@@ -1,6 +1,6 @@
 """What the JavaScript engines make of pairs that meet head on, for lesson 6.11.
 
-`uv run --extra js python -m reports.lessons.mechanisms.javascript_bounces` plays them and writes
+`uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.javascript_bounces` plays them and writes
 javascript_bounces.csv, which the lesson shows: the engines are npm packages that need not be
 installed.
 """
@@ -14,15 +14,15 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import row_of
-from adapters.run import Run
-from reports.lessons.lesson import run_of
-from reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
-from reports.lessons.mechanisms.recorded import keep, table_in
-from scenarios.model import Array
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.lessons.lesson import run_of
+from crosscheck2d.reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
+from crosscheck2d.reports.lessons.mechanisms.recorded import keep, table_in
+from crosscheck2d.scenarios.model import Array
 
 KEPT = Path(__file__).with_name("javascript_bounces.csv")
-COMMAND = "uv run --extra js python -m reports.lessons.mechanisms.javascript_bounces"
+COMMAND = "uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.javascript_bounces"
 ENGINES = ("planck", "matter", "rapier2d")
 # what is disabled -> the profile, and the options that do it
 VERSIONS: Mapping[str, tuple[str, Mapping[str, Any]]] = {

@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from adapters.box2d import Box2DEngine
-from adapters.mechanisms.ablated import MIXING, AblatedReference
-from adapters.pymunk import Pymunk
-from reports.lessons.friction.thrown import ROUGH
-from reports.lessons.lesson import (
+from crosscheck2d.adapters.box2d import Box2DEngine
+from crosscheck2d.adapters.mechanisms.ablated import MIXING, AblatedReference
+from crosscheck2d.adapters.pymunk import Pymunk
+from crosscheck2d.reports.lessons.friction.thrown import ROUGH
+from crosscheck2d.reports.lessons.lesson import (
     Claim,
     Curve,
     Lesson,
@@ -25,10 +25,17 @@ from reports.lessons.lesson import (
     run_of,
     swept,
 )
-from reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, PLAIN, asked, distances, lies_on
-from reports.lessons.mechanisms.pairs import SECONDS, pairs, separation, sideways
-from reports.page.style import TRUTH, number
-from scenarios.model import Scenario, Scene
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
+    ABLATED,
+    FLOAT32,
+    PLAIN,
+    asked,
+    distances,
+    lies_on,
+)
+from crosscheck2d.reports.lessons.mechanisms.pairs import SECONDS, pairs, separation, sideways
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Scenario, Scene
 
 SHOWN = 0.5  # the number on the one disk, of the collision that is replayed
 STATED = np.linspace(0.0, 1.0, 11)

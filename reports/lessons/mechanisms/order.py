@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.mechanisms.ablated import EXERCISE, POSITION_FIRST
-from reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
-from reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, lies_on
-from reports.lessons.mechanisms.falling import ROUNDING_MM, falling
-from reports.page.style import TRUTH, number
-from scenarios.families.lesson import free_fall
-from scenarios.model import Array
+from crosscheck2d.adapters.mechanisms.ablated import EXERCISE, POSITION_FIRST
+from crosscheck2d.reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED, PLAIN, ablated, lies_on
+from crosscheck2d.reports.lessons.mechanisms.falling import ROUNDING_MM, falling
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.lesson import free_fall
+from crosscheck2d.scenarios.model import Array
 
 END = free_fall().duration  # s
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.lesson import Read
-from reports.lessons.mechanisms.ablation import asked
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.reports.lessons.lesson import Read
+from crosscheck2d.reports.lessons.mechanisms.ablation import asked
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 CLOSING = np.array(
     [0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85, 0.95, 1.05, 1.2, 1.5, 1.9, 2.1, 3.0, 5.0]

@@ -1,7 +1,7 @@
 """What float32 changes: Box2D 2.3 and planck, which is the same algorithm in float64, in the same
 scenes.
 
-`uv run --extra js python -m reports.lessons.mechanisms.planck` plays both and writes planck.csv,
+`uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.planck` plays both and writes planck.csv,
 which the lesson shows: planck is an npm package that need not be installed.
 """
 
@@ -12,16 +12,16 @@ from pathlib import Path
 
 import pandas as pd
 
-from adapters.run import Run
-from reports.compare.laws import deviation
-from reports.lessons.lesson import run_of
-from reports.lessons.mechanisms.recorded import keep
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scenario, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.laws import deviation
+from crosscheck2d.reports.lessons.lesson import run_of
+from crosscheck2d.reports.lessons.mechanisms.recorded import keep
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 
 KEPT = Path(__file__).with_name("planck.csv")
-COMMAND = "uv run --extra js python -m reports.lessons.mechanisms.planck"
+COMMAND = "uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.planck"
 PLANCK, BOX2D = "planck", "box2d"
 PROFILES = ("matched", "shipped")
 SCENES = ("free_fall", "oblique_e09", "head_on_unequal_e0", "head_on_equal_e09")  # of the lesson

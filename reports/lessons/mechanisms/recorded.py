@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from adapters.run import Run
-from reports.terminal.foreign_text import put_text
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.terminal.foreign_text import put_text
 
 
 def keep(path: Path, found: pd.DataFrame, runs: Iterable[Run]) -> None:

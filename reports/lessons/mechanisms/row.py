@@ -7,9 +7,17 @@ from functools import cache
 
 import numpy as np
 
-from adapters.mechanisms.ablated import BOX2D, EXERCISE
-from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider, run_of
-from reports.lessons.mechanisms.ablation import (
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D, EXERCISE
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+    run_of,
+)
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     PLAIN,
@@ -18,9 +26,9 @@ from reports.lessons.mechanisms.ablation import (
     distances,
     lies_on,
 )
-from reports.page.style import TRUTH, number
-from scenarios.families.placing import lay_out
-from scenarios.model import Array, Scenario
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Array, Scenario
 
 NAMES = ("box2d:matched", "pymunk:matched", PLAIN, ABLATED)
 ORDERS = {"pair by pair": EXERCISE, "together": BOX2D}

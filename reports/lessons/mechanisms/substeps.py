@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
-from reports.lessons.mechanisms.ablation import ABLATED, FLOAT32, PLAIN, ablated, lies_on
-from reports.lessons.mechanisms.falling import ROUNDING_MM, falling
-from reports.page.style import TRUTH, number
-from scenarios.model import Array
+from crosscheck2d.reports.lessons.lesson import Claim, Lesson, Shown, Slider, time_step
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
+    ABLATED,
+    FLOAT32,
+    PLAIN,
+    ablated,
+    lies_on,
+)
+from crosscheck2d.reports.lessons.mechanisms.falling import ROUNDING_MM, falling
+from crosscheck2d.reports.page.style import TRUTH, number
+from crosscheck2d.scenarios.model import Array
 
 
 def show_substeps(substeps: int, k: int) -> Shown:

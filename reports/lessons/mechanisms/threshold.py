@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from reports.lessons.lesson import Claim, Lesson, LessonChart, Shown, Simulation, Slider
-from reports.lessons.mechanisms.ablation import (
+from crosscheck2d.reports.lessons.lesson import (
+    Claim,
+    Lesson,
+    LessonChart,
+    Shown,
+    Simulation,
+    Slider,
+)
+from crosscheck2d.reports.lessons.mechanisms.ablation import (
     ABLATED,
     FLOAT32,
     PLAIN,
@@ -14,8 +21,8 @@ from reports.lessons.mechanisms.ablation import (
     lies_on,
     setting_rows,
 )
-from reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
-from reports.page.style import TRUTH, number
+from crosscheck2d.reports.lessons.mechanisms.pairs import CLOSING, at_all_speeds, separation
+from crosscheck2d.reports.page.style import TRUTH, number
 
 NAMES = ("box2d:shipped", PLAIN, ABLATED)
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array, Scene, Thrust
-from scenarios.truth.oracle.friction import Friction, limited
-from scenarios.truth.oracle.jets import count_pieces, push
-from scenarios.truth.oracle.numbers import Number, Numbers
-from scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
+from crosscheck2d.scenarios.model import Array, Scene, Thrust
+from crosscheck2d.scenarios.truth.oracle.friction import Friction, limited
+from crosscheck2d.scenarios.truth.oracle.jets import count_pieces, push
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers
+from crosscheck2d.scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
 
 STATIC, FALLING = 0, 1
 """Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on;

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenarios.model import Array
-from scenarios.truth.oracle.numbers import Number, Numbers
+from crosscheck2d.scenarios.model import Array
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers
 
 MOST_PIVOTS = 300
 # Orders of collisions at one instant with 0 < e < 1: states whose ratios agree within this are one

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from scenarios.truth.oracle.bodies import Bodies, rational
-from scenarios.truth.oracle.contacts import Pressed, crossing, falling_meeting, meeting
-from scenarios.truth.oracle.filter import soonest, touching
-from scenarios.truth.oracle.numbers import Number
-from scenarios.truth.oracle.ties import Contact, Touch, key
+from crosscheck2d.scenarios.truth.oracle.bodies import Bodies, rational
+from crosscheck2d.scenarios.truth.oracle.contacts import Pressed, crossing, falling_meeting, meeting
+from crosscheck2d.scenarios.truth.oracle.filter import soonest, touching
+from crosscheck2d.scenarios.truth.oracle.numbers import Number
+from crosscheck2d.scenarios.truth.oracle.ties import Contact, Touch, key
 
 # of two equal products: by how much float64 may make them differ, some roundings
 NOT_EXCLUDED = 1e-12

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from scenarios.truth.oracle.filter import first_fall
-from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
+from crosscheck2d.scenarios.truth.oracle.filter import first_fall
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
 EPS = 2.0**-52
 # halvings of a bracket before Newton's method: enough to separate a simple root from others

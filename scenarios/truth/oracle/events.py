@@ -13,13 +13,20 @@ from contextlib import suppress
 
 import numpy as np
 
-from scenarios.model import Scene, Thrust
-from scenarios.truth.oracle.bodies import Bodies
-from scenarios.truth.oracle.contact_finder import ContactFinder
-from scenarios.truth.oracle.contacts import Pressed
-from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
-from scenarios.truth.oracle.path import Event, MotionEnds, Path, RecentCollisions, Record, ambiguous
-from scenarios.truth.oracle.resting import (
+from crosscheck2d.scenarios.model import Scene, Thrust
+from crosscheck2d.scenarios.truth.oracle.bodies import Bodies
+from crosscheck2d.scenarios.truth.oracle.contact_finder import ContactFinder
+from crosscheck2d.scenarios.truth.oracle.contacts import Pressed
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers, Undecided
+from crosscheck2d.scenarios.truth.oracle.path import (
+    Event,
+    MotionEnds,
+    Path,
+    RecentCollisions,
+    Record,
+    ambiguous,
+)
+from crosscheck2d.scenarios.truth.oracle.resting import (
     NO_GAP,
     NO_MATTER,
     NoLimit,
@@ -35,7 +42,7 @@ from scenarios.truth.oracle.resting import (
     probe,
     settle,
 )
-from scenarios.truth.oracle.ties import (
+from crosscheck2d.scenarios.truth.oracle.ties import (
     ENDLESS,
     Collision,
     Contact,
@@ -44,7 +51,7 @@ from scenarios.truth.oracle.ties import (
     Velocities,
     key,
 )
-from scenarios.truth.oracle.work import WorkLimit
+from crosscheck2d.scenarios.truth.oracle.work import WorkLimit
 
 MOST_IDLE = 100  # contacts in a row without a collision: the digits no longer decide
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from scenarios.model import Array
+from crosscheck2d.scenarios.model import Array
 
 Codes = NDArray[np.int64]
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from scenarios.truth.oracle.numbers import Number, Numbers
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers
 
 
 class Friction(NamedTuple):

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.model import Scene
-from scenarios.truth.oracle.bodies import Leg
-from scenarios.truth.oracle.numbers import Number
-from scenarios.truth.oracle.ties import ENDLESS, TOO_MANY, Contact, TieOutcome, key
+from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.truth.oracle.bodies import Leg
+from crosscheck2d.scenarios.truth.oracle.numbers import Number
+from crosscheck2d.scenarios.truth.oracle.ties import ENDLESS, TOO_MANY, Contact, TieOutcome, key
 
 ACCUMULATED = 64  # collisions of one disk ...
 INSTANT = 1e-9  # ... within this many s accumulate; in a fast scene ...

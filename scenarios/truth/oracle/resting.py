@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenarios.model import Array, Scene, Thrust
-from scenarios.no_truth import NoTruth
-from scenarios.truth.oracle.bodies import (
+from crosscheck2d.scenarios.model import Array, Scene, Thrust
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.oracle.bodies import (
     FALLING,
     STATIC,
     Bodies,
@@ -27,12 +27,20 @@ from scenarios.truth.oracle.bodies import (
     rational,
     square_to,
 )
-from scenarios.truth.oracle.clusters import complementary, solve
-from scenarios.truth.oracle.contact_finder import ContactFinder, line_span
-from scenarios.truth.oracle.filter import moved
-from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
-from scenarios.truth.oracle.path import MotionEnds
-from scenarios.truth.oracle.ties import Contact, TieOutcome, Touch, Velocities, apply, delassus, key
+from crosscheck2d.scenarios.truth.oracle.clusters import complementary, solve
+from crosscheck2d.scenarios.truth.oracle.contact_finder import ContactFinder, line_span
+from crosscheck2d.scenarios.truth.oracle.filter import moved
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers, Undecided
+from crosscheck2d.scenarios.truth.oracle.path import MotionEnds
+from crosscheck2d.scenarios.truth.oracle.ties import (
+    Contact,
+    TieOutcome,
+    Touch,
+    Velocities,
+    apply,
+    delassus,
+    key,
+)
 
 SAFE = 1 + 1e-6  # factor on every length by which float64 decides that two disks cannot meet
 # A series that takes more bounces than this to lose all but `SMALL` of its speed is followed bounce

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenarios.truth.oracle.clusters import collapse, complementary, is_m_matrix
-from scenarios.truth.oracle.friction import Friction, limited
-from scenarios.truth.oracle.numbers import Number, Numbers, Undecided
+from crosscheck2d.scenarios.truth.oracle.clusters import collapse, complementary, is_m_matrix
+from crosscheck2d.scenarios.truth.oracle.friction import Friction, limited
+from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers, Undecided
 
 MOST_ORDERS = 3000  # collisions tried in all orders together
 LARGEST_COLLAPSE = 0.5  # restitution; a larger one needs more contacts than are tried

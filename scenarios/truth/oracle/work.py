@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import inf
 from time import monotonic
 
-from scenarios.truth.oracle.path import MotionEnds
+from crosscheck2d.scenarios.truth.oracle.path import MotionEnds
 
 # collisions, edges crossed, records made anew, orders of simultaneous collisions tried
 MOST_STEPS = 60_000

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.event_driven.events import EventEngine
-from reports.stability.predicates_gas import compressibility
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.reports.stability.predicates_gas import compressibility
 from tests.adapters.event_driven.gases import gas
 
 TABLE = Path(__file__).parents[3] / "tests" / "data" / "event_figures.csv"

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from adapters.event_driven.events import EventEngine
-from scenarios.model import Array, Scenario, Scene, Trajectory, frozen
-from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import Motion, answer, world_thrusts
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory, frozen
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.closed_forms import Motion, answer, world_thrusts
 
 ERROR_BOUND = 1e-9  # m
 # a perturbed run may stray so many times less than the bound, since the run itself is as far off

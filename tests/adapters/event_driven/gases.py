@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.event_driven.events import EventEngine
-from scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
-from scenarios.families.placing import box, scatter
-from scenarios.model import Scene
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.families.exercise import HIGH, LOW, SHIP, SHIP_MASS, SHIP_RADIUS
+from crosscheck2d.scenarios.families.placing import box, scatter
+from crosscheck2d.scenarios.model import Scene
 
 
 def gas(n: int, packing: float, seed: int = 0) -> tuple[Scene, np.ndarray]:

@@ -9,16 +9,16 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from adapters.event_driven import events
-from adapters.event_driven import loop as event_loop
-from adapters.event_driven.disks import GOES_ON, LEFT
-from adapters.event_driven.events import EventEngine
-from scenarios.families.placing import box
-from scenarios.families.rows import counting_pi
-from scenarios.model import Scenario, Scene
-from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import bouncing
-from scenarios.truth.exact import computed
+from crosscheck2d.adapters.event_driven import events
+from crosscheck2d.adapters.event_driven import loop as event_loop
+from crosscheck2d.adapters.event_driven.disks import GOES_ON, LEFT
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.families.placing import box
+from crosscheck2d.scenarios.families.rows import counting_pi
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.closed_forms import bouncing
+from crosscheck2d.scenarios.truth.exact import computed
 from tests.adapters.event_driven.gases import gas
 from tests.adapters.event_driven.test_brute_force import plain_kernels
 

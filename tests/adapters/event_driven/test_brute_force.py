@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.event_driven import events
-from adapters.event_driven.events import EventEngine
-from scenarios.families.placing import box, scatter
-from scenarios.model import Scene
-from scenarios.no_truth import NoTruth
+from crosscheck2d.adapters.event_driven import events
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.families.placing import box, scatter
+from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
 from tests.adapters.event_driven.gases import collisions_of
 
 # A second algorithm: all contacts as polynomials, all roots by numpy, nothing kept from one event

@@ -7,12 +7,12 @@ import re
 import numpy as np
 import pytest
 
-from adapters.event_driven import events
-from adapters.event_driven.events import EventEngine
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scenario, Scene, Thrust
-from scenarios.no_truth import NoTruth
-from scenarios.truth.exact import OracleTruth
+from crosscheck2d.adapters.event_driven import events
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.exact import OracleTruth
 from tests.adapters.event_driven.event_truth import float64_truth
 from tests.adapters.event_driven.gases import collisions_of, gas, state_after
 

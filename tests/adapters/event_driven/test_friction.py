@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.event_driven.engine import EventDriven
-from adapters.play import play
-from adapters.run import Run
-from scenarios.families.placing import box, lay_out, scatter
-from scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
-from scenarios.truth.exact import computed, digits
+from crosscheck2d.adapters.event_driven.engine import EventDriven
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.scenarios.families.placing import box, lay_out, scatter
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.truth.exact import computed, digits
 
 G = 10.0
 FLOOR = [[[-64.0, 0.0], [64.0, 0.0]]]

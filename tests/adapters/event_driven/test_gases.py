@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reports.stability.predicates_gas import compressibility
+from crosscheck2d.reports.stability.predicates_gas import compressibility
 from tests.adapters.event_driven.event_figures import PACKINGS, measured, read
 
 

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from adapters.event_driven import events
-from adapters.event_driven.events import EventEngine
-from scenarios.families.placing import box, scatter
-from scenarios.model import Scene
-from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import bouncing
+from crosscheck2d.adapters.event_driven import events
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.families.placing import box, scatter
+from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.closed_forms import bouncing
 from tests.adapters.event_driven.test_brute_force import plain_kernels
 
 G = 10.0

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.event_driven.events import EventEngine
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.event_driven.events import EventEngine
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.adapters.event_driven.event_truth import float64_truth
 from tests.adapters.event_driven.gases import collisions_of, gas, state_after
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from reports.check.rows import CheckRow
-from reports.check.verdict import FileCheck, check_file
+from crosscheck2d.reports.check.rows import CheckRow
+from crosscheck2d.reports.check.verdict import FileCheck, check_file
 from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 
 TABLE = Path(__file__).parents[3] / "tests" / "data" / "confusion.csv"

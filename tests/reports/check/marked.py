@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from reports.check.marks import Marked, id_of
-from reports.check.points import read_points
-from reports.check.verdict import FileCheck
+from crosscheck2d.reports.check.marks import Marked, id_of
+from crosscheck2d.reports.check.points import read_points
+from crosscheck2d.reports.check.verdict import FileCheck
 
 
 def marks_of(*checks: FileCheck) -> list[Marked]:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from reports.check.command import PAGE
-from reports.check.formats import JUNIT
-from reports.run.made import is_sealed, may_overwrite, sealed
-from reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.check.command import PAGE
+from crosscheck2d.reports.check.formats import JUNIT
+from crosscheck2d.reports.run.made import is_sealed, may_overwrite, sealed
+from crosscheck2d.reports.terminal.exits import FolderTaken
 
 # longer than where its mark is looked for
 TEXT = f"<html>{PAGE.decode()}{'<p>a row</p>' * 1000}\udcff</html>\n"

@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.own_solver import gl_matrix
-from adapters.own_solver.file import SolverFailed, read_solver
-from adapters.own_solver.process import SolverProcess
-from reports.check.functions import is_read
-from reports.check.loop import left_out, loop_rows
-from reports.check.questions import QUESTIONS, Ball, SolverAnswer, ask
-from reports.check.rows import TASKS
-from reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
-from reports.check.solver import check_solver
-from reports.check.verdict import FileCheck, check_file
+from crosscheck2d.adapters.own_solver import gl_matrix
+from crosscheck2d.adapters.own_solver.file import SolverFailed, read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check.functions import is_read
+from crosscheck2d.reports.check.loop import left_out, loop_rows
+from crosscheck2d.reports.check.questions import QUESTIONS, Ball, SolverAnswer, ask
+from crosscheck2d.reports.check.rows import TASKS
+from crosscheck2d.reports.check.scenes import bounds, contact_faults, scene_of, scenes, truth_of
+from crosscheck2d.reports.check.solver import check_solver
+from crosscheck2d.reports.check.verdict import FileCheck, check_file
 from tests.reports.check.confusion import TABLE, judged, said_first, said_too
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT, HERE, MUTANTS

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from reports.check import command
-from reports.check.rows import TASKS
-from reports.check.terminal import code_only, same_code
-from reports.check.verdict import Tally, check_file, named
+from crosscheck2d.reports.check import command
+from crosscheck2d.reports.check.rows import TASKS
+from crosscheck2d.reports.check.terminal import code_only, same_code
+from crosscheck2d.reports.check.verdict import Tally, check_file, named
 from tests.reports.terminal.command_line import crosscheck, on_terminal
 from tests.solvers.mutants import CORRECT, MUTANTS
 

@@ -11,14 +11,20 @@ from time import perf_counter
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.own_solver.file import SolverText
-from reports.check.class_page import NOTHING, bars, causes, distribution, write_class_page
-from reports.check.formats import csv_text
-from reports.check.marks import Marked
-from reports.check.page import write_page as write_file_page
-from reports.check.terminal import print_tasks
-from reports.check.verdict import Tally
-from reports.terminal.console import Console
+from crosscheck2d.adapters.own_solver.file import SolverText
+from crosscheck2d.reports.check.class_page import (
+    NOTHING,
+    bars,
+    causes,
+    distribution,
+    write_class_page,
+)
+from crosscheck2d.reports.check.formats import csv_text
+from crosscheck2d.reports.check.marks import Marked
+from crosscheck2d.reports.check.page import write_page as write_file_page
+from crosscheck2d.reports.check.terminal import print_tasks
+from crosscheck2d.reports.check.verdict import Tally
+from crosscheck2d.reports.terminal.console import Console
 from tests.reports.check.test_marks import HOSTILE, marked, row, students
 from tests.reports.page.browsing import opened, overhang
 

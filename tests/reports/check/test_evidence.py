@@ -11,16 +11,16 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
-from reports.check.accesses import Access, accesses_of, part_of
-from reports.check.consequences import with_consequences
-from reports.check.formats import SCHEMA, as_json
-from reports.check.lines import Source
-from reports.check.loop import LEAVES_PAIRS_OUT
-from reports.check.questions import QUESTIONS, ask, ask_in_two_orders
-from reports.check.rows import UNKNOWN, CheckRow
-from reports.check.verdict import FileCheck, check_file
+from crosscheck2d.adapters.own_solver.file import read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check.accesses import Access, accesses_of, part_of
+from crosscheck2d.reports.check.consequences import with_consequences
+from crosscheck2d.reports.check.formats import SCHEMA, as_json
+from crosscheck2d.reports.check.lines import Source
+from crosscheck2d.reports.check.loop import LEAVES_PAIRS_OUT
+from crosscheck2d.reports.check.questions import QUESTIONS, ask, ask_in_two_orders
+from crosscheck2d.reports.check.rows import UNKNOWN, CheckRow
+from crosscheck2d.reports.check.verdict import FileCheck, check_file
 from tests.reports.check.confusion import judged
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT, HERE, MUTANTS

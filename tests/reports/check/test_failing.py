@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from adapters.own_solver.file import SolverFailed
-from reports.check.accesses import Access, part_of
-from reports.check.failing import FAR, doubtful
-from reports.check.page import write_page
-from reports.check.questions import QUESTIONS, SolverAnswer
-from reports.check.verdict import FileCheck, check_file
+from crosscheck2d.adapters.own_solver.file import SolverFailed
+from crosscheck2d.reports.check.accesses import Access, part_of
+from crosscheck2d.reports.check.failing import FAR, doubtful
+from crosscheck2d.reports.check.page import write_page
+from crosscheck2d.reports.check.questions import QUESTIONS, SolverAnswer
+from crosscheck2d.reports.check.verdict import FileCheck, check_file
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT
 

@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from adapters.own_solver import process as solver_process
-from adapters.own_solver.file import LONGEST, NotASolver, SolverFailed, read_solver
-from adapters.own_solver.process import SolverProcess
-from adapters.system import Pieces
-from reports.check.formats import as_junit
-from reports.check.verdict import FileCheck
+from crosscheck2d.adapters.own_solver import process as solver_process
+from crosscheck2d.adapters.own_solver.file import LONGEST, NotASolver, SolverFailed, read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.adapters.system import Pieces
+from crosscheck2d.reports.check.formats import as_junit
+from crosscheck2d.reports.check.verdict import FileCheck
 from tests.reports.check.marked import marks_of
 from tests.reports.terminal.command_line import crosscheck
 

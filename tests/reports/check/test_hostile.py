@@ -10,10 +10,10 @@ from time import monotonic
 
 import pytest
 
-from adapters.own_solver.file import NotASolver
-from reports.check.rows import CheckRow
-from reports.check.solver import check_solver
-from reports.check.verdict import FileCheck
+from crosscheck2d.adapters.own_solver.file import NotASolver
+from crosscheck2d.reports.check.rows import CheckRow
+from crosscheck2d.reports.check.solver import check_solver
+from crosscheck2d.reports.check.verdict import FileCheck
 
 LONG = pytest.mark.long  # waits for what hangs, twice for each function
 Results = dict[str, list[CheckRow]]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from reports.check import command
-from reports.check.command import checked, named_for
-from reports.check.verdict import check_file
+from crosscheck2d.reports.check import command
+from crosscheck2d.reports.check.command import checked, named_for
+from crosscheck2d.reports.check.verdict import check_file
 from tests.bench.class_of_students import LARGEST, STUDENTS
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.class_folder import MISSING, write_class

@@ -15,14 +15,21 @@ from xml.etree import ElementTree
 import jsonschema
 import pytest
 
-from reports.check.class_page import write_class_page
-from reports.check.command import alphabetical, grading_of
-from reports.check.formats import FORMATS, SCHEMA
-from reports.check.marks import Marked, id_of
-from reports.check.outcomes import OUTCOMES
-from reports.check.points import AS_A_WHOLE, DEFAULT, QUESTIONS, BadPoints, Points, read_points
-from reports.check.rows import UNKNOWN, CheckRow, Verdict
-from reports.check.verdict import FileCheck
+from crosscheck2d.reports.check.class_page import write_class_page
+from crosscheck2d.reports.check.command import alphabetical, grading_of
+from crosscheck2d.reports.check.formats import FORMATS, SCHEMA
+from crosscheck2d.reports.check.marks import Marked, id_of
+from crosscheck2d.reports.check.outcomes import OUTCOMES
+from crosscheck2d.reports.check.points import (
+    AS_A_WHOLE,
+    DEFAULT,
+    QUESTIONS,
+    BadPoints,
+    Points,
+    read_points,
+)
+from crosscheck2d.reports.check.rows import UNKNOWN, CheckRow, Verdict
+from crosscheck2d.reports.check.verdict import FileCheck
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
@@ -177,7 +184,7 @@ def test_tasks_that_a_file_of_points_leaves_out_are_named(
 def test_every_question_that_may_have_points_is_asked():
     """Of a right file: the table of questions is the check's own. Those that only a faulty file or
     one with another step is asked are not in it."""
-    from reports.check.verdict import check_file
+    from crosscheck2d.reports.check.verdict import check_file
 
     plain = next(path for path in CORRECT if path.name == "plain.js")
     found = {(one.task, one.name) for one in check_file(plain).rows}

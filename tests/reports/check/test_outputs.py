@@ -19,14 +19,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
-from reports.check import command
-from reports.check.formats import FORMATS, SCHEMA
-from reports.check.rows import CheckRow
-from reports.check.smallest import smallest_scene, smallest_scenes
-from reports.check.smallest_scene import Smallest
-from reports.check.verdict import check_file
+from crosscheck2d.adapters.own_solver.file import read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check import command
+from crosscheck2d.reports.check.formats import FORMATS, SCHEMA
+from crosscheck2d.reports.check.rows import CheckRow
+from crosscheck2d.reports.check.smallest import smallest_scene, smallest_scenes
+from crosscheck2d.reports.check.smallest_scene import Smallest
+from crosscheck2d.reports.check.verdict import check_file
 from tests.reports.check.marked import marks_of
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, on_terminal, process
@@ -393,7 +393,9 @@ def test_the_old_velocity_is_shown_beside_the_formulas_and_not_beside_the_exact_
 def test_each_fault_has_a_scene_that_shows_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A wrong angle in a flight of one sphere, a wrong overlap in a pair; faults of one kind share
     theirs."""
-    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)  # those that are tried first suffice
+    monkeypatch.setattr(
+        "crosscheck2d.reports.check.smallest.SECONDS", 0.0
+    )  # those that are tried first suffice
     text = RIGHT.read_text().replace("sphere.alpha += ", "sphere.alpha -= ")
     (tmp_path / "two.js").write_text(text.replace("nx * overlap / 2", "nx * overlap"))
     with SolverProcess(read_solver(tmp_path / "two.js")) as process:
@@ -422,7 +424,9 @@ def test_a_scene_is_credited_to_two_faults_only_if_it_shows_both(
 ):
     """Two faults in the velocities after a collision: neither sphere gets the right impulse, and
     both together get one. A file that has only one of them has no such scene."""
-    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)  # those that are tried first suffice
+    monkeypatch.setattr(
+        "crosscheck2d.reports.check.smallest.SECONDS", 0.0
+    )  # those that are tried first suffice
     (mutant,) = (mutant for mutant in MUTANTS if mutant.name == name)
     with SolverProcess(read_solver(mutant.write(tmp_path))) as process:
         found = smallest_scenes(process, 0.9, faults_in("2c", "2d"))
@@ -433,7 +437,7 @@ def test_a_scene_is_credited_to_two_faults_only_if_it_shows_both(
 
 def test_a_busy_machine_finds_a_failing_scene_too(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """Without any time to draw scenes, a pair that collides is tried."""
-    monkeypatch.setattr("reports.check.smallest.SECONDS", 0.0)
+    monkeypatch.setattr("crosscheck2d.reports.check.smallest.SECONDS", 0.0)
     with SolverProcess(read_solver(folder / "ben" / "Exercise.js")) as process:
         found = smallest_scene(process, 0.9)
 
@@ -453,7 +457,7 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
 ):
     """Opened from the file, at two widths: both layers move, nothing overflows, no error, no
     request."""
-    from reports.check.page import write_page
+    from crosscheck2d.reports.check.page import write_page
 
     page_path = folder / "page.html"
     (marked,) = marks_of(check_file(folder / "ben" / "Exercise.js"))
@@ -498,7 +502,7 @@ def test_the_page_shows_both_motions_and_asks_nothing_of_anywhere(
 
 def test_text_of_a_file_is_inert_on_its_page(tmp_path: Path):
     """A message that holds markup is shown as it is."""
-    from reports.check.page import write_page
+    from crosscheck2d.reports.check.page import write_page
 
     path = tmp_path / "evil.js"
     path.write_text("throw new Error('<script>alert(1)</script>')")

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from reports.check.page import WATCHED, speed_of, write_page
-from reports.check.smallest import Smallest, scenario_of
-from reports.check.verdict import FileCheck
-from scenarios.model import Array, Trajectory
+from crosscheck2d.reports.check.page import WATCHED, speed_of, write_page
+from crosscheck2d.reports.check.smallest import Smallest, scenario_of
+from crosscheck2d.reports.check.verdict import FileCheck
+from crosscheck2d.scenarios.model import Array, Trajectory
 from tests.reports.check.marked import marks_of
 from tests.reports.check.test_outputs import faults_in
 from tests.reports.page.browsing import opened

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.check.points import DEFAULT
+from crosscheck2d.reports.check.points import DEFAULT
 from tests.reports.check.test_outputs import RIGHT, WRONG
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck
 
@@ -82,5 +82,5 @@ def test_the_scaffold_fetches_gl_matrix_while_it_is_built(tmp_path: Path):
     )
 
     assert re.search(r'"\$\(echo \S*crosscheck2d-\*\.whl\)\[js\]"', built)
-    assert '-c "from adapters.npm_packages import fetch; fetch()"' in built
+    assert '-c "from crosscheck2d.adapters.npm_packages import fetch; fetch()"' in built
     assert all(re.search(r'CROSSCHECK_CACHE="?\$home/cache', one) for one in (built, run_later))

@@ -15,14 +15,14 @@ from unittest import mock
 import pytest
 from py_mini_racer import JSTimeoutException
 
-from adapters.own_solver.file import PATIENCE, NotASolver, SolverFailed, read_solver
-from adapters.own_solver.javascript import JavaScriptSolver
-from adapters.own_solver.process import GRACE, WORK, SolverProcess
-from adapters.own_solver.worker import HERE
-from adapters.safe_path import python
-from reports.check.lines import Source
-from reports.check.rows import judged
-from reports.check.solver import with_lines
+from crosscheck2d.adapters.own_solver.file import PATIENCE, NotASolver, SolverFailed, read_solver
+from crosscheck2d.adapters.own_solver.javascript import JavaScriptSolver
+from crosscheck2d.adapters.own_solver.process import GRACE, WORK, SolverProcess
+from crosscheck2d.adapters.own_solver.worker import HERE
+from crosscheck2d.adapters.safe_path import python
+from crosscheck2d.reports.check.lines import Source
+from crosscheck2d.reports.check.rows import judged
+from crosscheck2d.reports.check.solver import with_lines
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()

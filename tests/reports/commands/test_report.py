@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.commands.report import medians, numbers_of_scenes
-from reports.compare.comparison import Comparison, compare
-from reports.page.overview import OverviewCell
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.commands.report import medians, numbers_of_scenes
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.page.overview import OverviewCell
+from crosscheck2d.scenarios.catalogue import scenario
 
 
 def compared(name: str, answered: bool = True) -> Comparison:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from reports.compare.delays import jumps_of
-from reports.compare.view import View, cut
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.view import View, cut
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 
 
 def truth_of(name: str) -> tuple[Scenario, Trajectory]:

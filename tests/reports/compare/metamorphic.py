@@ -13,8 +13,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from adapters.run import Run
-from scenarios.model import Array, Collisions, Scenario, Scene, Thrust, Trajectory, frozen
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.scenarios.model import (
+    Array,
+    Collisions,
+    Scenario,
+    Scene,
+    Thrust,
+    Trajectory,
+    frozen,
+)
 
 ON_GRID = 1e-6  # of a step: a collision that is as near to the end of one was found there
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.compare.metrics import METRICS
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.reports.compare.answers import beside_truth, truth_of
 
 SPINNING = ("spin_under_torque", "body_frame_thrust", "ship_thrust")

@@ -1,4 +1,4 @@
-"""A law of `reports.compare.laws` is worked out once for the same objects, and forgotten with
+"""A law of `crosscheck2d.reports.compare.laws` is worked out once for the same objects, and forgotten with
 them."""
 
 import gc
@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from reports.compare.laws import cached
-from scenarios.catalogue import scenario
-from scenarios.model import Scene
+from crosscheck2d.reports.compare.laws import cached
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scene
 
 
 @pytest.fixture

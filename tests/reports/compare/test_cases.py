@@ -7,20 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare import laws, scales
-from reports.compare.comparison import Comparison
-from reports.compare.delays import jumps_of
-from reports.compare.fast_disks import can_pass
-from reports.compare.metrics import METRICS
-from reports.compare.restitution import Restitutions
-from reports.compare.view import NOT_JUDGED, Value, View, beside
-from scenarios import catalogue
-from scenarios.files.scene_file import read_scene_file
-from scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.fast_disks import can_pass
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.restitution import Restitutions
+from crosscheck2d.reports.compare.view import NOT_JUDGED, Value, View, beside
+from crosscheck2d.scenarios import catalogue
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 from tests.reports.compare.answers import beside_truth, truth_of
 
 CASES = Path(__file__).parents[2] / "data" / "cases"

@@ -6,8 +6,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from reports.compare.collisions import closest_in_order, match
-from scenarios.model import Collisions
+from crosscheck2d.reports.compare.collisions import closest_in_order, match
+from crosscheck2d.scenarios.model import Collisions
 
 
 def collisions(*times: float) -> Collisions:

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.play import play
-from reports.compare.comparison import compare
-from reports.compare.metrics import METRICS
-from reports.compare.scales import top_speed
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.scales import top_speed
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.adapters.broken_engines import DoublesSpeed, Exact, Freezes, GainsEnergy
 from tests.reports.compare.answers import beside_truth, truth_of
 

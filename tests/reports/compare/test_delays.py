@@ -6,15 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare import delays, laws, scales, view
-from reports.compare.comparison import compare
-from reports.compare.delays import WINDOW, distance_to_range, jumps_of, nearest, nearest_velocity
-from reports.compare.metrics import METRICS
-from scenarios.catalogue import SCENARIOS
-from scenarios.model import Array, Scenario, Scene, Trajectory
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare import delays, laws, scales, view
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.delays import (
+    WINDOW,
+    distance_to_range,
+    jumps_of,
+    nearest,
+    nearest_velocity,
+)
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.scenarios.catalogue import SCENARIOS
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
+from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.reports.compare.answers import beside_truth, truth_of
 
 HELD = ("velocity_max", "velocity_rms", "momentum_deviation", "energy_deviation")

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play_once
-from reports.compare.comparison import Comparison, compare
-from reports.compare.fast_disks import fast_note, plain, rounded_down
-from scenarios.model import Scenario, Scene
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.fast_disks import fast_note, plain, rounded_down
+from crosscheck2d.scenarios.model import Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 INTERVAL = 0.1  # s
 PHASES = np.linspace(0.0, 1.0, 41)  # of a step, at which the disk would touch

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.compare.friction_metrics import end_of_slip
-from reports.compare.metrics import METRICS
-from scenarios.model import Trajectory
-from scenarios.truth.sliding import slide
+from crosscheck2d.reports.compare.friction_metrics import end_of_slip
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.scenarios.model import Trajectory
+from crosscheck2d.scenarios.truth.sliding import slide
 from tests.reports.compare.answers import beside_truth, truth_of
 
 IN_COLLISIONS = (

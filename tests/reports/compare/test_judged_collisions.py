@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.run import Run
-from reports.compare.comparison import compare
-from reports.compare.metrics import METRICS
-from reports.compare.view import LEAST_SHARE, NOT_JUDGED, Value
-from reports.page import overview
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Collisions, Scenario, Trajectory
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, Value
+from crosscheck2d.reports.page import overview
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 NAMES = ("collisions_missed", "collisions_spurious", "first_wrong_collision_s")

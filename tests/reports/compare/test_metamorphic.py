@@ -15,19 +15,19 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare import collisions, delays, faces, view
-from reports.compare.comparison import compare
-from reports.compare.metrics import METRICS, Metric, _largest_of_disks
-from reports.compare.scales import momentum
-from reports.compare.verdicts import VERDICTS
-from reports.compare.view import Value, View
-from scenarios.families.placing import box, lay_out
-from scenarios.files.scene_file import read_scene_file
-from scenarios.model import Scenario, Scene, Thrust
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import collisions, delays, faces, view
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.metrics import METRICS, Metric, _largest_of_disks
+from crosscheck2d.reports.compare.scales import momentum
+from crosscheck2d.reports.compare.verdicts import VERDICTS
+from crosscheck2d.reports.compare.view import Value, View
+from crosscheck2d.scenarios.families.placing import box, lay_out
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
+from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.reports.compare.metamorphic import CHANGES, Change
 
 PLAYED = (

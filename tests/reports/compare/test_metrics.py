@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare import laws
-from reports.compare.comparison import compare
-from reports.compare.delays import jumps_of
-from reports.compare.metrics import METRICS
-from reports.compare.table import COLUMNS
-from reports.compare.view import NOT_JUDGED, View, cut
-from reports.page.findings import findings
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Scenario, Scene, Thrust, Trajectory
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.table import COLUMNS
+from crosscheck2d.reports.compare.view import NOT_JUDGED, View, cut
+from crosscheck2d.reports.page.findings import findings
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Scenario, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.adapters.broken_engines import NanAtStep7
 from tests.reports.compare.answers import beside_truth, truth_of
 

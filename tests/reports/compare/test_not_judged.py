@@ -9,20 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare.comparison import Comparison, compare
-from reports.compare.delays import WINDOW
-from reports.compare.metrics import METRICS
-from reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
-from reports.page import overview
-from reports.page.charts import CHARTS
-from reports.page.findings import findings
-from reports.run.comparing import read_scene_table
-from reports.run.diff import changed_numbers
-from scenarios.catalogue import scenario
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.delays import WINDOW
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
+from crosscheck2d.reports.page import overview
+from crosscheck2d.reports.page.charts import CHARTS
+from crosscheck2d.reports.page.findings import findings
+from crosscheck2d.reports.run.comparing import read_scene_table
+from crosscheck2d.reports.run.diff import changed_numbers
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 CARRIED = (

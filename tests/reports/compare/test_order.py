@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.compare.order import (
+from crosscheck2d.reports.compare.order import (
     ELSEWHERE,
     EXACT,
     ORDER,
@@ -20,7 +20,7 @@ from reports.compare.order import (
     order_of,
     verdict_of,
 )
-from reports.compare.pareto import (
+from crosscheck2d.reports.compare.pareto import (
     ACCURACIES,
     FAILED,
     NOT_REACHED,
@@ -32,8 +32,8 @@ from reports.compare.pareto import (
     said_of_cheaper,
     yardstick_of,
 )
-from reports.compare.pooling import middle_half
-from reports.speed import ladder
+from crosscheck2d.reports.compare.pooling import middle_half
+from crosscheck2d.reports.speed import ladder
 from tests.reports.speed.clockwork import Late
 
 STEP_SIZES = [1, 2, 4, 8, 16]

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.engine_row import FLOAT64
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare.metrics import METRICS
-from reports.compare.restitution import Restitutions, effective_restitution
-from reports.compare.view import SLOWEST, Value, beside
-from scenarios.catalogue import scenario
-from scenarios.model import Collisions, Scene, Trajectory
+from crosscheck2d.adapters.engine_row import FLOAT64
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.restitution import Restitutions, effective_restitution
+from crosscheck2d.reports.compare.view import SLOWEST, Value, beside
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Collisions, Scene, Trajectory
 
 G, SAMPLE = 9.81, 0.05  # m/s2, s
 ROUNDING = 1e-12  # of some ten operations in float64

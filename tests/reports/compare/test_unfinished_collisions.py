@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.engine_row import FLOAT64
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare import restitution
-from reports.compare.metrics import METRICS
-from reports.compare.restitution import Restitutions, effective_restitution
-from reports.compare.view import View
-from scenarios.catalogue import scenario
-from scenarios.model import Collisions, Scene, Trajectory
+from crosscheck2d.adapters.engine_row import FLOAT64
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare import restitution
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.restitution import Restitutions, effective_restitution
+from crosscheck2d.reports.compare.view import View
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Collisions, Scene, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 STEP = 0.05  # s

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, row_of
-from adapters.play import play
-from adapters.run import Run
-from reports.compare import verdicts as judging
-from reports.compare.comparison import compare
-from reports.compare.verdicts import VERDICTS, Verdict, fails, in_words, verdicts
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.files.scene_file import read_scene_file
-from scenarios.model import Scenario, Trajectory
-from scenarios.no_truth import answered
+from crosscheck2d.adapters.engines import ENGINES, row_of
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import verdicts as judging
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.compare.verdicts import VERDICTS, Verdict, fails, in_words, verdicts
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.no_truth import answered
 from tests.reports.compare.answers import truth_of
 
 CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"

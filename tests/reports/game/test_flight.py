@@ -14,14 +14,14 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-from adapters.conformance.probe import loaded
-from adapters.engine import ContactImpulse, Unsupported
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES
-from adapters.first_collisions import first_collisions
-from adapters.own_solver.engine import OwnSolver
-from adapters.play import play
-from reports.game.divergence import (
+from crosscheck2d.adapters.conformance.probe import loaded
+from crosscheck2d.adapters.engine import ContactImpulse, Unsupported
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.first_collisions import first_collisions
+from crosscheck2d.adapters.own_solver.engine import OwnSolver
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.game.divergence import (
     NEVER,
     WAIT,
     Drift,
@@ -32,13 +32,13 @@ from reports.game.divergence import (
     contact,
     differing_since,
 )
-from reports.game.flight import EARTH, FRAME, Flight, field_scenario, free_place
-from reports.game.pilot import SHIP
-from scenarios.families.exercise import SHIP as START
-from scenarios.files.scene_file import read_scene_file, scene_text
-from scenarios.model import Scene
-from scenarios.no_truth import NoTruth
-from scenarios.truth.closed_forms import world_thrusts
+from crosscheck2d.reports.game.flight import EARTH, FRAME, Flight, field_scenario, free_place
+from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.scenarios.families.exercise import SHIP as START
+from crosscheck2d.scenarios.files.scene_file import read_scene_file, scene_text
+from crosscheck2d.scenarios.model import Scene
+from crosscheck2d.scenarios.no_truth import NoTruth
+from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
 
 EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, both keys of a pair
     (8, "a", True),
@@ -303,7 +303,7 @@ def test_the_marker_names_the_first_collision():
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
     """The oracle's answer to a flight."""
-    from scenarios.truth.exact import with_oracle
+    from crosscheck2d.scenarios.truth.exact import with_oracle
 
     return with_oracle(scenario).truth(scenario.times)
 

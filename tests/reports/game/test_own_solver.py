@@ -19,18 +19,18 @@ import pytest
 from playwright.sync_api import Browser, Page
 from websockets.sync.client import connect
 
-from adapters.engines import ENGINES
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_solver.process import SolverProcess
-from reports.check.verdict import check_file
-from reports.commands.own_solvers import checked
-from reports.commands.serve import application
-from reports.game.command import PATIENCE, game_of, own_rows
-from reports.game.flight import FRAME, Flight, field_scenario
-from reports.game.server import Game, labels
-from reports.game.session import Session
-from reports.page import server
-from reports.page.own_solvers import with_lines
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.own_engine.engine import TEMPLATES, row_of_file
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.check.verdict import check_file
+from crosscheck2d.reports.commands.own_solvers import checked
+from crosscheck2d.reports.commands.serve import application
+from crosscheck2d.reports.game.command import PATIENCE, game_of, own_rows
+from crosscheck2d.reports.game.flight import FRAME, Flight, field_scenario
+from crosscheck2d.reports.game.server import Game, labels
+from crosscheck2d.reports.game.session import Session
+from crosscheck2d.reports.page import server
+from crosscheck2d.reports.page.own_solvers import with_lines
 from tests.bench.game import measure
 from tests.reports.game.test_page import fly
 from tests.reports.page.browsing import opened, served

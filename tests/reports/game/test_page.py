@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.commands.serve import application
-from reports.game.flight import FRAME
-from reports.game.pilot import SHIP
-from reports.game.server import Game
-from scenarios.files.scene_file import read_scene_file
-from scenarios.truth.closed_forms import world_thrusts
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.commands.serve import application
+from crosscheck2d.reports.game.flight import FRAME
+from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.reports.game.server import Game
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.truth.closed_forms import world_thrusts
 from tests.reports.game.test_flight import steered_home
 from tests.reports.page.browsing import opened, overhang, served
 

@@ -19,12 +19,12 @@ import uvicorn
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from adapters.box2d_v3 import Box2DV3
-from adapters.engines import ENGINES
-from reports.commands.serve import application, play
-from reports.game.flight import field_scenario
-from reports.game.server import MOST_A_SECOND, MOST_FAULTS, Game
-from reports.page.server import MOST_TABS, config_of, serve, taken_socket
+from crosscheck2d.adapters.box2d_v3 import Box2DV3
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.commands.serve import application, play
+from crosscheck2d.reports.game.flight import field_scenario
+from crosscheck2d.reports.game.server import MOST_A_SECOND, MOST_FAULTS, Game
+from crosscheck2d.reports.page.server import MOST_TABS, config_of, serve, taken_socket
 from tests.reports.game.test_flight import bits, flown
 
 FLOWN = ["reference:exercise", "pymunk:shipped"]

@@ -7,14 +7,14 @@ from math import cos, sin
 
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.game.messages import read_message
-from reports.game.pilot import SHIP
-from reports.game.session import Session
-from scenarios.catalogue import SCENARIOS
-from scenarios.families.placing import lay_out
-from scenarios.model import Scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.game.messages import read_message
+from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.reports.game.session import Session
+from crosscheck2d.scenarios.catalogue import SCENARIOS
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scenario
 
 
 @pytest.mark.parametrize(

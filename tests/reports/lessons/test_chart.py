@@ -9,8 +9,8 @@ from math import log10
 import pytest
 from playwright.sync_api import Browser, Page
 
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.pages import FILES, answer_json, lesson_page
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.pages import FILES, answer_json, lesson_page
 from tests.reports.page.browsing import opened
 
 

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.engines import DISTINCT, ENGINES
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.lesson import Claim, Curve, Lesson, Shown
-from reports.lessons.limits import SEEN, limits_of
-from reports.lessons.pages import FILES, answer_json, lesson_page
-from reports.page.style import TRUTH
-from reports.stability.limits import LIMIT, QUICK
+from crosscheck2d.adapters.engines import DISTINCT, ENGINES
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.lesson import Claim, Curve, Lesson, Shown
+from crosscheck2d.reports.lessons.limits import SEEN, limits_of
+from crosscheck2d.reports.lessons.pages import FILES, answer_json, lesson_page
+from crosscheck2d.reports.page.style import TRUTH
+from crosscheck2d.reports.stability.limits import LIMIT, QUICK
 from tests.reports.lessons.browsing import opened_lesson
 
 COSTLY = ("box", "crowd", "horizon", "limits")  # a second or more for each setting

@@ -14,14 +14,22 @@ from xml.etree import ElementTree
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.engines import ENGINES
-from reports.lessons import command, pages
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.conventions import Convention
-from reports.lessons.lesson import Shown
-from reports.lessons.mechanisms.ablation import ABLATED
-from reports.lessons.pages import ALONE, FILES, LIVE, answer_json, index_page, linked, offline
-from reports.page.style import TRUTH
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.lessons import command, pages
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.conventions import Convention
+from crosscheck2d.reports.lessons.lesson import Shown
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED
+from crosscheck2d.reports.lessons.pages import (
+    ALONE,
+    FILES,
+    LIVE,
+    answer_json,
+    index_page,
+    linked,
+    offline,
+)
+from crosscheck2d.reports.page.style import TRUTH
 from tests.reports.lessons.browsing import opened_lesson, wait_until_drawn
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck

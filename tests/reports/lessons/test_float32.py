@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.box2d import Box2DEngine
-from adapters.npm_packages import missing, version_of
-from reports.lessons.mechanisms.float32 import claim_of_all, shares_of
-from reports.lessons.mechanisms.planck import (
+from crosscheck2d.adapters.box2d import Box2DEngine
+from crosscheck2d.adapters.npm_packages import missing, version_of
+from crosscheck2d.reports.lessons.mechanisms.float32 import claim_of_all, shares_of
+from crosscheck2d.reports.lessons.mechanisms.planck import (
     BOX2D,
     KEPT,
     LADDER,
@@ -22,8 +22,8 @@ from reports.lessons.mechanisms.planck import (
     played,
     whole,
 )
-from reports.lessons.mechanisms.recorded import made_with, table_in
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.reports.lessons.mechanisms.recorded import made_with, table_in
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.test_readme import TEXTS
 
 QUICK = [*(("free_fall", profile, 64) for profile in PROFILES), ("galperin_3", "matched", 4)]
@@ -126,7 +126,7 @@ def test_a_share_is_the_error_of_box2d_less_that_of_planck(monkeypatch: pytest.M
         [(name, "matched", known(name)[0].middle_substeps, p, b) for name, p, b in rows],
         columns=["scenario", "profile", "substeps", "planck_radii", "box2d_radii"],
     )
-    monkeypatch.setattr("reports.lessons.mechanisms.float32.table_in", lambda _: table)
+    monkeypatch.setattr("crosscheck2d.reports.lessons.mechanisms.float32.table_in", lambda _: table)
     shares_of.cache_clear()
     found = shares_of("matched")
     shares_of.cache_clear()

@@ -8,15 +8,15 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.ablated import MIXING
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.friction.bounce import BOX2D, BOX2D_V3, CONE, NAMES
-from reports.lessons.friction.thrown import taken, thrown
-from reports.lessons.lesson import Shown, run_of
-from reports.lessons.mechanisms.pairs import pairs, sideways
-from reports.page.style import TRUTH
-from scenarios.model import State, Trajectory
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.ablated import MIXING
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.friction.bounce import BOX2D, BOX2D_V3, CONE, NAMES
+from crosscheck2d.reports.lessons.friction.thrown import taken, thrown
+from crosscheck2d.reports.lessons.lesson import Shown, run_of
+from crosscheck2d.reports.lessons.mechanisms.pairs import pairs, sideways
+from crosscheck2d.reports.page.style import TRUTH
+from crosscheck2d.scenarios.model import State, Trajectory
 
 BOUNCE, CONE_PAGE, ROLLING = (LESSONS[name] for name in ("friction", "cone", "rolling"))
 

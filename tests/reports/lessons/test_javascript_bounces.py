@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adapters.npm_packages import missing, version_of
-from reports.lessons.mechanisms.javascript_bounces import (
+from crosscheck2d.adapters.npm_packages import missing, version_of
+from crosscheck2d.reports.lessons.mechanisms.javascript_bounces import (
     ENGINES,
     KEPT,
     RESTITUTIONS,
@@ -16,8 +16,8 @@ from reports.lessons.mechanisms.javascript_bounces import (
     played,
     ratios,
 )
-from reports.lessons.mechanisms.pairs import CLOSING
-from reports.lessons.mechanisms.recorded import made_with, table_in
+from crosscheck2d.reports.lessons.mechanisms.pairs import CLOSING
+from crosscheck2d.reports.lessons.mechanisms.recorded import made_with, table_in
 
 LACKING = next(filter(None, map(missing, ("planck", "matter-js", "@dimforge/rapier2d-compat"))), "")
 fetched = pytest.mark.skipif(bool(LACKING), reason=LACKING)

@@ -13,23 +13,23 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.ablated import AblatedReference
-from adapters.play import play
-from reports.commands.serve import application
-from reports.game.server import Game
-from reports.lessons import pages
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.conventions import ZERO, table
-from reports.lessons.lesson import Lesson, run_of
-from reports.lessons.mechanisms.ablation import ABLATED
-from reports.lessons.mechanisms.javascript_bounces import VERSIONS
-from reports.lessons.mechanisms.row import GAP, struck
-from reports.lessons.meeting import collision_of_the_reference, two
-from reports.page.style import TRUTH
-from scenarios.catalogue import scenario
-from scenarios.no_truth import answered
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.commands.serve import application
+from crosscheck2d.reports.game.server import Game
+from crosscheck2d.reports.lessons import pages
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.conventions import ZERO, table
+from crosscheck2d.reports.lessons.lesson import Lesson, run_of
+from crosscheck2d.reports.lessons.mechanisms.ablation import ABLATED
+from crosscheck2d.reports.lessons.mechanisms.javascript_bounces import VERSIONS
+from crosscheck2d.reports.lessons.mechanisms.row import GAP, struck
+from crosscheck2d.reports.lessons.meeting import collision_of_the_reference, two
+from crosscheck2d.reports.page.style import TRUTH
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.no_truth import answered
+from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.reports.lessons.browsing import opened_lesson, wait_until_drawn
 from tests.reports.page.browsing import opened, overhang, served
 

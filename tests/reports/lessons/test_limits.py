@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adapters.engines import DISTINCT, ENGINES
-from reports.lessons import limits
-from reports.lessons.catalogue import LESSONS
-from reports.lessons.limits import HARSHNESS, SEEN, limits_of
-from reports.page.style import TRUTH
-from reports.stability import variants
-from reports.stability.cases import CASES
-from reports.stability.variants import DrivenEngine, play_as
+from crosscheck2d.adapters.engines import DISTINCT, ENGINES
+from crosscheck2d.reports.lessons import limits
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.lessons.limits import HARSHNESS, SEEN, limits_of
+from crosscheck2d.reports.page.style import TRUTH
+from crosscheck2d.reports.stability import variants
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
 from tests.measured import MEASURED
 from tests.reports.stability.kept_limits import agrees, kept
 

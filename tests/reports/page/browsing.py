@@ -16,7 +16,7 @@ import uvicorn
 from playwright.sync_api import Browser, Page, sync_playwright
 from starlette.applications import Starlette
 
-from reports.page.server import HOST, config_of, taken_socket
+from crosscheck2d.reports.page.server import HOST, config_of, taken_socket
 
 FLAGS = [
     "--no-sandbox",

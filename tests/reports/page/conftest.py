@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.compare.comparison import Comparison
+from crosscheck2d.reports.compare.comparison import Comparison
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, HOSTILE, LONG, ORBIT, played, write_small
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pandas as pd
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare.comparison import Comparison, compare
-from reports.lessons.catalogue import LESSONS
-from reports.page.report import write_page
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page.report import write_page
+from crosscheck2d.scenarios.catalogue import scenario
 
 HOSTILE = (
     "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>{{ 7 * 7 }}"

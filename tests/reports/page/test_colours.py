@@ -8,10 +8,10 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from adapters.engine_row import Mark
-from adapters.engines import ENGINES, FETCHED
-from reports.page.style import PALETTE, PATHS
-from scenarios.model import Array
+from crosscheck2d.adapters.engine_row import Mark
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.reports.page.style import PALETTE, PATHS
+from crosscheck2d.scenarios.model import Array
 
 MARKS = {
     name.partition(":")[0]: row.mark for name, row in {**ENGINES, **FETCHED}.items() if row.mark

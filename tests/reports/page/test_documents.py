@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from jinja2 import Environment, UndefinedError
 
-from reports.page.documents import REPORTS, environment, fragment, render
-from reports.page.style import look
+from crosscheck2d.reports.page.documents import REPORTS, environment, fragment, render
+from crosscheck2d.reports.page.style import look
 
 TEMPLATES = sorted(REPORTS.glob("*/*.j2"))
 BASE, MACROS = "page/base.html.j2", "page/macros.html.j2"

@@ -11,14 +11,14 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
-from reports.compare.comparison import Comparison
-from reports.page.cost_picture import with_two_ticks
-from reports.page.cost_points import RunTimes
-from reports.page.cost_sentences import surely_less
-from reports.page.error_cost import ErrorCost, error_cost
-from reports.page.pooled import SCORES, scores
-from reports.run.timing import noise_of
-from reports.run.timing_pass import COLUMNS
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.page.cost_picture import with_two_ticks
+from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.cost_sentences import surely_less
+from crosscheck2d.reports.page.error_cost import ErrorCost, error_cost
+from crosscheck2d.reports.page.pooled import SCORES, scores
+from crosscheck2d.reports.run.timing import noise_of
+from crosscheck2d.reports.run.timing_pass import COLUMNS
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.small import write_small
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.engines import row_of
-from adapters.play import play
-from reports.compare.comparison import Comparison, compare
-from reports.compare.pareto import cost_to_reach
-from reports.compare.pooling import middle_half, pooled
-from reports.page import findings, overview, situations
-from reports.page.pooled import scored, scores
-from scenarios.files.scene_file import read_scene_file
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.pareto import cost_to_reach
+from crosscheck2d.reports.compare.pooling import middle_half, pooled
+from crosscheck2d.reports.page import findings, overview, situations
+from crosscheck2d.reports.page.pooled import scored, scores
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
 
 CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 NAMES = ("reference:exercise", "reference:ordered", "pymunk:matched", "box2d_v3:matched")

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from adapters.conformance.conform import ask
-from adapters.conformance.laws import LAWS
-from adapters.conformance.probe import Departure
-from adapters.engines import ENGINES
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from adapters.own_solver.process import processes_reused
-from reports.page.own_engines import WORDS, is_lawless, own_engine_sentences
+from crosscheck2d.adapters.conformance.conform import ask
+from crosscheck2d.adapters.conformance.laws import LAWS
+from crosscheck2d.adapters.conformance.probe import Departure
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.own_engine.engine import TEMPLATES, row_of_file
+from crosscheck2d.adapters.own_solver.process import processes_reused
+from crosscheck2d.reports.page.own_engines import WORDS, is_lawless, own_engine_sentences
 from tests.reports.terminal.command_line import crosscheck
 
 PROBES = (*LAWS, "order_and_shapes", "load_forgets", "static_stays", "pair_momentum")

@@ -11,19 +11,19 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.friction import REFUSAL
-from adapters.run import Run
-from reports.compare.comparison import compare
-from reports.page.charts import ChartLine, Drawing, figure_of
-from reports.page.findings import early_ends, not_counted, refusals, unranked_sentence
-from reports.page.first_screen import failed
-from reports.page.own_solvers import with_lines
-from reports.page.page_tables import conformance_matrix, exact_answers
-from reports.page.pooled import with_marks
-from reports.page.report import how_broken
-from scenarios.catalogue import scenario
-from scenarios.truth.exact import OracleTruth
-from scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
+from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.comparison import compare
+from crosscheck2d.reports.page.charts import ChartLine, Drawing, figure_of
+from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals, unranked_sentence
+from crosscheck2d.reports.page.first_screen import failed
+from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.page_tables import conformance_matrix, exact_answers
+from crosscheck2d.reports.page.pooled import with_marks
+from crosscheck2d.reports.page.report import how_broken
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.truth.exact import OracleTruth
+from crosscheck2d.scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
 from tests.reports.page.browsing import overhang
 
 

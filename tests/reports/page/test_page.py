@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page, TimeoutError
 
-from reports.compare.comparison import Comparison
-from reports.lessons.catalogue import LESSONS
-from reports.page.charts import CHARTS, Drawing, packed_charts
-from reports.page.report import write_page
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page.charts import CHARTS, Drawing, packed_charts
+from crosscheck2d.reports.page.report import write_page
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.figures import check_figures
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, HOSTILE, ORBIT, PLAYED

@@ -13,19 +13,19 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from adapters.run import Run
-from reports.compare import laws
-from reports.compare.comparison import Comparison
-from reports.page import overview, panels
-from reports.page.cost_points import NO_CLOCK, RunTimes
-from reports.page.overview import OverviewCell
-from reports.page.panels import drawn_of, numbers_of
-from reports.run.timing import noise_of
-from reports.run.timing_pass import COLUMNS
-from scenarios.catalogue import scenario
-from scenarios.no_truth import answered
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.page import overview, panels
+from crosscheck2d.reports.page.cost_points import NO_CLOCK, RunTimes
+from crosscheck2d.reports.page.overview import OverviewCell
+from crosscheck2d.reports.page.panels import drawn_of, numbers_of
+from crosscheck2d.reports.run.timing import noise_of
+from crosscheck2d.reports.run.timing_pass import COLUMNS
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.no_truth import answered
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, PLAYED, write_small
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES, FETCHED
-from reports.compare.comparison import Comparison
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.reports.compare.comparison import Comparison
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import HEAD_ON, ORBIT, PLAYED, write_small
 from tests.reports.terminal.command_line import crosscheck

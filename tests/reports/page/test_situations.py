@@ -14,26 +14,34 @@ import plotly.graph_objects as go
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.engines import ENGINES, FETCHED
-from adapters.play import play
-from reports.commands.report import medians, never_played
-from reports.compare.comparison import Comparison, compare
-from reports.compare.view import cut
-from reports.page import charts, findings, overview, situations
-from reports.page.cost_points import NO_CLOCK, RunTimes, with_times
-from reports.page.first_screen import early_ends, situated
-from reports.page.links import PAGES, neighbours
-from reports.page.overview import OverviewCell
-from reports.page.own_solvers import with_lines
-from reports.page.page_tables import summaries
-from reports.page.pooled import SCORES, by_situation, flukes, scores
-from reports.page.sections import sections_of
-from reports.page.situations import CROWDS, FLIGHT, FRICTION, ROWS, SINGLE, SPIN, STACKS
-from reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of, number
-from reports.run.timing import noise_of
-from reports.run.timing_pass import COLUMNS as TIMED
-from reports.run.timing_pass import SCENES
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.commands.report import medians, never_played
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.page import charts, findings, overview, situations
+from crosscheck2d.reports.page.cost_points import NO_CLOCK, RunTimes, with_times
+from crosscheck2d.reports.page.first_screen import early_ends, situated
+from crosscheck2d.reports.page.links import PAGES, neighbours
+from crosscheck2d.reports.page.overview import OverviewCell
+from crosscheck2d.reports.page.own_solvers import with_lines
+from crosscheck2d.reports.page.page_tables import summaries
+from crosscheck2d.reports.page.pooled import SCORES, by_situation, flukes, scores
+from crosscheck2d.reports.page.sections import sections_of
+from crosscheck2d.reports.page.situations import (
+    CROWDS,
+    FLIGHT,
+    FRICTION,
+    ROWS,
+    SINGLE,
+    SPIN,
+    STACKS,
+)
+from crosscheck2d.reports.page.style import PATHS, TRUTH, Look, look, looks_of, mark_of, number
+from crosscheck2d.reports.run.timing import noise_of
+from crosscheck2d.reports.run.timing_pass import COLUMNS as TIMED
+from crosscheck2d.reports.run.timing_pass import SCENES
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.page.browsing import opened
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, ORBIT, write_small
 

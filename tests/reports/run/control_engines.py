@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.engine_row import EngineRow
-from scenarios.model import State
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.scenarios.model import State
 
 FATAL = 100  # the step
 SLOW = 4.0  # s

@@ -4,13 +4,13 @@ second or two; and the words of runs that are disturbed."""
 from contextlib import closing
 from pathlib import Path
 
-from adapters.engines import ENGINES
-from reports.run import suite
-from reports.run.plan import Means, RunPlan
-from reports.run.results import COMMAND, Results
-from reports.run.store import reading, writing
-from reports.terminal.progress import Progress
-from scenarios.rows import Rows
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import suite
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import reading, writing
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.rows import Rows
 
 PLAYED = ("pymunk:shipped", "pymunk:matched")
 # 24 cells of ms

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from reports.run.comparing import csv_of
-from reports.run.results import COMMAND
-from reports.run.store import writing
+from crosscheck2d.reports.run.comparing import csv_of
+from crosscheck2d.reports.run.results import COMMAND
+from crosscheck2d.reports.run.store import writing
 
 Change = Callable[[dict], object]
 

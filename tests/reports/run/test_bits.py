@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, UNASKED, told_apart
-from adapters.play import play_once
-from reports.run import bits
-from reports.run.plan import Means, RunPlan
-from reports.run.results import COMMAND, Results
-from reports.run.scenes import open_scene
-from reports.run.store import reading, writing
-from reports.run.suite import carry_out
-from reports.terminal.progress import Progress
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.adapters.engines import ENGINES, UNASKED, told_apart
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.run import bits
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.store import reading, writing
+from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.measured import MEASURED, TABLE
 from tests.reports.terminal.command_line import crosscheck
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.cluster import NoScheduler, connect
+from crosscheck2d.reports.run.cluster import NoScheduler, connect
 from tests.reports.run.small_runs import LONG, cells_in
 from tests.reports.run.test_disturbed import assert_nothing_lost, begun, undisturbed
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for

@@ -12,18 +12,18 @@ from statistics import median
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from reports.commands.diff import show_difference
-from reports.lessons.catalogue import LESSONS
-from reports.page.report import make_report
-from reports.run import suite
-from reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
-from reports.run.plan import Means, RunPlan
-from reports.run.results import COMMAND, Results
-from reports.run.store import writing
-from reports.run.suite import carry_out
-from reports.terminal.exits import Unusable
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.commands.diff import show_difference
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.page.report import make_report
+from crosscheck2d.reports.run import suite
+from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.terminal.exits import Unusable
+from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
 from tests.reports.run.stored import change_cells, change_plan, change_timings, put_table
 
@@ -111,7 +111,7 @@ def test_runs_without_a_common_cell_are_not_said_to_have_got_worse(
 ):
     """Exit 1: the comparison that was asked for cannot be made."""
     nothing = replace(difference(before, after), shared=0)
-    monkeypatch.setattr("reports.commands.diff.difference", lambda *_: nothing)
+    monkeypatch.setattr("crosscheck2d.reports.commands.diff.difference", lambda *_: nothing)
 
     with pytest.raises(SystemExit) as end:
         show_difference(before, after)

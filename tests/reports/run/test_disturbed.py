@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.results import COMMAND
-from reports.run.store import FILE, writing
+from crosscheck2d.reports.run.results import COMMAND
+from crosscheck2d.reports.run.store import FILE, writing
 from tests.reports.run.small_runs import LONG, SMALL, cells_in, read
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_error_of
+from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_error_of
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,15 @@ from typing import cast
 
 import pytest
 
-from adapters.own_engine.engine import row_of_file
-from reports.check.verdict import check_file
-from reports.commands.own_solvers import checked, checks_of, lines
-from reports.run.plan import Check, Means, RunPlan, Task
-from reports.run.pool import Failure
-from reports.run.results import COMMAND
-from reports.run.store import writing
-from reports.run.suite import Suite
-from reports.terminal.progress import Progress
+from crosscheck2d.adapters.own_engine.engine import row_of_file
+from crosscheck2d.reports.check.verdict import check_file
+from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
+from crosscheck2d.reports.run.plan import Check, Means, RunPlan, Task
+from crosscheck2d.reports.run.pool import Failure
+from crosscheck2d.reports.run.results import COMMAND
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.run.suite import Suite
+from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import MUTANTS

@@ -16,15 +16,15 @@ from unittest import mock
 
 import pytest
 
-from adapters.engine import NotStarted
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES
-from reports.run import playing, pool
-from reports.run.cells import Cell
-from reports.run.playing import CellResult, play_cell, play_here
-from reports.run.pool import Failure, affordable, run_all
-from reports.run.trajectories import from_trail, load_trajectory, packed
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engine import NotStarted
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import playing, pool
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.playing import CellResult, play_cell, play_here
+from crosscheck2d.reports.run.pool import Failure, affordable, run_all
+from crosscheck2d.reports.run.trajectories import from_trail, load_trajectory, packed
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.conftest import START_PROCESS
 from tests.forks import start_worker
 from tests.reports.run.control_engines import (

@@ -13,19 +13,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.own_engine.engine import row_of_file
-from adapters.own_solver import process as solver_process
-from adapters.own_solver.file import LARGEST, NotASolver, read_solver
-from adapters.play import play
-from adapters.run import Run
-from reports.check.command import make_page, scenes_of
-from reports.check.verdict import check_file
-from reports.run import suite
-from reports.run.cells import Cell
-from reports.run.playing import play_here
-from reports.run.results import COMMAND, Results
-from reports.run.store import reading
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.own_engine.engine import row_of_file
+from crosscheck2d.adapters.own_solver import process as solver_process
+from crosscheck2d.adapters.own_solver.file import LARGEST, NotASolver, read_solver
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.check.command import make_page, scenes_of
+from crosscheck2d.reports.check.verdict import check_file
+from crosscheck2d.reports.run import suite
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.playing import play_here
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import reading
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.check.marked import marks_of
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.store import FILE, FolderTaken, reading, writing
-from scenarios.rows import Damaged, Rows
+from crosscheck2d.reports.run.store import FILE, FolderTaken, reading, writing
+from crosscheck2d.scenarios.rows import Damaged, Rows
 
 COMMAND = "crosscheck test"
 
@@ -100,7 +100,7 @@ def test_a_folder_of_the_old_format_or_of_another_version_is_one_sentence(tmp_pa
 
 def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path: Path):
     code = (
-        "import sys, pathlib; from reports.run.store import writing\n"
+        "import sys, pathlib; from crosscheck2d.reports.run.store import writing\n"
         "with writing(pathlib.Path(sys.argv[1]), sys.argv[2]) as store:\n"
         "    store.put('cell', 'a', 1); print('writes', flush=True); sys.stdin.read()"
     )
@@ -179,7 +179,7 @@ def test_exports_of_other_plans_are_deleted_unless_they_were_changed(tmp_path: P
 def test_a_writer_that_is_killed_leaves_whole_rows_and_files(tmp_path: Path):
     """Killed 20 times while it writes rows of 300 kB and a file."""
     code = (
-        "import sys, pathlib; from reports.run.store import writing\n"
+        "import sys, pathlib; from crosscheck2d.reports.run.store import writing\n"
         "with writing(pathlib.Path(sys.argv[1]), sys.argv[2]) as store:\n"
         "    k = len(store.rows.keys('cell')); print(flush=True)\n"
         "    while True:\n"
@@ -206,7 +206,7 @@ def test_a_writer_that_is_killed_leaves_whole_rows_and_files(tmp_path: Path):
 def test_many_writers_may_share_a_cache(tmp_path: Path):
     """Of a row that two write the first one stays."""
     code = (
-        "import sys, pathlib; from scenarios.rows import Rows\n"
+        "import sys, pathlib; from crosscheck2d.scenarios.rows import Rows\n"
         "for k in range(200):\n"
         "    rows = Rows(pathlib.Path(sys.argv[1])); rows.put('record', str(k), sys.argv[2],"
         " b'x' * 1000, again=False); rows.close()"

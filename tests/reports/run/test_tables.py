@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.run import cells, comparing
-from reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
-from reports.run.comparing import ANSWER, COMPARED, CompareTask, SceneTasks, no_answer
-from reports.run.pool import Failure
-from reports.run.results import COMMAND, Results
-from reports.run.store import Store, writing
-from reports.run.tables import comparisons_of, make_tables
-from scenarios.truth import cache
+from crosscheck2d.reports.run import cells, comparing
+from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, SceneTasks, no_answer
+from crosscheck2d.reports.run.pool import Failure
+from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.store import Store, writing
+from crosscheck2d.reports.run.tables import comparisons_of, make_tables
+from crosscheck2d.scenarios.truth import cache
 from tests.reports.run.small_runs import make
 
 SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
@@ -218,8 +218,8 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
 
     assert JUDGE_SOURCE[0].startswith("reports/compare/")
     assert {name for name in imported if name.startswith("reports")} <= {
-        "reports.compare",
-        *(f"reports.compare.{path.stem}" for path in folder.rglob("*.py")),
+        "crosscheck2d.reports.compare",
+        *(f"crosscheck2d.reports.compare.{path.stem}" for path in folder.rglob("*.py")),
     }
 
 

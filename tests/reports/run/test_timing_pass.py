@@ -8,12 +8,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from reports.run import timing_pass
-from reports.run.results import Results
-from reports.run.stepping import Spent, binding_of
-from reports.run.timing import WARM_UP, Timed, interleaved, noise_of
-from reports.run.timing_pass import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run import timing_pass
+from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.stepping import Spent, binding_of
+from crosscheck2d.reports.run.timing import WARM_UP, Timed, interleaved, noise_of
+from crosscheck2d.reports.run.timing_pass import (
     BUSY,
     SCENES,
     SHARE,
@@ -25,7 +25,7 @@ from reports.run.timing_pass import (
     noise_floor,
     timed_scenes,
 )
-from scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
 
@@ -112,7 +112,7 @@ def test_the_pass_ends_in_time_and_leaves_out_a_round_that_is_not_whole(
         clock += 1.0
         return Spent(1.0)
 
-    monkeypatch.setattr("reports.run.timing.perf_counter", lambda: clock)
+    monkeypatch.setattr("crosscheck2d.reports.run.timing.perf_counter", lambda: clock)
     what = [Timed(key, run, 1.0) for key in "abcd"]
     samples = interleaved(what, 9, 99.0, 0, limit=10.5)
     took = clock
@@ -209,7 +209,7 @@ def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest
     refusing = timing_pass.CellToTime(
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
-    monkeypatch.setattr("reports.run.stepping.empty_world", partial(int, "no world"))
+    monkeypatch.setattr("crosscheck2d.reports.run.stepping.empty_world", partial(int, "no world"))
     lines = timing_pass.Pass([refusing], 5.0, 0)()
 
     assert [line.get("timing") or line["overhead"] for line in lines].count("key") == 1

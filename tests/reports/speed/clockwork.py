@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import ContactImpulse
-from scenarios.model import Array, Scene, State
+from crosscheck2d.adapters.engine import ContactImpulse
+from crosscheck2d.scenarios.model import Array, Scene, State
 
 
 class Sleeper:

@@ -10,14 +10,14 @@ import re
 
 import pandas as pd
 
-from adapters.engines import ENGINES
-from reports.compare.order import FINEST, NEARER
-from reports.compare.pareto import YARDSTICK
-from reports.run.scenes import open_scene
-from reports.speed import explained, figures
-from reports.speed.figures import AGAINST, AGAINST_BARE
-from reports.speed.versus import COMPARED
-from reports.terminal.counts import counted
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.compare.order import FINEST, NEARER
+from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed import explained, figures
+from crosscheck2d.reports.speed.figures import AGAINST, AGAINST_BARE
+from crosscheck2d.reports.speed.versus import COMPARED
+from crosscheck2d.reports.terminal.counts import counted
 
 SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
 MATCHED = tuple(name for name in ENGINES if name.endswith(":matched"))

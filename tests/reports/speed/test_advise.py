@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.engines import ENGINES
-from adapters.play import play
-from reports.compare.delays import jumps_of
-from reports.compare.view import View
-from reports.run.scenes import open_scene
-from reports.speed import advice
-from reports.speed.advice import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.view import View
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed import advice
+from crosscheck2d.reports.speed.advice import (
     NEARER,
     NO_GAIN,
     NOT_COMPARED,
@@ -36,12 +36,12 @@ from reports.speed.advice import (
     Inquiry,
     those_that_keep,
 )
-from reports.speed.advise import print_advice, sentence_on_times
-from reports.speed.plan import PLAIN
-from reports.speed.purposes import PURPOSES
-from reports.speed.scored_part import scored
-from reports.terminal.progress import Progress
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.reports.speed.advise import print_advice, sentence_on_times
+from crosscheck2d.reports.speed.plan import PLAIN
+from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.adapters.broken_engines import DoublesSpeed, Freezes, GainsEnergy
 from tests.reports.terminal.command_line import crosscheck
 

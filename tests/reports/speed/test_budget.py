@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engine_row import EngineRow
-from adapters.engines import ENGINES
-from adapters.mechanisms.ablated import AblatedReference
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.engine_row import EngineRow
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
+from crosscheck2d.adapters.mechanisms.table import (
     DIGITS,
     END_OF_STEP,
     FLIGHT,
@@ -25,9 +25,9 @@ from adapters.mechanisms.table import (
     Mechanism,
     mechanisms_of,
 )
-from reports.compare import scales
-from reports.speed import budget, budget_tables, explained
-from reports.speed.budget import (
+from crosscheck2d.reports.compare import scales
+from crosscheck2d.reports.speed import budget, budget_tables, explained
+from crosscheck2d.reports.speed.budget import (
     ALL,
     INTERPLAY,
     RESIDUAL,
@@ -39,9 +39,9 @@ from reports.speed.budget import (
     budget_of,
     window_of,
 )
-from reports.speed.plan import middle
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.model import Array, State
+from crosscheck2d.reports.speed.plan import middle
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.model import Array, State
 
 FLOAT64 = 2.0**-53
 BUILT_IN = [name for name in MECHANISMS if name in ENGINES]

@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from adapters.engines import FETCHED, row_of
-from adapters.mechanisms.settings import (
+from crosscheck2d.adapters.engines import FETCHED, row_of
+from crosscheck2d.adapters.mechanisms.settings import (
     SETTINGS,
     Setting,
     find_remedy,
     settings_of,
     without_finer,
 )
-from adapters.npm_packages import missing
-from reports.speed.causes import LATE, cause_of
-from scenarios.files.scene_file import read_scene_file
+from crosscheck2d.adapters.npm_packages import missing
+from crosscheck2d.reports.speed.causes import LATE, cause_of
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
 
 CASES = Path(__file__).parents[3] / "tests" / "data" / "cases"
 LACKING = [reason for row in FETCHED.values() if (reason := missing(row.package))]

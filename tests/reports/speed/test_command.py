@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from reports.cli import app
-from reports.compare.pooling import POOLED
+from crosscheck2d.reports.cli import app
+from crosscheck2d.reports.compare.pooling import POOLED
 
 pytestmark = pytest.mark.slow  # starts worker processes six times
 
@@ -40,7 +40,7 @@ def test_a_scene_without_an_exact_answer_is_refused_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """Exit 1 and the reason; nothing is left behind."""
-    monkeypatch.setattr("reports.speed.scored_part.reach_of", no_reach)
+    monkeypatch.setattr("crosscheck2d.reports.speed.scored_part.reach_of", no_reach)
     done = CliRunner().invoke(app, ["speed", "cradle_touching", "--out", str(tmp_path / "out")])
 
     assert done.exit_code == 1

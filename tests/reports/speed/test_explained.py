@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.speed import budget, explained
-from reports.speed.budget import RESIDUAL, TOTAL, budget_of
-from reports.speed.explained import COLUMNS, Cut, extent, sentence, share
-from reports.speed.scored_part import scored
+from crosscheck2d.reports.speed import budget, explained
+from crosscheck2d.reports.speed.budget import RESIDUAL, TOTAL, budget_of
+from crosscheck2d.reports.speed.explained import COLUMNS, Cut, extent, sentence, share
+from crosscheck2d.reports.speed.scored_part import scored
 
 
 def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:

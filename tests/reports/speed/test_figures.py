@@ -9,17 +9,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import DISTINCT, ENGINES
-from adapters.mechanisms.table import MECHANISMS
-from reports.compare.pareto import YARDSTICK
-from reports.run.scenes import open_scene
-from reports.speed import budget, explained, figures, ladder, tables
-from reports.speed.budget import budget_of
-from reports.speed.effort import FULL, QUICK
-from reports.speed.measure import Measured
-from reports.speed.plan import SCENE, middle
-from reports.speed.versus import COMPARED
-from scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.adapters.engines import DISTINCT, ENGINES
+from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed import budget, explained, figures, ladder, tables
+from crosscheck2d.reports.speed.budget import budget_of
+from crosscheck2d.reports.speed.effort import FULL, QUICK
+from crosscheck2d.reports.speed.measure import Measured
+from crosscheck2d.reports.speed.plan import SCENE, middle
+from crosscheck2d.reports.speed.versus import COMPARED
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from tests.measured import MEASURED, NOT_YET_TIMED
 from tests.reports.speed import statements as speed_figures
 from tests.reports.speed.statements import MATCHED, SHIPPED

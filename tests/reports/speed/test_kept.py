@@ -9,17 +9,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import read_row
-from reports.run.store import writing
-from reports.speed import ladder, measure
-from reports.speed.command import SPEED, kept_of
-from reports.speed.effort import QUICK
-from reports.speed.kept import Kept
-from reports.speed.measure import done
-from reports.speed.plan import SpeedPlan
-from reports.terminal import progress as terminal
-from reports.terminal.progress import Progress
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters.engines import read_row
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.speed import ladder, measure
+from crosscheck2d.reports.speed.command import SPEED, kept_of
+from crosscheck2d.reports.speed.effort import QUICK
+from crosscheck2d.reports.speed.kept import Kept
+from crosscheck2d.reports.speed.measure import done
+from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.reports.terminal import progress as terminal
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
 
 TASK = ("error", "scene", "slow_collision", 0, "reference:exercise", "", 1)

@@ -8,11 +8,11 @@ import pandas as pd
 import plotly.graph_objects as go
 import pytest
 
-from reports.compare.order import ORDER
-from reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
-from reports.speed import charts, tables, versus
-from reports.speed.measure import SIZE, Measured
-from reports.speed.plan import PLAIN, SCENE
+from crosscheck2d.reports.compare.order import ORDER
+from crosscheck2d.reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
+from crosscheck2d.reports.speed import charts, tables, versus
+from crosscheck2d.reports.speed.measure import SIZE, Measured
+from crosscheck2d.reports.speed.plan import PLAIN, SCENE
 
 DT = np.array([0.4, 0.2, 0.1])
 

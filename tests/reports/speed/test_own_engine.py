@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from adapters.own_engine.engine import TEMPLATES, row_of_file
-from reports.run.stepping import CALL, EMPTY, READ
-from reports.speed.ladder import times_of
+from crosscheck2d.adapters.own_engine.engine import TEMPLATES, row_of_file
+from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ
+from crosscheck2d.reports.speed.ladder import times_of
 
 
 @pytest.mark.slow

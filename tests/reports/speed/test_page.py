@@ -13,23 +13,23 @@ import plotly.graph_objects as go
 import pytest
 from playwright.sync_api import Browser
 
-from adapters.mechanisms.options import OPTIONS
-from adapters.mechanisms.table import MECHANISMS
-from adapters.play import play
-from reports.compare.pareto import FAILED, UNREACHABLE
-from reports.compare.pooling import said_of_pool
-from reports.run.machine import about
-from reports.speed import charts, figures
-from reports.speed.budget import budget_of
-from reports.speed.effort import QUICK
-from reports.speed.explained import extent
-from reports.speed.measure import Measured, Measuring
-from reports.speed.page import write_page
-from reports.speed.plan import SpeedPlan
-from reports.speed.results import Results
-from reports.terminal.progress import Progress
-from scenarios.catalogue import scenario
-from scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN
+from crosscheck2d.adapters.mechanisms.options import OPTIONS
+from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.pareto import FAILED, UNREACHABLE
+from crosscheck2d.reports.compare.pooling import said_of_pool
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.speed import charts, figures
+from crosscheck2d.reports.speed.budget import budget_of
+from crosscheck2d.reports.speed.effort import QUICK
+from crosscheck2d.reports.speed.explained import extent
+from crosscheck2d.reports.speed.measure import Measured, Measuring
+from crosscheck2d.reports.speed.page import write_page
+from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.reports.speed.results import Results
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, EVENT_DRIVEN
 from tests.measured import MEASURED
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.figures import check_figures
@@ -102,8 +102,8 @@ def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
 
 def test_errors_are_those_of_the_comparison(results: Results):
     """The same number as `position_max_radii` of the report, from the same play."""
-    from adapters.engines import ENGINES
-    from reports.compare.comparison import compare
+    from crosscheck2d.adapters.engines import ENGINES
+    from crosscheck2d.reports.compare.comparison import compare
 
     row = results.points[
         (results.points.scenario == SCENES[0]) & (results.points.engine == "reference")
@@ -305,7 +305,7 @@ def test_a_ratio_that_drifts_beyond_the_gate_is_named():
 
 def test_the_kept_figures_have_every_ratio_that_is_gated():
     """All engines but the yardstick and those that are it with friction, at all sizes."""
-    from adapters.engines import ENGINES
+    from crosscheck2d.adapters.engines import ENGINES
 
     assert set(figures.ratios(figures.read())) == {
         (name, n)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from adapters.engines import DISTINCT
-from reports.compare.pareto import YARDSTICK
-from reports.speed import figures
-from reports.speed.versus import COMPARED
+from crosscheck2d.adapters.engines import DISTINCT
+from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.speed import figures
+from crosscheck2d.reports.speed.versus import COMPARED
 from tests.measured import MEASURED
 from tests.reports.speed import statements as speed_figures
 

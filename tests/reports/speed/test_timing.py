@@ -11,23 +11,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from reports.run.stepping import Spent
-from reports.run.timing import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.run.stepping import Spent
+from crosscheck2d.reports.run.timing import (
     FEWEST_ROUNDS,
     WARM_UP,
     Sample,
     Timed,
     interleaved,
 )
-from reports.speed import ladder, sizes
-from reports.speed.effort import QUICK
-from reports.speed.estimate import READY, all_rounds
-from reports.speed.measure import IN_PILE, Measured, samples_table
-from reports.speed.scored_part import scored
-from reports.speed.tables import cost_of_sleep, end_of_all_pairs, summed_up
-from scenarios.catalogue import scenario
-from scenarios.model import Scene
+from crosscheck2d.reports.speed import ladder, sizes
+from crosscheck2d.reports.speed.effort import QUICK
+from crosscheck2d.reports.speed.estimate import READY, all_rounds
+from crosscheck2d.reports.speed.measure import IN_PILE, Measured, samples_table
+from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.tables import cost_of_sleep, end_of_all_pairs, summed_up
+from crosscheck2d.scenarios.catalogue import scenario
+from crosscheck2d.scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
 
 EACH = 1e-3

@@ -15,10 +15,10 @@ from math import inf, nan
 from pathlib import Path
 from typing import NamedTuple
 
-from adapters.engines import FETCHED
-from reports.page import style
-from reports.stability.cases import CASES
-from reports.stability.limits import ONLY_BEYOND, Limit, engines_of
+from crosscheck2d.adapters.engines import FETCHED
+from crosscheck2d.reports.page import style
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import ONLY_BEYOND, Limit, engines_of
 
 DATA = Path(__file__).parents[3] / "tests" / "data"
 FILE = DATA / "stability_limits.csv"

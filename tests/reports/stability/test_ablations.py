@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from adapters.engines import ENGINES
-from adapters.mechanisms.table import (
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.mechanisms.table import (
     FLIGHT,
     FRICTION,
     MECHANISMS,
@@ -21,7 +21,7 @@ from adapters.mechanisms.table import (
     RESTITUTION,
     mechanisms_of,
 )
-from reports.stability.ablations import (
+from crosscheck2d.reports.stability.ablations import (
     ACTS_AT_END,
     END_OF_STEP,
     Ablations,
@@ -29,12 +29,12 @@ from reports.stability.ablations import (
     sufficient_mechanisms,
     words_of,
 )
-from reports.stability.cases import CASES
-from reports.stability.explain import explained
-from reports.stability.limits import QUICK, Limit, Trial
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as
-from scenarios.catalogue import scenario
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.explain import explained
+from crosscheck2d.reports.stability.limits import QUICK, Limit, Trial
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as
+from crosscheck2d.scenarios.catalogue import scenario
 
 
 @cache

@@ -12,18 +12,18 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
-from adapters.engines import ENGINES, read_row
-from adapters.own_engine.engine import TEMPLATES
-from reports import cli
-from reports.page.links import PAGES
-from reports.run.store import writing
-from reports.stability.cases import CASES
-from reports.stability.command import STABILITY, write_files
-from reports.stability.limits import QUICK
-from reports.stability.maps import MAPS
-from reports.stability.results import COLUMNS, StabilityPlan, Task
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DRIVEN_ENGINES, taking_part
+from crosscheck2d.adapters.engines import ENGINES, read_row
+from crosscheck2d.adapters.own_engine.engine import TEMPLATES
+from crosscheck2d.reports import cli
+from crosscheck2d.reports.page.links import PAGES
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.command import STABILITY, write_files
+from crosscheck2d.reports.stability.limits import QUICK
+from crosscheck2d.reports.stability.maps import MAPS
+from crosscheck2d.reports.stability.results import COLUMNS, StabilityPlan, Task
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.page.figures import check_figures
 from tests.reports.terminal.command_line import crosscheck

@@ -10,13 +10,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES, FETCHED
-from adapters.npm_packages import missing
-from reports.stability.cases import CASES
-from reports.stability.limits import QUICK, Limit
-from reports.stability.results import StabilityPlan, Task
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DRIVEN_ENGINES, taking_part
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.npm_packages import missing
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import QUICK, Limit
+from crosscheck2d.reports.stability.results import StabilityPlan, Task
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.stability.kept_limits import FILE_OF_FETCHED, Kept, agrees, kept
 from tests.reports.terminal.command_line import crosscheck
 

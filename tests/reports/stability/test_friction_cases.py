@@ -9,18 +9,30 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.engines import ENGINES, UNASKED
-from adapters.mechanisms.table import IMPULSE, Mechanism, mechanisms_of, with_mechanisms
-from adapters.play import play
-from reports.lessons.lesson import run_of
-from reports.stability.cases import CASES
-from reports.stability.cases_friction import DT, FALL, FRICTION, PHASES, in_corner, rough_bounce
-from reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
-from reports.stability.overview import findings
-from reports.stability.phases import phase
-from reports.stability.predicates import judge, truth_of
-from reports.stability.search import LimitSearch
-from reports.stability.variants import play_as
+from crosscheck2d.adapters.engines import ENGINES, UNASKED
+from crosscheck2d.adapters.mechanisms.table import (
+    IMPULSE,
+    Mechanism,
+    mechanisms_of,
+    with_mechanisms,
+)
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.lessons.lesson import run_of
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.cases_friction import (
+    DT,
+    FALL,
+    FRICTION,
+    PHASES,
+    in_corner,
+    rough_bounce,
+)
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
+from crosscheck2d.reports.stability.overview import findings
+from crosscheck2d.reports.stability.phases import phase
+from crosscheck2d.reports.stability.predicates import judge, truth_of
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import play_as
 
 MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
 REFUSE = ("reference:exercise", "reference:lesson")

@@ -9,15 +9,15 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.engines import changed
-from adapters.play import play
-from adapters.pymunk import Pymunk
-from reports.compare import laws
-from reports.stability.cases import CASES
-from reports.stability.cases_gas import RADIUS, gas, wrapped_run
-from reports.stability.limits import QUICK
-from reports.stability.predicates import judge
-from reports.stability.predicates_gas import (
+from crosscheck2d.adapters.engines import changed
+from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.pymunk import Pymunk
+from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.cases_gas import RADIUS, gas, wrapped_run
+from crosscheck2d.reports.stability.limits import QUICK
+from crosscheck2d.reports.stability.predicates import judge
+from crosscheck2d.reports.stability.predicates_gas import (
     BLOCKS,
     ERRORS,
     MOMENTUM_DRIFTS,
@@ -31,10 +31,10 @@ from reports.stability.predicates_gas import (
     literature,
     shares_of_speeds,
 )
-from reports.stability.search import LimitSearch
-from reports.stability.variants import play_as
-from scenarios.catalogue import SCENARIOS
-from scenarios.model import Scenario, Trajectory, frozen
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import play_as
+from crosscheck2d.scenarios.catalogue import SCENARIOS
+from crosscheck2d.scenarios.model import Scenario, Trajectory, frozen
 
 EXACT = "event_driven:float64"
 AT_END_AND_IN_ORDER = ("pymunk:matched", "reference:ordered")

@@ -10,15 +10,23 @@ from math import atan, pi, sqrt
 import numpy as np
 import pytest
 
-from adapters.engines import changed
-from reports.stability.cases import CASES
-from reports.stability.cases_alone import ball, far, on_spring, oscillator
-from reports.stability.limits import QUICK, Limit
-from reports.stability.predicates import apexes
-from reports.stability.search import LimitSearch
-from reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, answers, law_of, named
-from reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as, played
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.adapters.engines import changed
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.cases_alone import ball, far, on_spring, oscillator
+from crosscheck2d.reports.stability.limits import QUICK, Limit
+from crosscheck2d.reports.stability.predicates import apexes
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.touching import (
+    AT_ONCE,
+    GAPS,
+    PAIRS,
+    TOUCHING,
+    answers,
+    law_of,
+    named,
+)
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as, played
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 PARTNERS = [
     f"{engine}:{profile}" for engine in ("box2d", "box2d_v3") for profile in ("shipped", "matched")

@@ -11,23 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import FETCHED
-from reports.cli import VARIED
-from reports.stability.cases import CASES
-from reports.stability.explain import explained, with_replays
-from reports.stability.interventions import (
+from crosscheck2d.adapters.engines import FETCHED
+from crosscheck2d.reports.cli import VARIED
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.explain import explained, with_replays
+from crosscheck2d.reports.stability.interventions import (
     INTERVENTIONS,
     intervention_of,
     reason_by_intervention,
     with_settings,
 )
-from reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
-from reports.stability.reasons import reason_of
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DRIVEN_ENGINES
-from reports.stability.vary import VARIES, case_of_file, similar, varied
-from scenarios.files.scene_file import read_scene_file
-from scenarios.truth.exact import with_oracle
+from crosscheck2d.reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
+from crosscheck2d.reports.stability.reasons import reason_of
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.reports.stability.vary import VARIES, case_of_file, similar, varied
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from reports.page.sections import limits_of
-from reports.page.situations import FAR_OFF
-from reports.page.style import number
-from reports.stability.cases import CASES
-from reports.stability.limits import LIMIT, Case, Limit, Trial
-from reports.stability.overview import findings, held, in_report, in_words
-from scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.reports.page.sections import limits_of
+from crosscheck2d.reports.page.situations import FAR_OFF
+from crosscheck2d.reports.page.style import number
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import LIMIT, Case, Limit, Trial
+from crosscheck2d.reports.stability.overview import findings, held, in_report, in_words
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 
 COLUMN = "column_of_ten"
 

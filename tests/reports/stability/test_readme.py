@@ -6,9 +6,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from adapters.engines import FETCHED
-from reports.stability.cases import CASES
-from reports.stability.limits import FULL, QUICK
+from crosscheck2d.adapters.engines import FETCHED
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import FULL, QUICK
 from tests.reports.stability.kept_limits import (
     FILE_OF_FETCHED,
     IN_README,

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.run import Run
-from reports.page.replay import pack_layers
-from reports.run.pool import Failure, run_all
-from reports.stability.cases import CASES
-from reports.stability.cases_collisions import at_speed
-from reports.stability.cases_gas import gas
-from reports.stability.explain import explained
-from reports.stability.failures import (
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.page.replay import pack_layers
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.cases_collisions import at_speed
+from crosscheck2d.reports.stability.cases_gas import gas
+from crosscheck2d.reports.stability.explain import explained
+from crosscheck2d.reports.stability.failures import (
     AFTER,
     BEFORE,
     failure_files,
@@ -32,13 +32,13 @@ from reports.stability.failures import (
     near,
     part_of,
 )
-from reports.stability.limits import FULL, QUICK, Case, Limit, Trial
-from reports.stability.predicates import Predicate, Reading, judge
-from reports.stability.results import Task, failed, limit_from, row_of
-from reports.stability.search import LimitSearch
-from reports.stability.variants import DrivenEngine, play_as
-from scenarios.families.placing import lay_out
-from scenarios.model import Scenario, Trajectory
+from crosscheck2d.reports.stability.limits import FULL, QUICK, Case, Limit, Trial
+from crosscheck2d.reports.stability.predicates import Predicate, Reading, judge
+from crosscheck2d.reports.stability.results import Task, failed, limit_from, row_of
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
+from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 
 def abort() -> None:

@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engines import FETCHED, row_of
-from adapters.npm_packages import missing
-from adapters.play import play_once
-from reports.compare.faces import first_on_line, on_faces, thrown_off
-from reports.stability.cases import CASES as LIMITS_OF
-from reports.stability.explain import explained, with_replays
-from reports.stability.limits import QUICK, Limit
-from reports.stability.predicates import judge
-from reports.stability.predicates_usable import USABLE
-from reports.stability.search import LimitSearch
-from reports.stability.variants import taking_part
-from reports.stability.vary import case_of_file, heaviest
-from scenarios.files.scene_file import read_scene_file
+from crosscheck2d.adapters.engines import FETCHED, row_of
+from crosscheck2d.adapters.npm_packages import missing
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.faces import first_on_line, on_faces, thrown_off
+from crosscheck2d.reports.stability.cases import CASES as LIMITS_OF
+from crosscheck2d.reports.stability.explain import explained, with_replays
+from crosscheck2d.reports.stability.limits import QUICK, Limit
+from crosscheck2d.reports.stability.predicates import judge
+from crosscheck2d.reports.stability.predicates_usable import USABLE
+from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import taking_part
+from crosscheck2d.reports.stability.vary import case_of_file, heaviest
+from crosscheck2d.scenarios.files.scene_file import read_scene_file
 
 CASES = Path(__file__).parents[3] / "tests" / "data" / "cases"
 PIECES = CASES / "pieces.toml"

@@ -19,7 +19,7 @@ from unittest import mock
 import pytest
 from typer.testing import CliRunner
 
-from reports.cli import app
+from crosscheck2d.reports.cli import app
 from tests.forks import crosscheck_in, start
 
 CROSSCHECK = Path(sys.executable).parent / "crosscheck"

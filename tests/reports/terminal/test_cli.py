@@ -10,11 +10,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from adapters.engines import ENGINES
-from reports.compare.metrics import METRICS
-from reports.compare.table import COLUMNS
-from reports.terminal.progress import Progress
-from scenarios.catalogue import SCENARIOS
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.compare.metrics import METRICS
+from crosscheck2d.reports.compare.table import COLUMNS
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.reports.terminal.command_line import crosscheck, forked, process
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
@@ -45,8 +45,8 @@ def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_help_loads_no_number_library():
     """`--help` answers at once because nothing heavy is imported for it."""
     code = (
-        "import sys, reports.cli\nfrom typer.testing import CliRunner\nassert"
-        " CliRunner().invoke(reports.cli.app, ['run', '--help']).exit_code == 0\nprint([name for"
+        "import sys, crosscheck2d.reports.cli\nfrom typer.testing import CliRunner\nassert"
+        " CliRunner().invoke(crosscheck2d.reports.cli.app, ['run', '--help']).exit_code == 0\nprint([name for"
         " name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
     )
 

@@ -16,14 +16,14 @@ from typing import Any
 
 import pytest
 
-from adapters import safe_path
-from adapters.own_solver.file import read_solver
-from adapters.own_solver.process import SolverProcess
-from reports.run import pool
-from reports.run.cells import Cell
-from reports.run.playing import play_here
-from reports.run.pool import Failure, run_all
-from scenarios.catalogue import scenario
+from crosscheck2d.adapters import safe_path
+from crosscheck2d.adapters.own_solver.file import read_solver
+from crosscheck2d.adapters.own_solver.process import SolverProcess
+from crosscheck2d.reports.run import pool
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.playing import play_here
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK
 from tests.solvers.mutants import CORRECT
@@ -272,8 +272,8 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
 @pytest.mark.parametrize(
     "begin",
     [
-        ["-P", "-c", "from reports.__main__ import main; main()"],
-        pytest.param(["-m", "reports"], marks=pytest.mark.slow),
+        ["-P", "-c", "from crosscheck2d.reports.__main__ import main; main()"],
+        pytest.param(["-m", "crosscheck2d.reports"], marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from reports.terminal.console import Console
-from reports.terminal.exits import say
-from reports.terminal.foreign_text import encoded, legible, put_bytes
-from reports.terminal.progress import Progress
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.exits import say
+from crosscheck2d.reports.terminal.foreign_text import encoded, legible, put_bytes
+from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.terminal.command_line import crosscheck
 
 ROOT = Path(__file__).parents[3]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.terminal.streams import Outlet
+from crosscheck2d.reports.terminal.streams import Outlet
 from tests.reports.terminal.command_line import CROSSCHECK
 
 SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"

@@ -17,9 +17,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.run.results import COMMAND
-from reports.run.store import writing
-from reports.terminal.counts import counted
+from crosscheck2d.reports.run.results import COMMAND
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.terminal.counts import counted
 from tests.reports.run.small_runs import cells_in
 from tests.reports.run.test_disturbed import alive
 from tests.reports.terminal.command_line import crosscheck, wait_for
@@ -31,7 +31,10 @@ pytestmark = [
 ]
 
 SOLVERS = Path(__file__).parents[3] / "tests" / "solvers" / "correct"
-TRUTH, ANSWER = "scenarios.truth.exact:OracleTruth.record", "scenarios.truth.exact:computed"
+TRUTH, ANSWER = (
+    "crosscheck2d.scenarios.truth.exact:OracleTruth.record",
+    "crosscheck2d.scenarios.truth.exact:computed",
+)
 BOTH = [signal.SIGTERM, signal.SIGINT]
 # In the gate each signal is sent in another test, in the long run both are sent in both.
 CTRL_C = [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
@@ -63,9 +66,12 @@ SOCKET = (  # RFC 6455, 1.2: a page opens its socket
 # The stages of every command, each with what never returns there.
 STALLED = {
     "the answer in run": (TWO, TRUTH),
-    "the comparison in run": (TWO, "reports.compare.comparison:_measure"),
+    "the comparison in run": (TWO, "crosscheck2d.reports.compare.comparison:_measure"),
     "the answer in report": (["report", "done"], TRUTH),
-    "the comparison in report": (["report", "done"], "reports.compare.comparison:_measure"),
+    "the comparison in report": (
+        ["report", "done"],
+        "crosscheck2d.reports.compare.comparison:_measure",
+    ),
     "the answer in truth": (["truth", "two.toml"], TRUTH),
     "the answer in speed": (
         ["speed", "two.toml", "--engine", "pymunk:shipped", "--out", "out"],
@@ -79,7 +85,7 @@ STALLED = {
     "a scene in check of a folder": (["check", SOLVERS], ANSWER),
     "a lesson in lesson --export": (
         ["lesson", "order", "--export", "order.html"],
-        "reports.lessons.lesson:play_once",
+        "crosscheck2d.reports.lessons.lesson:play_once",
     ),
 }
 # what the gate plays of these
@@ -132,7 +138,9 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
 def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
     """Signalled to stop while it compares: the sentence counts the cells, and the same command
     gives the bytes of a whole run."""
-    command = Command(*TWO, cwd=place, stalled="reports.compare.comparison:_measure").stalled()
+    command = Command(
+        *TWO, cwd=place, stalled="crosscheck2d.reports.compare.comparison:_measure"
+    ).stalled()
     ended = command.stop(how)
     had = cells_in(place / "out")
     resumed = crosscheck(*TWO, cwd=place)
@@ -178,10 +186,10 @@ def test_a_command_ends_whenever_it_is_signalled(place: Path, words: list, how: 
 
 LESSON = (
     ["lesson"],
-    "reports.lessons.lesson:play_once:waits",
+    "crosscheck2d.reports.lessons.lesson:play_once:waits",
     "GET /lesson/order HTTP/1.1\r\nHost: localhost\r\n\r\n",
 )
-GAME = (["play", "--engine", "reference"], "reports.game.session:Flight:waits", SOCKET)
+GAME = (["play", "--engine", "reference"], "crosscheck2d.reports.game.session:Flight:waits", SOCKET)
 
 
 @pytest.mark.slow
@@ -256,8 +264,8 @@ def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: st
     (tmp_path / name).write_text(text)
     question = {"spheres": [[0.0] * 12], "calls": [["integrate", 0, 1e-3]], "world": False}
     asks = (
-        "from pathlib import Path; from adapters.own_solver.file import read_solver; "
-        "from adapters.own_solver.process import SolverProcess; "
+        "from pathlib import Path; from crosscheck2d.adapters.own_solver.file import read_solver; "
+        "from crosscheck2d.adapters.own_solver.process import SolverProcess; "
         f"SolverProcess(read_solver(Path({str(tmp_path / name)!r}))).do('ask', {question}, 60.0)"
     )
     asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)

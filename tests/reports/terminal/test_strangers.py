@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.run.made import may_overwrite
-from reports.terminal.foreign_text import put_text, whole
+from crosscheck2d.reports.run.made import may_overwrite
+from crosscheck2d.reports.terminal.foreign_text import put_text, whole
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # each is a command with a folder of its own

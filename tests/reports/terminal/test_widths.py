@@ -10,17 +10,17 @@ import pytest
 from rich.cells import cell_len
 from rich.table import Table
 
-from adapters.engines import ENGINES
-from reports.commands import diff
-from reports.run.diff import Change
-from reports.stability.cases import CASES
-from reports.stability.command import print_limits
-from reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
-from reports.terminal.console import Console
-from reports.terminal.counts import counted
-from reports.terminal.exits import folded
-from reports.terminal.progress import OneLine, Progress, fitted
-from reports.terminal.tables import print_list, print_table, print_texts
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.reports.commands import diff
+from crosscheck2d.reports.run.diff import Change
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.command import print_limits
+from crosscheck2d.reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
+from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import folded
+from crosscheck2d.reports.terminal.progress import OneLine, Progress, fitted
+from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 from tests.reports.terminal.command_line import Done, crosscheck, on_terminal
 
 DATA = Path(__file__).parents[3] / "tests" / "data"

@@ -9,11 +9,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from adapters.engines import changed
-from adapters.matched import chosen, searched
-from adapters.pymunk import MATCHED as PYMUNK
-from reports.tune.score import FLOOR, TrialScores, against, at_cost, faults_of, measured, posed
-from reports.tune.search import (
+from crosscheck2d.adapters.engines import changed
+from crosscheck2d.adapters.matched import chosen, searched
+from crosscheck2d.adapters.pymunk import MATCHED as PYMUNK
+from crosscheck2d.reports.tune.score import (
+    FLOOR,
+    TrialScores,
+    against,
+    at_cost,
+    faults_of,
+    measured,
+    posed,
+)
+from crosscheck2d.reports.tune.search import (
     BETTER,
     CHOSEN,
     COLUMNS,
@@ -23,9 +31,9 @@ from reports.tune.search import (
     searched_of,
     shown,
 )
-from scenarios.catalogue import SCENARIOS, scenario
-from scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
-from scenarios.model import Array, Scenario
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
+from crosscheck2d.scenarios.model import Array, Scenario
 
 
 def start(one: Scenario) -> Array:
@@ -181,7 +189,7 @@ def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.Monk
     nothing."""
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
-    monkeypatch.setattr("reports.tune.search.searched_of", lambda _: slop)
+    monkeypatch.setattr("crosscheck2d.reports.tune.search.searched_of", lambda _: slop)
     search = SettingsSearch("pymunk", ("column", "landing"), ((0, 1), (2, 3)), say=lambda _: None)
     table = search.run()
 

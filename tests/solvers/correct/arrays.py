@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reference_impl.state import Disks, World
+from crosscheck2d.reference_impl.state import Disks, World
 
 
 def advance(disks: Disks, world: World, dt: float, count: int) -> list:
