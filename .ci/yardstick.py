@@ -42,8 +42,8 @@ KEPT = HERE.parent / "yardstick"
 CACHE = Path(os.environ.get("YARDSTICK_CACHE", "~/.cache/crosscheck2d-yardstick")).expanduser()
 Numbers = Iterator[tuple[str, str | float]]
 
-# The modules of the measured code, old and new ones, and what the groups import from them. A module
-# may be in the package `crosscheck2d`.
+# The modules of the measured code, old and new ones, and what the groups import from them. All but
+# the tests may be in the package `crosscheck2d`.
 API = {
     "scenarios.catalogue": "SCENARIOS",
     "scenarios.files.scene_file": "read_scene_file",
@@ -66,7 +66,8 @@ RANDOM_SCENES = 300
 def load(name: str) -> Any:
     """The object of that name in the measured code."""
     modules = [module for module, names in API.items() if name in names.split()]
-    for module in [f"{package}{module}" for package in ("crosscheck2d.", "") for module in modules]:
+    packaged = [f"crosscheck2d.{module}" for module in modules if module[:5] != "tests"]
+    for module in [*packaged, *modules]:
         with suppress(ModuleNotFoundError, AttributeError):
             return getattr(import_module(module), name)
     raise LookupError(f"{name}: is in none of {', '.join(modules)}")
@@ -320,11 +321,15 @@ def measure(out: Path, root: Path, groups: list[str]) -> int:
     out, root = out.resolve(), root.resolve()
     # of this checkout the environment that runs, which need not be .venv
     python = root / ".venv" / "bin" / "python"
+    path = [root] if python.exists() else [root, root / ".ci" / "types"]
     python = Path(sys.executable) if root == HERE.parents[1] or not python.exists() else python
     # A cache of its own: exact answers are computed, not looked up.
     shutil.rmtree(out / "cache", ignore_errors=True)
     environment = {name: text for name, text in os.environ.items() if name != "VIRTUAL_ENV"}
-    environment |= {"PYTHONPATH": str(root), "CROSSCHECK_CACHE": str(out / "cache")}
+    environment |= {
+        "PYTHONPATH": os.pathsep.join(map(str, path)),
+        "CROSSCHECK_CACHE": str(out / "cache"),
+    }
 
     def run(name: str, *command: object) -> bool:
         began = time.monotonic()

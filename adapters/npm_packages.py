@@ -21,10 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from crosscheck2d.adapters.engine import Unsupported
+from crosscheck2d.adapters.library_versions import how_to_add
 
 HERE = Path(__file__).parent / "javascript"
 PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
-HOW = "uv run --extra js crosscheck ..."
+HOW = how_to_add("js")
 ABSENT = f"not installed: {HOW}"
 NPM_CI = (
     "ci",

@@ -1,17 +1,12 @@
-"""The command `crosscheck`, or `python -m crosscheck2d.reports`: it can be stopped by a signal before it has
-imported what it needs."""
+"""The command `crosscheck`, or `python -m crosscheck2d.reports`: it can be stopped by a signal
+before it has imported what it needs."""
 
-import os
 import sys
 
 
 def main() -> None:
     """Do what the command line asks for."""
-    # for the next line alone
-    sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    from crosscheck2d.adapters.safe_path import (
-        keep_path_safe,  # and no adapters.py of the current folder
-    )
+    from crosscheck2d.adapters.safe_path import keep_path_safe
 
     keep_path_safe()  # before anything else is imported
     from crosscheck2d.reports.terminal.exits import ends_on_signals, refuse

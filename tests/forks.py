@@ -89,4 +89,4 @@ def serve(connection: Connection, folder: str, memory: int, environment: Mapping
     """In the fork: the worker, with the variables of the test."""
     os.environ.clear()
     os.environ |= environment
-    pool.serve(connection, folder, memory, ())
+    pool.serve(connection, folder, memory, False)

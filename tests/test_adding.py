@@ -93,7 +93,7 @@ ADDED: dict[str, list[Added]] = {
         Added("adapters/toy.py", TOY),
         Added(
             "adapters/engines.py",
-            '    "toy:plain": EngineRow(partial(_made, "adapters.toy.Toy"),'
+            '    "toy:plain": EngineRow(partial(_made, "crosscheck2d.adapters.toy.Toy"),'
             ' "flies through everything", 0.5, FLOAT64,'
             ' outside=True, distributions=("typer",),\n'
             '                     options={"as it is": {}},\n'
@@ -132,15 +132,15 @@ ADDED: dict[str, list[Added]] = {
         ),
         Added(
             "reports/page/charts.py",
-            '    "toy_chart": Chart("a toy", toy_chart),\n',
+            '    "toy_chart": SceneChart("a toy", toy_chart),\n',
             "}\n\n\ndef packed",
         ),
     ],
     "a lesson": [
         Added(
             "reports/lessons/toy.py",
-            "from crosscheck2d.reports.lessons.lesson import LessonChart, Curve, Lesson, Shown\n\n\ndef"
-            ' show():\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
+            "from crosscheck2d.reports.lessons.lesson import LessonChart, Curve, Lesson, Shown\n"
+            'def show():\n    curve = Curve("toy:plain", np.arange(2.0), np.arange(2.0))\n   '
             ' return Shown([LessonChart("a toy", "x", "y", [curve])], None, [])\n\n\n'
             'TOY = Lesson("toy", "9", "A toy lesson", "Is it here?", "It is.", [],'
             ' ["toy:plain"], show)\n',
@@ -171,10 +171,11 @@ ADDED: dict[str, list[Added]] = {
 @pytest.fixture(scope="module")
 def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the source, compiled kernels included, with one of everything added."""
-    folder = tmp_path_factory.mktemp("grown")
+    folder = tmp_path_factory.mktemp("grown") / "crosscheck2d"
     for name in (*SOURCE, "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("out", "*.png"))
-    shutil.copy(ROOT / "README.md", folder)
+    for name in ("README.md", "__init__.py"):
+        shutil.copy(ROOT / name, folder)
     for additions in ADDED.values():
         for added in additions:
             path = folder / added.file
@@ -192,7 +193,8 @@ def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def python(grown: Path, *words: str | Path) -> str:
     """What Python prints that finds the copy first, run in an empty folder beside it."""
-    environment = os.environ | {"PYTHONPATH": str(grown), "PYTHONDONTWRITEBYTECODE": "1"}
+    path = os.pathsep.join(map(str, (grown.parent, grown)))  # the package, and the tests
+    environment = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(
         [sys.executable, *words],
         cwd=grown,

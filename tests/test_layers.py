@@ -2,10 +2,13 @@
 an engine; a class has a name of its own."""
 
 import ast
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from functools import cache
+from importlib.util import module_from_spec, resolve_name, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -60,6 +63,7 @@ FILES = [
     for path in sorted((ROOT / folder).rglob("*.py"))
     if "out" not in path.parts
 ]
+PACKAGE = "crosscheck2d."
 MODULES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
     for path in FILES
@@ -68,21 +72,23 @@ MODULES = {
 
 @cache
 def imports_of(path: Path) -> frozenset[str]:
-    """The modules a file imports, wherever the import stands; a name of a package counts as its
-    module."""
+    """The modules a file imports, wherever the import stands, ours without `crosscheck2d.`; a name
+    of a package counts as its module."""
     found = set()
+    folder = PACKAGE + ".".join(path.relative_to(ROOT).parent.parts)
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            found |= {alias.name.removeprefix(PACKAGE) for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            names = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= names & set(MODULES) or {node.module or ""}
+            module = resolve_name("." * node.level + (node.module or ""), folder)
+            module = module.removeprefix(PACKAGE)
+            names = {f"{module}.{alias.name}" for alias in node.names}
+            found |= names & set(MODULES) or {module}
     return frozenset(found)
 
 
 def of_folder(folder: str, names: Iterable[str]) -> set[str]:
-    """What of a folder is named: `scenarios`, crosscheck2d.scenarios.truth.exact -> truth."""
+    """What of a folder is named: of scenarios/truth/exact.py it is `truth`."""
     start = folder.replace("/", ".") + "."
     return {name.removeprefix(start).split(".")[0] for name in names if name.startswith(start)}
 
@@ -110,6 +116,39 @@ def test_inside_a_folder_imports_point_down(folder: str):
                     upwards.append(f"{path.relative_to(ROOT)} imports {other}")
 
     assert upwards == []
+
+
+def test_imports_are_absolute_but_in_the_solvers_which_can_be_copied_alone():
+    """The solvers name each other and numpy and numba, never the package that they are in."""
+    for path in FILES:
+        own = path.relative_to(ROOT).parts[0] == "reference_impl"
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom):
+                name = "." * node.level + (node.module or "")
+                assert own == name.startswith(".") or "crosscheck2d" not in name, f"{path}: {name}"
+                assert own or not node.level, f"{path}: {name}"
+
+
+def loaded_twice(modules: Iterable[ModuleType]) -> dict[Path, set[str]]:
+    """Files of this repository that are loaded under several names."""
+    names: dict[Path, set[str]] = {}
+    for module in modules:
+        file = getattr(module, "__file__", None)
+        if file and ROOT in (path := Path(file).resolve()).parents:
+            names.setdefault(path, set()).add(getattr(module, "__name__", ""))
+    return {path: spellings for path, spellings in names.items() if len(spellings) > 1}
+
+
+def test_no_file_is_loaded_under_two_names():
+    """As `crosscheck2d.reports` and as `reports`: a class would then be two classes. All that the
+    tests import is loaded here; the control loads a file under its old name."""
+    assert loaded_twice([*sys.modules.values()]) == {}
+    assert not {*MAY_IMPORT} & {name.partition(".")[0] for name in sys.modules}
+    old = ".".join(("adapters", "matched"))
+    spec = spec_from_file_location(old, ROOT / "adapters" / "matched.py")
+    assert spec
+    twice = loaded_twice([*sys.modules.values(), module_from_spec(spec)])
+    assert [*twice.values()] == [{old, f"crosscheck2d.{old}"}]
 
 
 def test_no_application_imports_another():

@@ -2,9 +2,9 @@
 of 32 readings, which differ in the phase of the collision within its step and the angles of the
 disks, or in the height of a fall.
 
-`uv run --extra js python -m crosscheck2d.adapters.conformance.impact_table` asks all engines again, and writes
-impact_table.csv and the table of adapters/README.md; it takes half a minute. With names of engines
-behind it, it asks only those, and keeps the rows of all others.
+`uv run --extra js python -m crosscheck2d.adapters.conformance.impact_table` asks all engines again,
+and writes impact_table.csv and the table of adapters/README.md; it takes half a minute. With names
+of engines behind it, it asks only those, and keeps the rows of all others.
 """
 
 from __future__ import annotations

@@ -54,8 +54,7 @@ MIXING: dict[str, Callable[[float, float], float]] = {
 
 
 class AblatedReference(Reference):
-    """`crosscheck2d.adapters.mechanisms.ablated_reference` with these parameters; without any the exercise's
-    solver, to the bit.
+    """`ablated_reference` with these parameters; without any the exercise's solver, to the bit.
 
     order: the stages of a step; substeps: how often the order is repeated in a dt, each with its
         fraction of dt.
@@ -63,7 +62,7 @@ class AblatedReference(Reference):
         has it.
     mixing: how the restitutions of two disks are combined, a key of `MIXING`.
     friction: of a pair; None: the scene's.
-    `parameters`: fields of `crosscheck2d.adapters.mechanisms.ablated_reference.Parameters`.
+    `parameters`: fields of `ablated_reference.Parameters`.
     """
 
     def __init__(

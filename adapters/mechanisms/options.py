@@ -66,7 +66,7 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """The engine and a profile that names the swept parameter, as in `crosscheck2d.reports.page.style`."""
+        """The engine and a profile that names the swept parameter, see `reports/page/style.py`."""
         return f"{self.engine}+{self.parameter.what}"
 
     def at(self, value: int) -> Callable[[], Engine]:

@@ -1,8 +1,8 @@
 """The mechanisms of every engine: how it differs from exact flight with end-of-step detection.
 
-Each can be enabled in `crosscheck2d.adapters.mechanisms.ablated_reference`; some can be disabled in the
-engine, too. The numbers are read from the engine. With all of its mechanisms the reference
-reproduces the engine, mostly to rounding.
+Each can be enabled in `ablated_reference.py`; some can be disabled in the engine, too. The numbers
+are read from the engine. With all of its mechanisms the reference reproduces the engine, mostly to
+rounding.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import CodeType
 from typing import Any
 
-from crosscheck2d.adapters.safe_path import PACKAGES
+from crosscheck2d.adapters.safe_path import PACKAGE
 
 
 def modules_beside(
@@ -61,7 +61,7 @@ def imported_by(text: str) -> set[str]:
 
 def is_library(name: str, folder: Path) -> bool:
     """Whether a module is found outside `folder`."""
-    if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in PACKAGES:
+    if name in sys.builtin_module_names or name in sys.stdlib_module_names or name == PACKAGE:
         return True
     spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
     # a folder without __init__.py is found last

@@ -55,7 +55,7 @@ class ChartLine(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Chart:
+class SceneChart:
     """A row of `CHARTS`: what it shows in a line, and the function that draws it for one
     comparison."""
 
@@ -398,11 +398,11 @@ def shortened(values: Array | Sequence[float], digits: int = 4) -> list[float | 
     return [float(f"{v:.{digits}g}") if isfinite(v) else None for v in listed]
 
 
-CHARTS: dict[str, Chart] = {
-    "momentum": Chart("momentum error over time", momentum),
-    "energy": Chart("energy error over time", energy),
-    "deviation": Chart("distance to the truth over time", deviation),
-    "convergence": Chart("position error against dt", convergence),
+CHARTS: dict[str, SceneChart] = {
+    "momentum": SceneChart("momentum error over time", momentum),
+    "energy": SceneChart("energy error over time", energy),
+    "deviation": SceneChart("distance to the truth over time", deviation),
+    "convergence": SceneChart("position error against dt", convergence),
 }
 
 

@@ -38,6 +38,7 @@ def render(
     looks: Mapping[str, style.Look] = MappingProxyType({}),
     plotly: bool = False,
     connects: bool = False,
+    sheet: str = "page/page.css",
     **fields: Any,
 ) -> str:
     """The page of `template`, which extends base.html.j2, as text; templates, scripts, styles:
@@ -52,13 +53,13 @@ def render(
     """
     sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
     library = [plotly_source()] if plotly else []
-    sheet = css() + "".join((REPORTS / sheet).read_text(encoding="utf-8") for sheet in styles)
+    text = css(sheet) + "".join((REPORTS / each).read_text(encoding="utf-8") for each in styles)
     policy = content_policy([*library, *sources]) + ("; connect-src 'self'" if connects else "")
     return fragment(
         template,
         generator=generator,
         policy=policy,
-        css=Markup(sheet),
+        css=Markup(text),
         looks=looks,
         looks_json=for_script(
             {name: look._asdict() | {"path": look.path} for name, look in looks.items()}
@@ -121,12 +122,12 @@ class CompiledTemplates(FileSystemBytecodeCache):
             super().dump_bytecode(bucket)
 
 
-def css() -> str:
+def css(sheet: str = "page/page.css") -> str:
     """The style sheet of all pages with the colours of style.py in front, for light and for
     dark."""
     light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
     return f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
-        REPORTS / "page" / "page.css"
+        REPORTS / sheet
     ).read_text(encoding="utf-8")
 
 

@@ -51,21 +51,31 @@ function readPack(bytes) {
 // m, where a frame of a layer has the centre of a disk; axis 0 is x, 1 is y.
 function placeOf(pack, layer, frame, disk, axis) {
   const steps = layer.grid[(frame * pack.radius.length + disk) * 2 + axis];
-  return layer.low[axis] + (steps / 65535) * layer.span[axis];
+  return layer.low[axis] + (steps / pack.steps) * layer.span[axis];
 }
 
 class Player {
   constructor(element, pack, looks) {
     const speed = Number(element.querySelector(".speed").value);
-    Object.assign(this, { element, looks, playing: false, speed, hidden: new Set() });
-    this.canvas = element.querySelector("canvas");
+    Object.assign(this, { element, looks, playing: false, speed, hidden: new Set(), views: [] });
     this.slider = element.querySelector(".scrub");
     this.clock = element.querySelector(".clock");
     this.button = element.querySelector(".play");
     this.note = element.querySelector(".ended");
+    this.sizes = new ResizeObserver(() => this.fit());
     this.listen();
+    this.look([...element.querySelectorAll("canvas")].map((canvas) => ({ canvas })));
     this.showPack(pack);
-    new ResizeObserver(() => this.fit()).observe(this.canvas.parentElement);
+  }
+
+  // Draws on these: { canvas, name } shows one engine over the exact answer, { canvas } all that are not hidden.
+  look(views) {
+    this.sizes.disconnect();
+    this.views = views;
+    for (const { canvas } of views) {
+      canvas.onclick = () => this.toggle();
+      this.sizes.observe(canvas.parentElement);
+    }
   }
 
   // Shows a pack from where it opens; `pace` is how many of its seconds pass in one at speed 1.
@@ -88,7 +98,6 @@ class Player {
     this.element.querySelector(".forth").onclick = () => this.stepBy(1);
     this.element.querySelector(".speed").onchange = (event) => { this.speed = Number(event.target.value); };
     this.slider.oninput = () => { this.stop(); this.seek(Number(this.slider.value)); };
-    this.canvas.onclick = () => this.toggle();
     this.element.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -155,7 +164,14 @@ class Player {
 
   ended(layer) { return this.time > this.pack.t[layer.frames - 1] + 1e-9; }
 
-  coordinate(layer, frame, disk, axis) { return placeOf(this.pack, layer, frame, disk, axis); }
+  // m, between the places a and b of a disk; on a torus the shorter way.
+  distance(a, b) {
+    const box = this.pack.wrap;
+    return Math.hypot(...[0, 1].map((axis) => {
+      const size = box ? box[2 + axis] - box[axis] : 0, gap = a[axis] - b[axis];
+      return size ? gap - size * Math.round(gap / size) : gap;
+    }));
+  }
 
   // [[x, y], ...] m of an engine's disks now; on a straight line between the packed samples. null once it has ended.
   positions(name) {
@@ -166,9 +182,9 @@ class Player {
   place(layer, disk) {
     const [k, share] = this.frameAt(this.time);
     return [0, 1].map((axis) => {
-      const here = this.coordinate(layer, k, disk, axis);
+      const here = placeOf(this.pack, layer, k, disk, axis);
       if (!share || k + 1 >= layer.frames) return here;
-      const gap = this.coordinate(layer, k + 1, disk, axis) - here;
+      const gap = placeOf(this.pack, layer, k + 1, disk, axis) - here;
       const box = this.pack.wrap;
       const jumps = box && Math.abs(gap) > (box[2 + axis] - box[axis]) / 2;  // it left and came in again opposite
       return jumps ? here : here + share * gap;

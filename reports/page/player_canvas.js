@@ -9,39 +9,50 @@ const distance = (metres) => metres < 1e6 ? `${Number(metres.toPrecision(2))} m`
 
 Object.assign(Player.prototype, {
   fit() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;  // page.css fits the height to the view
-    if (!width) return;
-    const [left, bottom, right, top] = this.pack.view;
-    const margin = 16, foot = 18;  // px around the picture, and below it for the scale bar
-    const sharp = window.devicePixelRatio || 1;
-    this.scale = Math.min((width - 2 * margin) / (right - left), (height - 2 * margin - foot) / (top - bottom));
-    this.centre = [(width - this.scale * (left + right)) / 2, (height - foot + this.scale * (top + bottom)) / 2];
-    Object.assign(this.canvas, { width: Math.round(width * sharp), height: Math.round(height * sharp) });
-    this.size = [width, height, sharp];
+    for (const view of this.views) {
+      const { clientWidth: width, clientHeight: height } = view.canvas;  // the style sheet fits the height to the view
+      if (!width) continue;
+      const [left, bottom, right, top] = this.pack.view;
+      const margin = view.name ? 8 : 16, foot = 18;  // px around the picture, and below it for the scale bar
+      const sharp = window.devicePixelRatio || 1;
+      view.scale = Math.min((width - 2 * margin) / (right - left), (height - 2 * margin - foot) / (top - bottom));
+      view.centre = [(width - view.scale * (left + right)) / 2, (height - foot + view.scale * (top + bottom)) / 2];
+      Object.assign(view.canvas, { width: Math.round(width * sharp), height: Math.round(height * sharp) });
+      view.size = [width, height, sharp];
+    }
     this.draw();
   },
 
   pixel([x, y]) { return [this.centre[0] + this.scale * x, this.centre[1] - this.scale * y]; },
 
   draw() {
-    if (!this.size) return;
-    const pen = this.canvas.getContext("2d");
+    this.views.filter((view) => view.size).forEach((view) => this.drawView(view));
+    this.note.textContent = this.pack.layers.filter((layer) => !this.hidden.has(layer.name) && this.ended(layer))
+      .map((layer) => `${this.label(layer.name)} ends at ${layer.ends} s`).join("; ");
+  },
+
+  label(name) { return this.pack.labels?.[name] ?? (name === "truth" ? "exact answer" : name); },
+
+  drawView(view) {
+    Object.assign(this, { size: view.size, scale: view.scale, centre: view.centre });
+    const pen = view.canvas.getContext("2d");
     const css = getComputedStyle(this.element);
-    this.ink = { text: css.getPropertyValue("--text"), soft: css.getPropertyValue("--soft"), wall: css.getPropertyValue("--wall") };
+    const [text, soft, wall, exact] = ["--text", "--soft", "--wall", "--exact"].map((name) => css.getPropertyValue(name));
+    this.ink = { text, soft, wall, exact };
     pen.setTransform(this.size[2], 0, 0, this.size[2], 0, 0);
     pen.clearRect(0, 0, this.size[0], this.size[1]);
     this.drawWalls(pen);
-    const layers = this.pack.layers.filter((layer) => !this.hidden.has(layer.name));
+    const names = view.name ? ["truth", view.name] : null;
+    const layers = this.pack.layers.filter((layer) => names ? names.includes(layer.name) : !this.hidden.has(layer.name));
+    if (names) layers.sort((a) => a.name === "truth" ? -1 : 1);
     const few = this.pack.radius.length <= FEW;
     this.drawStatic(pen);
     if (few) layers.forEach((layer) => this.drawPath(pen, layer));
-    layers.forEach((layer, k) => this.ended(layer) || this.drawDisks(pen, layer, few, layers.length - k));
+    layers.forEach((layer, k) => this.ended(layer) || this.drawDisks(pen, layer, few, layers.length - k, Boolean(names)));
     layers.forEach((layer) => this.drawCollisions(pen, layer));
     if (few) layers.forEach((layer) => this.ended(layer) || this.drawAway(pen, layer));
     this.drawEvent(pen, layers);
     this.drawScaleBar(pen);
-    this.note.textContent = layers.filter((layer) => this.ended(layer))
-      .map((layer) => `${layer.name === "truth" ? "exact answer" : layer.name} ends at ${layer.ends} s`).join("; ");
   },
 
   colour(layer) { return this.looks[layer.name][darkPage() ? "dark" : "light"]; },
@@ -70,7 +81,7 @@ Object.assign(Player.prototype, {
     this.pack.radius.forEach((radius, disk) => {
       if (!this.pack.static[disk]) return;
       pen.beginPath();
-      pen.arc(...this.pixel([0, 1].map((axis) => this.coordinate(layer, 0, disk, axis))), radius * this.scale, 0, 2 * Math.PI);
+      pen.arc(...this.pixel([0, 1].map((axis) => placeOf(this.pack, layer, 0, disk, axis))), radius * this.scale, 0, 2 * Math.PI);
       pen.fill();
     });
   },
@@ -87,7 +98,7 @@ Object.assign(Player.prototype, {
       let before = null;
       pen.beginPath();
       for (let k = 0; k < layer.frames; k++) {
-        const here = [this.coordinate(layer, k, disk, 0), this.coordinate(layer, k, disk, 1)];
+        const here = [placeOf(this.pack, layer, k, disk, 0), placeOf(this.pack, layer, k, disk, 1)];
         const jumps = before && box && [0, 1].some((a) => Math.abs(here[a] - before[a]) > (box[2 + a] - box[a]) / 2);
         before && !jumps ? pen.lineTo(...this.pixel(here)) : pen.moveTo(...this.pixel(here));
         before = here;
@@ -97,10 +108,10 @@ Object.assign(Player.prototype, {
     pen.globalAlpha = 1;
   },
 
-  drawDisks(pen, layer, few, rank) {
+  drawDisks(pen, layer, few, rank, under) {
     const look = this.looks[layer.name];
     const truth = layer.name === "truth";
-    const colour = this.colour(layer);
+    const colour = truth && under ? this.ink.exact : this.colour(layer);
     pen.strokeStyle = pen.fillStyle = colour;
     this.pack.radius.forEach((radius, disk) => {
       if (this.pack.static[disk]) return;
@@ -108,8 +119,8 @@ Object.assign(Player.prototype, {
       const r = Math.max(1.5, radius * this.scale);
       pen.beginPath();
       pen.arc(x, y, r, 0, 2 * Math.PI);
-      pen.globalAlpha = 0.09;
-      if (!truth) pen.fill();
+      pen.globalAlpha = truth ? 1 : 0.09;
+      if (!truth || under) pen.fill();
       pen.globalAlpha = 1;
       pen.setLineDash(look.dash);
       // Coinciding outlines stay visible as rings in each other: the lower the layer, the wider its line.
@@ -117,7 +128,7 @@ Object.assign(Player.prototype, {
       pen.stroke();
       pen.setLineDash([]);
       pen.lineWidth = 1.2;
-      if (layer.turns) this.drawSpoke(pen, [x, y], r, this.angle(layer, disk));
+      if (layer.turns && !(truth && under)) this.drawSpoke(pen, [x, y], r, this.angle(layer, disk));
       if (few && !truth && r > 9) this.drawMark(pen, look, x, y);
     });
   },

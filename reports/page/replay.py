@@ -29,7 +29,8 @@ FRAMES = 240
 # positions in a layer, so that a crowd of 100 disks fits into the page
 NUMBERS = 10_000
 COLLISIONS = 300  # collision marks in a layer at most: more hide the disks
-STEPS = 65535  # of the position grid
+GRID = 16383  # steps of the position grid over the box of a layer: fractions of a pixel
+STEPS = 65535  # of instants, and of a turn less one
 
 
 def pack(comparison: Comparison) -> str:
@@ -97,6 +98,7 @@ def head_of(
     scene = scenario.scene
     return {
         "duration": scenario.duration,
+        "steps": GRID,
         "t": rounded(scenario.times[shown]),
         "radius": rounded(scene.radius),
         "static": scene.static.astype(int).tolist(),
@@ -151,7 +153,7 @@ def layer(
     finite = np.nan_to_num(position, nan=0.0, posinf=1e9, neginf=-1e9)
     low, high = finite.min(axis=(0, 1)), finite.max(axis=(0, 1))
     span = np.where(high > low, high - low, 1.0)
-    grid = np.rint((finite - low) / span * STEPS).astype(np.uint16)
+    grid = np.rint((finite - low) / span * GRID).astype(np.uint16)
     body = smoothed(grid.reshape(len(mine), -1))
     turns = bool(trajectory.angle.any())
     if turns:

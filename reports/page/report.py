@@ -67,7 +67,7 @@ def write_page(
     html = render(
         "page/page.html.j2",
         generator=GENERATOR,
-        scripts=(*CHARTED, "page/panels.js"),
+        scripts=(*CHARTED, "page/scene_panels.js"),
         looks=style.looks_of((*names, style.TRUTH)),
         plotly=True,
         names=names,

@@ -149,6 +149,12 @@ def mark_of(engine: str) -> Mark:
     return marks[engine] or PALETTE[unmarked().index(engine) % len(PALETTE)]
 
 
+def marks() -> list[Mark]:
+    """Every mark of an engine, of `PALETTE` and of the exact answer, each once."""
+    rows = [row.mark for row in {**FETCHED, **ENGINES}.values() if row.mark]
+    return list(dict.fromkeys([*rows, *PALETTE, OF_TRUTH]))
+
+
 def unmarked() -> list[str]:
     """The engines without a mark in their row."""
     rows = {**FETCHED, **ENGINES}.items()
@@ -179,9 +185,13 @@ def readable_on(colour: str) -> str:
 
 
 def css_variables(dark: bool) -> str:
-    """The ramp as CSS custom properties `--heat-k` and `--on-heat-k`."""
+    """The colours of engines as CSS custom properties, named by the light one, and the ramp as
+    `--heat-k` and `--on-heat-k`."""
     ramp = HEAT_DARK if dark else HEAT_LIGHT
-    return "".join(f"--heat-{k}:{c};--on-heat-{k}:{readable_on(c)};" for k, c in enumerate(ramp))
+    colours = "".join(f"--{mark.light[1:]}:{mark[dark]};" for mark in marks())
+    return colours + "".join(
+        f"--heat-{k}:{c};--on-heat-{k}:{readable_on(c)};" for k, c in enumerate(ramp)
+    )
 
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

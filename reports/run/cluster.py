@@ -14,6 +14,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
 
+from crosscheck2d.adapters.library_versions import how_to_add
 from crosscheck2d.reports.run import pool
 from crosscheck2d.reports.run.pool import ATTEMPTS, LOST, Failure, Pool
 
@@ -107,7 +108,7 @@ def connect(scheduler: str) -> Any:
     except ImportError as missing:
         raise NoScheduler(
             f"--scheduler {scheduler}: it needs the package {missing.name}, which is not"
-            " installed; uv sync --extra cluster, or pip install crosscheck2d[cluster]"
+            f" installed: {how_to_add('cluster')}"
         ) from missing
     # important faults are raised; each logger of distributed has its own level
     for name in [*logging.root.manager.loggerDict]:

@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 import psutil
 
 from crosscheck2d.adapters import system
-from crosscheck2d.adapters.safe_path import PACKAGES, PROGRAM, TESTS, keep_path_safe
+from crosscheck2d.adapters.safe_path import OwnPackages, keep_path_safe
 from crosscheck2d.reports.terminal.exits import refuse, say
 
 TIMEOUT = 60.0  # s a task may take
@@ -95,17 +95,17 @@ def allow(seconds: float = 0.0) -> None:
         _parent.send_bytes(CLOCK + str(seconds).encode())
 
 
-def serve(connection: Connection, folder: str, memory: int, packages: Sequence[str]) -> None:
+def serve(connection: Connection, folder: str, memory: int, fresh: bool) -> None:
     """The main function of a worker: carry out tasks until there are no more.
 
-    `folder` has the files of its output and its trail; `packages`: what a new interpreter may
-    import from the folder of this program.
+    `folder` has the files of its output and its trail; `fresh`: it is a new interpreter, no fork.
     """
     global _trail, _parent
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    if packages:
-        keep_path_safe(tuple(packages))
+    if fresh:
+        keep_path_safe()
+        sys.meta_path.insert(0, OwnPackages())
     append = os.O_WRONLY | os.O_CREAT | os.O_APPEND | system.BINARY
     output = os.open(Path(folder, "output"), append)
     for number, file in enumerate((os.open(os.devnull, os.O_RDONLY), output, output)):
@@ -156,16 +156,10 @@ def out_of_memory(memory: int) -> Failure:
 
 def start_process(connection: Connection, folder: str, memory: int) -> Any:
     """Start a worker at the other end of a connection."""
-    packages: tuple[str, ...] = ()
-    if CONTEXT.get_start_method() == "spawn":
-        # The new interpreter finds this program in its last place, and nothing in the folder in
-        # which the command was started.
-        packages = (*PACKAGES, TESTS) if TESTS in sys.modules else PACKAGES
+    fresh = CONTEXT.get_start_method() == "spawn"
+    if fresh:  # finds nothing in the folder in which the command was started
         os.environ["PYTHONSAFEPATH"] = "1"
-        sys.path.extend({PROGRAM} - {*sys.path})
-    process = CONTEXT.Process(
-        target=serve, args=(connection, folder, memory, packages), daemon=True
-    )
+    process = CONTEXT.Process(target=serve, args=(connection, folder, memory, fresh), daemon=True)
     process.start()
     return process
 

@@ -1,8 +1,8 @@
 """Which mechanisms of an engine are enough to produce its limit: the reference with only these
 works and fails at the same values as the engine.
 
-`crosscheck2d.adapters.mechanisms.table` lists what an engine does differently from exact flight with
-end-of-step detection, and `crosscheck2d.adapters.mechanisms.ablated_reference` can enable each of these
+`adapters/mechanisms/table.py` lists what an engine does differently from exact flight with
+end-of-step detection, and `adapters/mechanisms/ablated_reference.py` can enable each of these
 mechanisms. An ablation is the reference with some of them enabled. An ablation that has the
 engine's limit shows its cause.
 """

@@ -35,7 +35,7 @@ class Reason(NamedTuple):
         predicts: the limit that follows from it.
         variant: an engine that differs in this alone, or in little else, and must get farther;
             "+bullets": the engine itself with bullets.
-        mechanism: the one that the sentence is about, of `crosscheck2d.adapters.mechanisms.table`, or
+        mechanism: the one that the sentence is about, of `adapters/mechanisms/table.py`, or
             `END_OF_STEP`; an ablation that has the limit must have it.
     """
 

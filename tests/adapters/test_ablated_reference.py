@@ -204,7 +204,8 @@ def test_every_engine_with_mechanisms_is_known_and_flies_as_its_row_says():
 
 PLAIN = """
 import sys, numpy as np
-from crosscheck2d.adapters.mechanisms.ablated import BOX2D, BOX2D_V3, EXERCISE, PYMUNK, AblatedReference
+from crosscheck2d.adapters.mechanisms.ablated import BOX2D, BOX2D_V3, EXERCISE, PYMUNK
+from crosscheck2d.adapters.mechanisms.ablated import AblatedReference
 from crosscheck2d.scenarios.families.placing import box, lay_out
 grid = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 2) * 1.0
 n = np.arange(9)

@@ -66,7 +66,7 @@ def drifted(name: str, row: EngineRow) -> list[str]:
 
 @pytest.mark.parametrize("name", EACH)
 def test_an_engine_reads_what_is_kept_of_it(name):
-    """With the same versions; else `python -m crosscheck2d.adapters.conformance.impact_table` writes it anew."""
+    """With the same versions; else the command in adapters/README.md writes it anew."""
     assert drifted(name, ROWS[name]) == []
 
 

@@ -43,7 +43,8 @@ sys.platform = "PLATFORM"
 for package in ("adapters", "reference_impl", "reports", "scenarios"):
     for path in sorted(pathlib.Path(package).rglob("*.py")):
         if "out" not in path.parts and path.name not in ("__main__.py",):
-            importlib.import_module(".".join(path.with_suffix("").parts).removesuffix(".__init__"))
+            name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+            importlib.import_module(f"crosscheck2d.{name}")
 from crosscheck2d.adapters import system
 assert not system.KERNEL and not system.ALARMS
 try:

@@ -12,7 +12,6 @@ import pyb2d3
 import pymunk
 import pytest
 
-from crosscheck2d.adapters.library_versions import version
 from crosscheck2d.adapters.npm_packages import missing, pinned, place
 
 ROOT = Path(__file__).parents[2]
@@ -28,14 +27,15 @@ RELEASES = dict(
 def test_the_table_has_the_pinned_versions_and_the_days_of_their_release():
     """Those of PyPI are in uv.lock, too."""
     lock = tomllib.loads((ROOT / "uv.lock").read_text(encoding="utf-8"))
-    released = {package["name"]: package.get("sdist", {}) for package in lock["package"]}
+    locked = {package["name"]: package for package in lock["package"]}
     npm = pinned()["dependencies"]
     assert set(RELEASES) == {"pymunk", "box2d-py", "pyb2d3"} | {*npm} - {"gl-matrix"}
     for name, (number, day) in RELEASES.items():
         if name in npm:
             assert number == npm[name]
         else:
-            assert (number, day) == (version(name), str(released[name]["upload-time"])[:10])
+            released = str(locked[name]["sdist"]["upload-time"])
+            assert (number, day) == (locked[name]["version"], released[:10])
 
 
 def test_pyb2d3_hands_on_none_of_what_box2d_3_has():

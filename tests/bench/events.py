@@ -134,10 +134,10 @@ def compile_time() -> float:
     """Processor seconds for all kernels, from an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         return alone(
-            "from tests.adapters.event_driven.gases import gas; from time import process_time;from"
-            " crosscheck2d.adapters.event_driven.events import EventEngine; start = process_time();engine ="
-            " EventEngine(*gas(100, 0.3)); engine.advance(1.0);"
-            " engine.motion_at(1.0);engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0);"
+            "from tests.adapters.event_driven.gases import gas; from time import process_time;"
+            " from crosscheck2d.adapters.event_driven.events import EventEngine;"
+            " start = process_time(); engine = EventEngine(*gas(100, 0.3)); engine.advance(1.0);"
+            " engine.motion_at(1.0); engine.accelerate(0, 1.0, (0.0, 0.0)); engine.advance(2.0);"
             " print(process_time() - start)",
             NUMBA_CACHE_DIR=empty,
         )

@@ -61,7 +61,8 @@ class Checkout:
         self.process = subprocess.Popen(
             [sys.executable, "-B", "-c", PLAYER],
             cwd=source,
-            env=os.environ | {"PYTHONPATH": str(source), "NUMBA_CACHE_DIR": str(kernels)},
+            env=os.environ
+            | {"PYTHONPATH": str(source / ".ci" / "types"), "NUMBA_CACHE_DIR": str(kernels)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

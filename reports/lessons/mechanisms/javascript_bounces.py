@@ -1,8 +1,8 @@
 """What the JavaScript engines make of pairs that meet head on, for lesson 6.11.
 
-`uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.javascript_bounces` plays them and writes
-javascript_bounces.csv, which the lesson shows: the engines are npm packages that need not be
-installed.
+`uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.javascript_bounces` plays them
+and writes javascript_bounces.csv, which the lesson shows: the engines are npm packages that need
+not be installed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What float32 changes: Box2D 2.3 and planck, which is the same algorithm in float64, in the same
 scenes.
 
-`uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.planck` plays both and writes planck.csv,
-which the lesson shows: planck is an npm package that need not be installed.
+`uv run --extra js python -m crosscheck2d.reports.lessons.mechanisms.planck` plays both and writes
+planck.csv, which the lesson shows: planck is an npm package that need not be installed.
 """
 
 from __future__ import annotations

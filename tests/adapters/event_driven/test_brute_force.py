@@ -187,7 +187,7 @@ def plain_kernels(right="", wrong=""):
     """The kernels as plain Python, one line of them replaced."""
     folder = Path(events.__file__).parent
     source = "\n".join((folder / f"{name}.py").read_text() for name in FILES)
-    ours = r"from adapters\.event_driven\.\w+ import (\([^)]*\)|.*)"
+    ours = r"from crosscheck2d\.adapters\.event_driven\.\w+ import (\([^)]*\)|.*)"
     source = re.sub(rf"from __future__.*|@kernel|@inlined_early|@inlined|{ours}", "", source)
     assert right in source
     names: dict = {"__name__": "plain"}

@@ -1,4 +1,4 @@
-"""A law of `crosscheck2d.reports.compare.laws` is worked out once for the same objects, and forgotten with
+"""A law of `reports/compare/laws.py` is worked out once for the same objects, and forgotten with
 them."""
 
 import gc

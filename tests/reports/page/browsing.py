@@ -78,7 +78,7 @@ def belongs(asked: str, url: str) -> bool:
     it."""
     host = urlsplit(url).hostname
     if host is None:
-        return asked.startswith(("data:", "blob:")) or asked.split("#")[0] == url
+        return asked.startswith(("data:", "blob:")) or asked.split("#")[0] == url.split("#")[0]
     return urlsplit(asked).hostname == host
 
 

@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page, TimeoutError
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.page.charts import CHARTS, Drawing, packed_charts
+from crosscheck2d.reports.page.replay import GRID
 from crosscheck2d.reports.page.report import write_page
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.figures import check_figures
@@ -123,7 +124,7 @@ def test_the_replay_shows_the_trajectory(
         run = next(r for r in comparison.runs if r.name == engine and r.dt == comparison.middle_dt)
         assert run.trajectory is not None
         expected = run.trajectory.position[rows]
-        half_step = np.ptp(expected, axis=(0, 1)) / 65535 / 2
+        half_step = np.ptp(expected, axis=(0, 1)) / GRID / 2
         # A static disk's coordinate may span nothing; the float64 sum of low and step then rounds
         # by itself.
         assert (np.abs(np.array(positions) - expected) <= half_step * (1 + 1e-6) + 1e-12).all()

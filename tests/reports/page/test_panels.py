@@ -22,6 +22,7 @@ from crosscheck2d.reports.page import overview, panels
 from crosscheck2d.reports.page.cost_points import NO_CLOCK, RunTimes
 from crosscheck2d.reports.page.overview import OverviewCell
 from crosscheck2d.reports.page.panels import drawn_of, numbers_of
+from crosscheck2d.reports.page.replay import GRID
 from crosscheck2d.reports.run.timing import noise_of
 from crosscheck2d.reports.run.timing_pass import COLUMNS
 from crosscheck2d.scenarios.catalogue import scenario
@@ -252,7 +253,7 @@ def followed(page: Page, comparison: Comparison, engine: str, shown_of: str) -> 
     moved = run.trajectory.position[rows][:, drawn.disks[0]]
     expected = moved[:, 0] if drawn.axes == "x" else moved[:, 1]
     # a step of the grid that positions are packed on
-    grid = np.ptp(run.trajectory.position) / 65535
+    grid = np.ptp(run.trajectory.position) / GRID
     return found["drawn"] == found["line"] and bool(
         np.abs(np.array(found["track"])[:, 1] - expected).max() <= grid
     )

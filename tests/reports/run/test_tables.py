@@ -217,7 +217,7 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
     }
 
     assert JUDGE_SOURCE[0].startswith("reports/compare/")
-    assert {name for name in imported if name.startswith("reports")} <= {
+    assert {name for name in imported if name.startswith("crosscheck2d.reports")} <= {
         "crosscheck2d.reports.compare",
         *(f"crosscheck2d.reports.compare.{path.stem}" for path in folder.rglob("*.py")),
     }

@@ -15,6 +15,7 @@ from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
+from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck, forked, process
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
@@ -45,8 +46,9 @@ def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_help_loads_no_number_library():
     """`--help` answers at once because nothing heavy is imported for it."""
     code = (
-        "import sys, crosscheck2d.reports.cli\nfrom typer.testing import CliRunner\nassert"
-        " CliRunner().invoke(crosscheck2d.reports.cli.app, ['run', '--help']).exit_code == 0\nprint([name for"
+        "import sys; from crosscheck2d.reports.cli import app\n"
+        "from typer.testing import CliRunner\n"
+        "assert CliRunner().invoke(app, ['run', '--help']).exit_code == 0\nprint([name for"
         " name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
     )
 

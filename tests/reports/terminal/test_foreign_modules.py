@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import multiprocessing
+import os
 import shutil
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from typing import Any
 import pytest
 
 from crosscheck2d.adapters import safe_path
-from crosscheck2d.adapters.own_solver.file import read_solver
+from crosscheck2d.adapters.own_solver.file import SolverFailed, read_solver
 from crosscheck2d.adapters.own_solver.process import SolverProcess
 from crosscheck2d.reports.run import pool
 from crosscheck2d.reports.run.cells import Cell
@@ -34,7 +35,8 @@ pytestmark = [
     pytest.mark.slow,  # each starts programs of its own
 ]
 ROOT = Path(__file__).parents[3]
-OURS = ("adapters", "reference_impl", "reports", "scenarios", "tests")
+SOURCE = ("adapters", "reference_impl", "reports", "scenarios")
+OURS = (*SOURCE, "crosscheck2d", "tests")
 LIBRARIES = (
     "Box2D",
     "flint",
@@ -95,7 +97,7 @@ def in_a_worker() -> Any:
 def start_unsafely(connection: Any, folder: str, memory: int) -> Any:
     """A worker as multiprocessing starts one."""
     process = multiprocessing.get_context("spawn").Process(
-        target=pool.serve, args=(connection, folder, memory, ())
+        target=pool.serve, args=(connection, folder, memory, False)
     )
     process.start()
     return process
@@ -132,9 +134,16 @@ def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(
     assert ended.reason.startswith("its worker could not start: exit status 1")
 
 
+def test_the_parts_of_the_package_have_no_names_of_their_own(tmp_path: Path):
+    """For a solver's file `reference_impl` is a module beside it, if there is one."""
+    (tmp_path / "mine.py").write_text("import reference_impl\ndef integrate(sphere, dt): pass\n")
+    with pytest.raises(SolverFailed, match="No module named 'reference_impl'"):
+        SolverProcess(read_solver(tmp_path / "mine.py"))
+
+
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_solver_imports_libraries_and_not_what_lies_beside_it(ran, name: str):
-    """Python's own random is Python's own, numpy is numpy, reference_impl is ours."""
+    """Python's own random is Python's own, numpy is numpy, crosscheck2d is ours."""
     with SolverProcess(read_solver(Path(f"my_{name}"))) as process:
         assert process.functions["collide"]
     assert ran() == ""
@@ -177,7 +186,7 @@ def imported_here() -> frozenset[str]:
     """The modules of Python's that this program imports, but for those that Python itself has
     imported before it."""
     found = set()
-    for path in (path for folder in OURS[:4] for path in (ROOT / folder).rglob("*.py")):
+    for path in (path for folder in SOURCE for path in (ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
@@ -198,7 +207,7 @@ def test_a_pythonpath_with_the_current_folder_runs_nothing_of_it(tmp_path: Path,
     so there."""
     ran = trapped(
         tmp_path / "here",
-        {*imported_here(), "secrets", "numbers", "random", "adapters", "scenarios"},
+        {*imported_here(), "secrets", "numbers", "random", *SOURCE},
     )
     done = subprocess.run(
         [CROSSCHECK, "list", "metrics"],
@@ -242,13 +251,18 @@ def test_a_folder_that_modules_are_installed_in_stays_where_it_was_last(
     assert path == ["/else", str(folder), "/more"]
 
 
-def test_of_the_folder_of_the_program_only_its_packages_are_found():
-    """pyproject.toml beside them is no hindrance, nor a conftest.py; `tests` are found by who is
-    reported of them."""
-    found = safe_path.OwnPackages(safe_path.PACKAGES).find_spec
-    assert all(found(name) is not None for name in OURS[:4])
-    assert [found(name) for name in ("tests", "scipy", "conftest", "random")] == [None] * 4
-    assert safe_path.OwnPackages((safe_path.TESTS,)).find_spec("tests") is not None
+def test_of_the_folder_of_the_program_only_the_package_and_its_tests_are_found():
+    """Its parts have no other name."""
+    find = safe_path.OwnPackages().find_spec
+    assert all(find(name) is not None for name in ("crosscheck2d", "tests"))
+    assert [find(name) for name in (*SOURCE, "scipy", "conftest")] == [None] * 6
+
+
+def test_a_new_process_finds_the_package_where_nothing_is_installed():
+    """Without site-packages, and so without what else finds it in a clone."""
+    words = safe_path.python("import crosscheck2d.adapters; print(crosscheck2d.__file__)")
+    done = subprocess.run([words[0], "-S", *words[1:]], capture_output=True, text=True)
+    assert done.stdout.strip() == str(ROOT / "__init__.py"), done.stderr[-500:]
 
 
 @pytest.fixture(scope="module")
@@ -257,16 +271,19 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
     of them were run."""
     base = tmp_path_factory.mktemp("clone")
     ran = trapped(
-        base / "root",
+        base / "crosscheck2d",
         {"scipy", "yaml", "pyarrow", "cffi", "random", "secrets", "numbers", *LIBRARIES},
     )
-    for name in OURS[:4]:
+    shutil.copy(ROOT / "__init__.py", base / "crosscheck2d")
+    for name in SOURCE:
         shutil.copytree(
-            ROOT / name, base / "root" / name, ignore=shutil.ignore_patterns("__pycache__", "out")
+            ROOT / name,
+            base / "crosscheck2d" / name,
+            ignore=shutil.ignore_patterns("__pycache__", "out"),
         )
     for name, solver in SOLVERS.items():
-        (base / "root" / f"my_{name}").write_text(solver.read_text())
-    return base / "root", ran
+        (base / "crosscheck2d" / f"my_{name}").write_text(solver.read_text())
+    return base / "crosscheck2d", ran
 
 
 @pytest.mark.parametrize(
@@ -302,13 +319,17 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Callable[[], 
 def test_a_module_beside_readme_is_not_run_where_everybody_stands(
     clone: tuple[Path, Callable[[], str]], begin: list[str], words: list[str]
 ):
-    """The root on the path as an editable installation has it, at its end, or before all others, as
-    `-m` does it."""
+    """The root at the end of the path, or before all others, as `-m` does it."""
     root, ran = clone
     at_end = f"import sys; sys.path.append({str(root)!r}); sys.argv[0] = 'crosscheck'; "
     begin = begin if begin[0] == "-m" else [*begin[:2], at_end + begin[2]]
     done = subprocess.run(
-        [sys.executable, *begin, *words], cwd=root, capture_output=True, text=True, timeout=500
+        [sys.executable, *begin, *words],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root.parent)},
+        capture_output=True,
+        text=True,
+        timeout=500,
     )
 
     assert ran() == "", done.stderr
