@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NoReturn
 
 from crosscheck2d.reports.run.diff import FACTOR, ROUNDING, Change, Difference, Timing, difference
-from crosscheck2d.reports.run.store import Damaged
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, FolderTaken, Unusable, refuse, say
 from crosscheck2d.reports.terminal.tables import print_list, print_table
+from crosscheck2d.scenarios.rows import Damaged
 
 SHOWN = 12  # changes, the worst first
 HEADINGS = (

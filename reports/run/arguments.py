@@ -14,12 +14,13 @@ from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_r
 from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
 from crosscheck2d.adapters.own_solver.file import KINDS, NotASolver
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
-from crosscheck2d.reports.run.store import Damaged, Store, reading, writing
+from crosscheck2d.reports.run.store import Store, reading, writing
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import FolderTaken, Unusable, refuse
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.files.scene_file import SceneFileError
+from crosscheck2d.scenarios.rows import Damaged
 
 
 @contextmanager

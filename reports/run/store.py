@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from crosscheck2d.reports.terminal.exits import FolderTaken
 from crosscheck2d.reports.terminal.exits import say as warn
 from crosscheck2d.reports.terminal.foreign_text import encoded, whole
 from crosscheck2d.scenarios.regular import all_of
-from crosscheck2d.scenarios.rows import Damaged, Row, Rows, digest_of
+from crosscheck2d.scenarios.rows import Row, Rows, digest_of
 
 FILE, LOCK = "results.sqlite", ".crosscheck.lock"
 OWN = re.compile(
@@ -276,6 +276,3 @@ def _close_locks() -> None:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_close_locks)
-
-__all__ = ["Damaged", "FolderTaken", "Row", "Store", "place_of", "reading", "writing"]
-Say = Callable[[str], None]

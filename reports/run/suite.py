@@ -22,11 +22,12 @@ from crosscheck2d.reports.run.plan import Means, RunPlan, Task, tasks_of
 from crosscheck2d.reports.run.playing import CellResult, source_and_versions
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.results import Results, sources_of
-from crosscheck2d.reports.run.store import Row, Store
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.run.timing_pass import CellToTime, Pass, cells_to_time
 from crosscheck2d.reports.run.trajectories import from_trail, packed
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.rows import Row
 
 
 class OtherVersions(Exception):

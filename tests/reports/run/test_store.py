@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck2d.reports.run.store import FILE, FolderTaken, reading, writing
+from crosscheck2d.reports.run.store import FILE, reading, writing
+from crosscheck2d.reports.terminal.exits import FolderTaken
 from crosscheck2d.scenarios.rows import Damaged, Rows
 
 COMMAND = "crosscheck test"
