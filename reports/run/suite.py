@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -40,13 +40,16 @@ def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> 
     tasks = dict(tasks_of(plan, scenarios))
     header = plan.header(scenarios, list(tasks)) | {"timing": "", "seconds": nan}
     before = store.rows.get("run", "plan")
-    rows = {task: store.get(task.kind, task.key) for task in tasks}
     store.put("run", "plan", header)
-    ended = {task: row for task, row in rows.items() if row and is_usable(row, means)}
+    store.rows.delete("run", "comparisons")  # those of an earlier plan
+    rows = ((task, store.get(task.kind, task.key)) for task in tasks)
+    ended = {  # without the trajectories, which may be more than the memory holds
+        task: row._replace(blob=b"") for task, row in rows if row and is_usable(row, means)
+    }
     Suite(plan, means, store, scenarios, progress).run(tasks, ended, header)
-    played = len(tasks) > len(ended)
-    # of the command that played, if this one found all rows
-    seconds = progress.seconds if before is None or played else before.value["seconds"]
+    seconds = progress.seconds
+    if before is not None and len(tasks) == len(ended) and not isnan(before.value["seconds"]):
+        seconds = before.value["seconds"]  # of the command that played
     store.put("run", "plan", header | {"seconds": seconds})
     cells = cells_to_time(Results.read(store), plan.engines)
     take_timings(store, cells, plan.timings, means, progress)
