@@ -86,7 +86,7 @@ def crosscheck(*words: object, codes: tuple[int, ...] = (0, 1)) -> int:
 def says(command: str, word: str) -> bool:
     """Whether the help of a command of the measured code has a word, as not all code has."""
     words = [Path(sys.executable).parent / "crosscheck", command, "--help"]
-    return word in subprocess.run(words, check=False, capture_output=True, text=True).stdout
+    return word in subprocess.run(words, check=False, capture_output=True).stdout.decode()
 
 
 def digest(*arrays: Any) -> str:

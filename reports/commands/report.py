@@ -27,7 +27,7 @@ from crosscheck2d.reports.run.arguments import (
     started_where,
 )
 from crosscheck2d.reports.run.plan import Means
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.suite import take_timings
 from crosscheck2d.reports.run.timing_pass import cells_to_time
 from crosscheck2d.reports.terminal.console import Console
@@ -73,7 +73,7 @@ def report_again(
         refuse(["--print: name the scenes to print; the overview is always printed"])
     with opening(out, COMMAND, there=True) as store:
         with keeping(out, lambda: "The rows are kept."), Progress() as progress:
-            results = Results.read(store)
+            results = RunResults.read(store)
             played = sorted({record["scenario"] for record in results.records})
             if missing := [scene for scene in scenes if scene not in played]:
                 refuse(
@@ -88,7 +88,7 @@ def report_again(
         finish(report)
 
 
-def time_again(results: Results, seconds: float, progress: Progress) -> Results:
+def time_again(results: RunResults, seconds: float, progress: Progress) -> RunResults:
     """The results with new times; exits 2 if the engines have changed since they were played."""
     with started_where(results.header["folder"]):
         rows = {name: row_of(name) for name in checked_engines(results.header["engines"])}
@@ -101,7 +101,7 @@ def time_again(results: Results, seconds: float, progress: Progress) -> Results:
             ]
         )
     take_timings(results.store, cells, seconds, Means(1), progress, again=True)
-    return Results.read(results.store)
+    return RunResults.read(results.store)
 
 
 def print_summary(report: Report, page: str) -> None:

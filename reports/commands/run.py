@@ -21,7 +21,7 @@ from crosscheck2d.reports.run.bits import kept_bits, write_bits
 from crosscheck2d.reports.run.cluster import NoScheduler, connect
 from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.pool import LEAST_MEMORY, affordable
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.run.suite import OtherVersions, carry_out
 from crosscheck2d.reports.terminal.counts import counted
@@ -72,7 +72,7 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
         try:
             with keeping(request.out, lambda: what_is_kept(store)), Progress() as progress:
                 carry_out(plan, means, store, progress)
-                results = Results.read(store)
+                results = RunResults.read(store)
                 report = make_report(results, progress.say, LESSONS)
                 if request.bits:
                     write_bits(results)
@@ -107,7 +107,7 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
 def what_is_kept(store: Store) -> str:
     """A sentence on what an interrupted run has left, and how to continue."""
     try:
-        ended = len(Results.read(store).records)
+        ended = len(RunResults.read(store).records)
     except ValueError:
         ended = 0
     if not ended:

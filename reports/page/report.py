@@ -25,7 +25,7 @@ from crosscheck2d.reports.page.own_solvers import Said, with_lines
 from crosscheck2d.reports.page.page_tables import page_tables
 from crosscheck2d.reports.page.panels import MARKED, panels
 from crosscheck2d.reports.page.sections import by_family, sections_of
-from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.tables import comparisons_of, make_tables
 from crosscheck2d.reports.run.timing_pass import TIMINGS, noise_floor
 from crosscheck2d.reports.terminal.counts import counted
@@ -107,7 +107,7 @@ class Report:
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
     """
 
-    results: Results
+    results: RunResults
     comparisons: list[Comparison]
     runs: pd.DataFrame
     findings: list[str]
@@ -117,7 +117,7 @@ class Report:
 
 
 def make_report(
-    results: Results,
+    results: RunResults,
     say: Callable[[str], None],
     lessons: Mapping[str, Any],
     on_paper: Sequence[str] = (),
@@ -188,7 +188,7 @@ def take_times(folder: Path) -> str:
     return shlex.join(["crosscheck", "report", str(folder), "--timings", f"{TIMINGS:g}"])
 
 
-def unfinished(results: Results) -> str:
+def unfinished(results: RunResults) -> str:
     """A sentence for the page of a run that has not ended; "" for one that has."""
     if results.complete:
         return ""

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from crosscheck2d.reports.run.cells import versions
-from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.counts import counted, listed
 from crosscheck2d.reports.terminal.tables import print_list, print_table
@@ -35,7 +35,7 @@ class ChangedBits(NamedTuple):
     other: int
 
 
-def rows_of(results: Results) -> list[dict[str, Any]]:
+def rows_of(results: RunResults) -> list[dict[str, Any]]:
     """A row of the table for each scene and engine of a run, at the middle of the step sizes; none
     for another seed than that of the kept bits, 0, which gives random scenes other starts."""
     steps: dict[str, set[int]] = {}
@@ -115,7 +115,7 @@ BITS = "bits.csv"  # in the folder of a run
 SHOWN = 12  # differences
 
 
-def write_bits(results: Results) -> None:
+def write_bits(results: RunResults) -> None:
     """Write the table of a run to its folder, below the system, architecture and versions, which
     may affect the bits."""
     made_by = {

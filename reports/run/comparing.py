@@ -207,7 +207,11 @@ class SceneTasks:
     @property
     def awaited(self) -> list[str]:
         """The scenes whose exact answer is being computed, or is about to be."""
-        return [self.scenes[task] for task in self.under_way if task[0] == ANSWER]
+        return [
+            scene
+            for task, scene in self.scenes.items()
+            if task[0] == ANSWER and task in self.under_way
+        ]
 
     def task_ended(self, task: Key, result: Any, partly: bool = False) -> Iterator[Task]:
         """Write the result of a task, and return the next task of its scene."""

@@ -17,7 +17,7 @@ from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, rounding_of
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading
 from crosscheck2d.reports.run.tables import joined
 from crosscheck2d.reports.run.timing_pass import is_busy, noise_floor
@@ -121,7 +121,7 @@ def difference(before: Path, after: Path) -> Difference:
         FolderTaken, Unusable, Damaged: a folder cannot be used; says which and what to do.
     """
     with reading(before, COMMAND) as first, reading(after, COMMAND) as second:
-        one, other = Results.read(first), Results.read(second)
+        one, other = RunResults.read(first), RunResults.read(second)
         tables = table_of(one), table_of(other)
         warnings, like = warnings_of(one, other)
         cells = by_name(one), by_name(other)
@@ -151,7 +151,7 @@ def difference(before: Path, after: Path) -> Difference:
     return Difference(warnings, statuses, numbers, same, len(both), timed)
 
 
-def warnings_of(one: Results, other: Results) -> tuple[list[str], bool]:
+def warnings_of(one: RunResults, other: RunResults) -> tuple[list[str], bool]:
     """Warnings about machines, versions and completeness; and whether the machine is the same."""
     before, after = one.header, other.header
     said = [
@@ -183,7 +183,7 @@ def sentence_on_rest(folder: Path, rest: Cells) -> str:
     return f"only in {folder}: {counted(len(rest), 'cell')} of {names[0]}, in {names[1]}"
 
 
-def by_name(results: Results) -> Cells:
+def by_name(results: RunResults) -> Cells:
     """(scenario, `engine:profile` as the table has it, dt in s) -> the record of the cell."""
     return {
         (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
@@ -247,7 +247,7 @@ def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
     }
 
 
-def table_of(results: Results) -> pd.DataFrame:
+def table_of(results: RunResults) -> pd.DataFrame:
     """deviations.csv with all values as text: equal text means equal bits. Raises `Unusable`."""
     table = pd.read_csv(BytesIO(joined(results.tables())), dtype=str, keep_default_na=False)
     if list(table.columns) != list(COLUMNS):
@@ -361,8 +361,8 @@ def ratio(was: float, now: float) -> float:
 
 
 def timings_of(
-    one: Results,
-    other: Results,
+    one: RunResults,
+    other: RunResults,
     before: Cells,
     after: Cells,
 ) -> list[Timing]:

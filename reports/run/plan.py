@@ -36,7 +36,7 @@ class Check(NamedTuple):
     source: str
 
 
-class Task(NamedTuple):
+class RunTask(NamedTuple):
     """A task of a run: its row has the kind and the key; `what` it is of: a cell, an engine or a
     known answer."""
 
@@ -78,7 +78,7 @@ class RunPlan:
             for scene in self.scenes
         }
 
-    def header(self, scenarios: Mapping[str, Scenario], tasks: Sequence[Task]) -> dict[str, Any]:
+    def header(self, scenarios: Mapping[str, Scenario], tasks: Sequence[RunTask]) -> dict[str, Any]:
         """The plan as a row, with the keys of its tasks and what makes each scenario again."""
         lists = {name: list(getattr(self, name)) for name in ("scenes", "engines", "dts")}
         values = {name: getattr(self, name) for name in ("full", "timings", "trajectories")}
@@ -119,22 +119,25 @@ class Means:
 
 def tasks_of(
     plan: RunPlan, scenarios: Mapping[str, Scenario]
-) -> Iterator[tuple[Task, Callable[[], Any]]]:
+) -> Iterator[tuple[RunTask, Callable[[], Any]]]:
     """Each task of a plan with the picklable function that carries it out; cells in reading
     order."""
     for name, row in plan.engines.items():
-        yield Task("probes", content_key(name, row.source), name), partial(conform_here, name, row)
+        yield (
+            RunTask("probes", content_key(name, row.source), name),
+            partial(conform_here, name, row),
+        )
     checker = source_hash(CHECK_SOURCE)
     for name, check in plan.checks.items():
         key = content_key(name, plan.engines[name].source, checker)
-        yield Task("check", key, name), check
+        yield RunTask("check", key, name), check
     if KNOWN_SCENE in plan.scenes:
         for known in KNOWN_ANSWERS:
-            yield Task("known_answer", content_key(repr(known)), known), known.reproduce
+            yield RunTask("known_answer", content_key(repr(known)), known), known.reproduce
     for scene, scenario in scenarios.items():
         question = replace(scenario, truth=None)  # an engine does not get the exact answer
         hashed = scene_hash(scenario)
         for name in told_apart(plan.engines, scenario.scene):
             for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
-                task = Task("cell", cell.key(hashed, plan.engines[name].source), cell)
+                task = RunTask("cell", cell.key(hashed, plan.engines[name].source), cell)
                 yield task, partial(play_here, cell, plan.engines[name], question)

@@ -341,19 +341,18 @@ def run_all(
     workers: int,
     timeout: float = TIMEOUT,
     memory: int = 0,
-    scheduler: str = "",
+    far: Any = None,
     alone: Collection[Hashable] = frozenset(),
     urgent: deque[Any] | None = None,
 ) -> Generator[tuple[Any, Any | Failure], None, None]:
     """Run picklable tasks, `workers` at once; yield (key, result or `Failure`) as each ends.
 
-    A task may take `timeout` s and `memory` bytes (0: no limit). With the address of a dask
-    `scheduler` the tasks run on its workers, one per thread. Tasks that the caller puts into
-    `urgent` meanwhile start before the others, on this machine. For timings `workers` is 1, so that
-    nothing runs beside them.
+    A task may take `timeout` s and `memory` bytes (0: no limit). With `far`, an open `Cluster`, the
+    tasks run there. Tasks that the caller puts into `urgent` meanwhile start before the others, on
+    this machine. For timings `workers` is 1, so that nothing runs beside them.
 
     Raises:
-        NoScheduler: nothing answers at `scheduler`, or no longer.
+        NoScheduler: the scheduler of the cluster has gone.
     """
     waiting: deque[tuple[Any, Any]] = deque(tasks.items())
     lost = Counter[Hashable]()
@@ -362,11 +361,6 @@ def run_all(
     pool = Pool(affordable(workers), timeout, memory, alone)
     with ExitStack() as stack:
         stack.callback(pool.close_all)
-        far = None
-        if scheduler:
-            from crosscheck2d.reports.run.cluster import Cluster
-
-            far = stack.enter_context(Cluster(scheduler, timeout, memory, alone))
 
         def begin() -> None:
             while True:

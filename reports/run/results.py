@@ -31,7 +31,7 @@ COMMAND = "crosscheck run"
 
 
 @dataclass(frozen=True, eq=False)
-class Results:
+class RunResults:
     """The rows of one run that its present plan uses.
 
     Attributes:
@@ -56,7 +56,7 @@ class Results:
     complete: bool
 
     @staticmethod
-    def read(store: Store) -> Results:
+    def read(store: Store) -> RunResults:
         """Read the rows of a folder; raises `Unusable` if there is no plan."""
         row = store.get("run", "plan")
         if row is None:
@@ -74,7 +74,7 @@ class Results:
                     about = {"cell": key, "scene": what, "seed": header["seed"]}
                     of[kind][-1] = what, row.value | about | {"digest": row.digest}
         timing = store.get("timing", header["timing"])
-        return Results(
+        return RunResults(
             store,
             header,
             [record for _, record in of.get("cell", [])],

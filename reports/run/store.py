@@ -104,11 +104,16 @@ class Store:
 
     def delete_exports(self, folder: str, used: Mapping[str, Any]) -> None:
         """Delete the exports in a folder below this one that are not `used`."""
-        for name in self.rows.keys(EXPORT):
-            if name.startswith(f"{folder}/") and name not in used:
-                if self.is_ours(name):
-                    (self.folder / name).unlink()
-                self.rows.delete(EXPORT, name)
+        names = [name for name in self.rows.keys(EXPORT) if name.startswith(f"{folder}/")]
+        unused = [name for name in names if name not in used]
+        for name in unused:
+            if self.is_ours(name):
+                (self.folder / name).unlink()
+        if not used:
+            with suppress(OSError):  # it is not there, or somebody has put something into it
+                (self.folder / folder).rmdir()
+        for name in unused:
+            self.rows.delete(EXPORT, name)
 
     def refuse_foreign(self, option: str) -> None:
         """Raise `FolderTaken` if the folder holds anything but the rows and their exports."""

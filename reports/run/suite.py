@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from math import isnan, nan
@@ -15,13 +15,14 @@ from typing import Any
 from crosscheck2d.adapters.conformance.conform import not_probed
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.run.cells import Cell, content_key, scene_hash
+from crosscheck2d.reports.run.cluster import Cluster
 from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, SceneTasks
 from crosscheck2d.reports.run.known_answers import KnownAnswer
 from crosscheck2d.reports.run.machine import about
-from crosscheck2d.reports.run.plan import Means, RunPlan, Task, tasks_of
+from crosscheck2d.reports.run.plan import Means, RunPlan, RunTask, tasks_of
 from crosscheck2d.reports.run.playing import CellResult, source_and_versions
 from crosscheck2d.reports.run.pool import Failure, run_all
-from crosscheck2d.reports.run.results import Results, sources_of
+from crosscheck2d.reports.run.results import RunResults, sources_of
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.run.timing_pass import CellToTime, Pass, cells_to_time
 from crosscheck2d.reports.run.trajectories import from_trail, packed
@@ -51,7 +52,7 @@ def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> 
     if before is not None and len(tasks) == len(ended) and not isnan(before.value["seconds"]):
         seconds = before.value["seconds"]  # of the command that played
     store.put("run", "plan", header | {"seconds": seconds})
-    cells = cells_to_time(Results.read(store), plan.engines)
+    cells = cells_to_time(RunResults.read(store), plan.engines)
     take_timings(store, cells, plan.timings, means, progress)
 
 
@@ -78,8 +79,8 @@ class Suite:
 
     def run(
         self,
-        tasks: Mapping[Task, Callable[[], Any]],
-        ended: Mapping[Task, Row],
+        tasks: Mapping[RunTask, Callable[[], Any]],
+        ended: Mapping[RunTask, Row],
         header: Mapping[str, Any],
     ) -> None:
         """Carry out the tasks that have not `ended`, and compare each scene when its cells have."""
@@ -101,10 +102,13 @@ class Suite:
         alone = {task for task in left if self.plan.engines[task.what.engine].leaves_state}
         urgent: deque[Any] = deque([*checks.items(), *scenes.tasks()])
         self.progress.start(len(missing), len(tasks))
-        limits = self.means.timeout, self.means.memory
-        with closing(
-            run_all(played, self.means.workers, *limits, self.means.scheduler, alone, urgent)
-        ) as results:
+        means, limits = self.means, (self.means.timeout, self.means.memory)
+        with ExitStack() as stack:
+            far = Cluster(means.scheduler, *limits, alone) if means.scheduler else None
+            if far is not None:
+                stack.enter_context(far)
+            results = run_all(played, means.workers, *limits, far, alone, urgent)
+            stack.enter_context(closing(results))
             self.show_waiting(scenes)
             for task, result in results:
                 if task[0] in (ANSWER, COMPARED):
@@ -121,7 +125,7 @@ class Suite:
         if len(scenes.records) == sum(map(len, scenes.cells.values())) and scenes.awaited:
             self.progress.say(waiting_for(scenes.awaited))
 
-    def keep(self, task: Task, result: Any) -> None:
+    def keep(self, task: RunTask, result: Any) -> None:
         """Write the row of a task that is not a cell, and show its status."""
         failed = isinstance(result, Failure)
         status, reason = (result.status, result.reason) if failed else ("ok", "")
@@ -151,7 +155,7 @@ class Suite:
         self.store.put(task.kind, task.key, value | {"outside": outside})
         self.progress.done(title, status, reason)
 
-    def keep_cell(self, task: Task, result: CellResult | Failure) -> dict[str, Any]:
+    def keep_cell(self, task: RunTask, result: CellResult | Failure) -> dict[str, Any]:
         """Write the row of a cell and show its status; returns its record."""
         cell: Cell = task.what
         scenario = self.scenarios[cell.scene]

@@ -25,7 +25,7 @@ from crosscheck2d.reports.run.comparing import (
     rows_not_judged,
 )
 from crosscheck2d.reports.run.pool import Failure, run_all
-from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.store import FILE
 from crosscheck2d.reports.run.timing_pass import TABLE, timings
 from crosscheck2d.reports.terminal.exits import Unusable
@@ -54,7 +54,7 @@ class Tables(NamedTuple):
     unjudged: dict[str, str]
 
 
-def make_tables(results: Results, say: Callable[[str], None]) -> Tables:
+def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
     """Write deviations.csv, runs.csv, timings.csv, and the trajectories if they were asked for.
 
     Raises:
@@ -96,7 +96,7 @@ def joined(parts: Sequence[bytes]) -> bytes:
     return encoded(b"".join(rows).decode(errors=PATHS))
 
 
-def export_trajectories(results: Results) -> None:
+def export_trajectories(results: RunResults) -> None:
     """Write the trajectories of the plan, if they were asked for, and delete those of other
     plans."""
     names = {}
@@ -108,7 +108,7 @@ def export_trajectories(results: Results) -> None:
     results.store.delete_exports("trajectories", names)
 
 
-def compare_missing(results: Results, say: Callable[[str], None]) -> SceneTasks:
+def compare_missing(results: RunResults, say: Callable[[str], None]) -> SceneTasks:
     """Compute the answers and compare the scenes that have no row, in worker processes, each within
     its time limit."""
     records = {record["cell"]: record for record in results.records}
@@ -131,7 +131,7 @@ def not_compared(failure: Failure) -> str:
     return f"the comparison could not be made: {failure.status}: {failure.reason}"
 
 
-def not_judged(results: Results, scene: str, failure: Failure) -> Comparison:
+def not_judged(results: RunResults, scene: str, failure: Failure) -> Comparison:
     """What can be shown of a scene whose comparison failed: its runs, with no answer."""
     runs = [results.run(record) for record in results.by_scene[scene]]
     why = not_compared(failure)
@@ -139,7 +139,7 @@ def not_judged(results: Results, scene: str, failure: Failure) -> Comparison:
     return Comparison(scenario, None, runs, rows_not_judged(runs, why, ITSELF))
 
 
-def comparisons_of(results: Results, tables: Tables) -> list[Comparison]:
+def comparisons_of(results: RunResults, tables: Tables) -> list[Comparison]:
     """The comparisons in reading order. Only runs at the middle dt have their trajectories, because
     no others are drawn."""
     comparisons = []

@@ -16,7 +16,7 @@ import pandas as pd
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.pool import allow
-from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.stepping import (
     CALL,
     EMPTY,
@@ -97,7 +97,7 @@ class CellToTime(NamedTuple):
         return replace(scenario, duration=samples * scenario.sample_interval)
 
 
-def cells_to_time(results: Results, engines: Mapping[str, EngineRow]) -> list[CellToTime]:
+def cells_to_time(results: RunResults, engines: Mapping[str, EngineRow]) -> list[CellToTime]:
     """The cells to be timed: those of `timed_scenes` that were played to their end by the present
     source of their engine."""
     played = [record for record in results.records if record["status"] == "ok"]
@@ -208,12 +208,12 @@ def as_played(cell: CellToTime) -> dict[str, Any]:
     return {"timing": cell.key, "copy": 0, "timed_s": until, "cost": cost, "wrapping": [0.0]}
 
 
-def is_busy(results: Results) -> bool:
+def is_busy(results: RunResults) -> bool:
     """Whether other work kept the machine so busy that times are not shown."""
     return noise_floor(results).floor > BUSY
 
 
-def timings(results: Results) -> pd.DataFrame:
+def timings(results: RunResults) -> pd.DataFrame:
     """timings.csv with `COLUMNS`: a row for each timed cell."""
     rows: list[tuple[Any, ...]] = []
     scenarios: dict[str, Scenario] = {}
@@ -244,7 +244,7 @@ def timings(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def binding(results: Results, name: str, scenario: Scenario, substeps: int) -> float:
+def binding(results: RunResults, name: str, scenario: Scenario, substeps: int) -> float:
     """s per simulated second that the steps and calls of an engine take in an empty world; nan if
     that is not known."""
     step, singly = (median_of(results.overheads.get((what, name, ""))) for what in (EMPTY, CALL))
@@ -256,7 +256,7 @@ def median_of(costs: Sequence[float] | None) -> float:
     return float(np.median(costs)) if costs else np.nan
 
 
-def noise_floor(results: Results) -> Noise:
+def noise_floor(results: RunResults) -> Noise:
     """The ratios of the two timings of a cell, over all cells timed twice."""
     pairs = [lines for lines in results.timings.values() if {0, 1} <= lines.keys()]
     return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])

@@ -19,10 +19,10 @@ import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run.cells import Cell, scene_hash
-from crosscheck2d.reports.run.plan import Means, RunPlan, Task
+from crosscheck2d.reports.run.plan import Means, RunPlan, RunTask
 from crosscheck2d.reports.run.playing import play_here
 from crosscheck2d.reports.run.pool import run_all
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.run.suite import Suite, carry_out
 from crosscheck2d.reports.run.tables import make_tables
@@ -69,7 +69,7 @@ def played(
         suite = Suite(plan, Means(workers), store, scenarios, progress)
         for cell, result in run_all(tasks, workers, timeout=3600.0):
             key = cell.key(scene_hash(scenarios[cell.scene]), "")
-            record = suite.keep_cell(Task("cell", key, cell), result)
+            record = suite.keep_cell(RunTask("cell", key, cell), result)
             assert record["status"] == "ok", record["reason"]
             inside += record["seconds"]
     return Cost(perf_counter() - started, inside, sum(processor()) - before)
@@ -188,7 +188,7 @@ def play_many(folder: Path) -> None:
     started = perf_counter()
     with writing(out, COMMAND) as store, Clocked() as progress:
         carry_out(plan, Means(workers=2), store, progress)
-        results = Results.read(store)
+        results = RunResults.read(store)
         make_tables(results, lambda _: None)
     made, inside = perf_counter(), sum(record["seconds"] for record in results.records)
     print(
@@ -202,7 +202,7 @@ def tables_again(folder: Path) -> None:
     """Print how long rows and tables take when all has been compared."""
     started = perf_counter()
     with writing(folder / "out", COMMAND) as store:
-        make_tables(Results.read(store), lambda _: None)
+        make_tables(RunResults.read(store), lambda _: None)
     print(f"  rows and tables again {perf_counter() - started:.2f} s (ceiling 3), {used()}")
 
 

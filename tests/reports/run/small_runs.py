@@ -7,7 +7,7 @@ from pathlib import Path
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import suite
 from crosscheck2d.reports.run.plan import Means, RunPlan
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading, writing
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.rows import Rows
@@ -45,10 +45,10 @@ def make(folder: Path, scene_file: Path, timings: float = 0.0) -> Path:
     return folder
 
 
-def read(folder: Path) -> Results:
+def read(folder: Path) -> RunResults:
     """The results in a folder; the file of its rows is closed, and so no trajectory can be read."""
     with reading(folder, COMMAND) as store:
-        return Results.read(store)
+        return RunResults.read(store)
 
 
 def cells_in(folder: Path) -> int:

@@ -13,7 +13,7 @@ from crosscheck2d.adapters.engines import ENGINES, UNASKED, told_apart
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.run import bits
 from crosscheck2d.reports.run.plan import Means, RunPlan
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.store import reading, writing
 from crosscheck2d.reports.run.suite import carry_out
@@ -48,7 +48,7 @@ def test_the_same_engine_has_the_same_bits_and_another_has_not(made: Path):
     """At the middle step size, as it plays in this process; also where both are right: the last
     place tells them apart."""
     with reading(made, COMMAND) as store:
-        one, other = bits.rows_of(Results.read(store))
+        one, other = bits.rows_of(RunResults.read(store))
     scenario = open_scene(SCENE, 0)
     dt = scenario.dt(scenario.middle_substeps)
     again = play_once(ENGINES["pymunk:matched"].make, "pymunk:matched", scenario, dt).trajectory
@@ -119,7 +119,7 @@ def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_random_scenes_of_another_seed_are_not_compared(made: Path):
     """The kept bits are those of seed 0."""
     with reading(made, COMMAND) as store:
-        results = Results.read(store)
+        results = RunResults.read(store)
         seeded = replace(results, records=[record | {"seed": 1} for record in results.records])
 
         assert len(bits.rows_of(results)) == 2

@@ -19,7 +19,7 @@ from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
 from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
 from crosscheck2d.reports.run.plan import Means, RunPlan
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.run.suite import carry_out
 from crosscheck2d.reports.terminal.exits import Unusable
@@ -42,7 +42,7 @@ def run(folder: Path, workers: int) -> Path:
     """A run of `PLAN`, with its tables."""
     with writing(folder, COMMAND) as store, Progress() as progress:
         carry_out(PLAN, Means(workers), store, progress)
-        make_report(Results.read(store), progress.say, LESSONS)
+        make_report(RunResults.read(store), progress.say, LESSONS)
     return folder
 
 

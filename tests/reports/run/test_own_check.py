@@ -12,7 +12,7 @@ import pytest
 from crosscheck2d.adapters.own_engine.engine import row_of_file
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
-from crosscheck2d.reports.run.plan import Check, Means, RunPlan, Task
+from crosscheck2d.reports.run.plan import Check, Means, RunPlan, RunTask
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND
 from crosscheck2d.reports.run.store import writing
@@ -37,7 +37,7 @@ def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
         progress.start(3, 3)
         suite = Suite(plan, Means(1), store, {}, progress)
         for result in (right, later, Failure("timeout", "was stopped")):
-            suite.keep(Task("check", "key", name), result)
+            suite.keep(RunTask("check", "key", name), result)
             rows.append(store.get("check", "key").value)
 
     assert FAULTY.cause in right.says[0]

@@ -23,7 +23,7 @@ from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.run import suite
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_here
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.check.marked import marks_of
@@ -222,7 +222,7 @@ def meanwhile(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> Non
 def flight(out: Path) -> tuple[list[str], list[bytes]]:
     """The keys of the cells of a run, and the positions that it has of each."""
     with reading(out, COMMAND) as store:
-        results = Results.read(store)
+        results = RunResults.read(store)
         positions = [results.trajectory(record).position for record in results.records]
     return [record["cell"] for record in results.records], [one.tobytes() for one in positions]
 

@@ -16,7 +16,7 @@ from crosscheck2d.reports.run import cells, comparing
 from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
 from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, SceneTasks, no_answer
 from crosscheck2d.reports.run.pool import Failure
-from crosscheck2d.reports.run.results import COMMAND, Results
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store, writing
 from crosscheck2d.reports.run.tables import comparisons_of, make_tables
 from crosscheck2d.scenarios.truth import cache
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of two scenes on two engines, with its tables."""
     folder = make(tmp_path_factory.mktemp("tables") / "out", SCENE)
     with writing(folder, COMMAND) as store:
-        make_tables(Results.read(store), silent)
+        make_tables(RunResults.read(store), silent)
     return folder
 
 
@@ -54,14 +54,14 @@ def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.Mo
     """The tables are put together, and no worker is asked."""
     monkeypatch.setattr(comparing, "compare_scene", None)
     monkeypatch.setattr(comparing, "compute_answer", None)
-    made = make_tables(Results.read(store), silent)
+    made = make_tables(RunResults.read(store), silent)
 
     assert len(made.scene_tables) == len(made.answers) == 2
 
 
 def test_what_is_kept_is_what_is_compared(store: Store):
     """Every bit is the same in what is compared here and now and in what the page is made from."""
-    results = Results.read(store)
+    results = RunResults.read(store)
     made = make_tables(results, silent)
     again = comparisons_of(results, made)
     for (scene, records), comparison in zip(results.by_scene.items(), again):
@@ -80,7 +80,7 @@ def test_tables_that_are_gone_are_made_again_to_the_same_bytes(store: Store):
             store.rows.delete(kind, key)
     for name in ("deviations.csv", "runs.csv"):
         (store.folder / name).unlink()
-    make_tables(Results.read(store), silent)
+    make_tables(RunResults.read(store), silent)
 
     assert deviations(store) == whole
 
@@ -92,7 +92,7 @@ def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     whole, before = deviations(store), {*store.rows.keys(COMPARED)}
     monkeypatch.setattr(comparing, "judge_hash", lambda: "another metric")
     monkeypatch.setattr(comparing, "compare_scene", partial(killed_once, tmp_path / "mark"))
-    make_tables(Results.read(store), silent)
+    make_tables(RunResults.read(store), silent)
 
     assert (tmp_path / "mark").exists()
     assert len({*store.rows.keys(COMPARED)} - before) == 2
@@ -115,7 +115,7 @@ def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended(store: S
     for kind in (ANSWER, COMPARED):
         for key in store.rows.keys(kind):
             store.rows.delete(kind, key)
-    results = Results.read(store)
+    results = RunResults.read(store)
     tasks = SceneTasks(store, results.cells, results.sources, {}, 60.0)
     begun: list[Any] = []
     last = [keys[-1] for keys in results.cells.values()]
@@ -139,7 +139,7 @@ def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     row = store.get("run", "comparisons").value
     store.rows.delete(COMPARED, row["slow_collision"])
     monkeypatch.setattr(comparing, "compare_scene", fails)
-    results = Results.read(store)
+    results = RunResults.read(store)
     made = make_tables(results, silent)
     table = pd.read_csv(store.folder / "deviations.csv")
     failed = table[table.scenario == "slow_collision"]
@@ -164,7 +164,7 @@ def fails(*_: object) -> bytes:
 def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(store: Store):
     """One that was not there in 5 s is not tried again within 5 s; within 6 s it is."""
     whole = deviations(store)
-    results = Results.read(store)
+    results = RunResults.read(store)
     source = results.sources["slow_collision"]
     key = comparing.digest(repr((source.digest, comparing.judge_hash())).encode())
     late = no_answer(Failure("timeout", "stopped after 5 s"), 5.0)
@@ -189,10 +189,10 @@ def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(stor
 
 def test_trajectories_are_exported_when_asked_for(store: Store):
     plan = store.get("run", "plan").value
-    results = Results.read(store)
+    results = RunResults.read(store)
     for asked, names in ((True, {record["cell"] for record in results.records}), (False, set())):
         store.put("run", "plan", plan | {"trajectories": asked})
-        make_tables(Results.read(store), silent)
+        make_tables(RunResults.read(store), silent)
         assert {path.stem for path in store.folder.glob("trajectories/*.npz")} == names
 
 

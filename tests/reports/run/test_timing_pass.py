@@ -10,7 +10,7 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import timing_pass
-from crosscheck2d.reports.run.results import Results
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.stepping import Spent, binding_of
 from crosscheck2d.reports.run.timing import WARM_UP, Timed, interleaved, noise_of
 from crosscheck2d.reports.run.timing_pass import (
@@ -190,13 +190,13 @@ def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
 def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
     """Half of the pairs are off by 12 %: busy; by 8 %: not; no pair: not known, so busy."""
 
-    def with_pairs(*ratios: float) -> Results:
+    def with_pairs(*ratios: float) -> RunResults:
         lines = [
             {"timing": str(k), "copy": copy, "cost": [cost]}
             for k, ratio in enumerate(ratios)
             for copy, cost in enumerate((1.0, ratio))
         ]
-        return Results(None, {}, [], {}, [], {}, {"lines": lines}, True)
+        return RunResults(None, {}, [], {}, [], {}, {"lines": lines}, True)
 
     assert is_busy(with_pairs(0.88, 1.0, 1.12, 1.12))
     assert not is_busy(with_pairs(0.92, 1.0, 1.08, 1.08))
