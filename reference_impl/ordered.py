@@ -22,15 +22,29 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiled import compiled, inlined, kernel, pasted
+from .meetings import (
+    COARSE,
+    DUE,
+    EDGE,
+    EXACT,
+    INDEXED,
+    LEEWAY,
+    NOBODY,
+    ask_all,
+    change,
+    contact,
+    empty_agenda,
+    first_due,
+    first_of_all,
+    path_of,
+)
 from .neighbour_list import (
-    EDGES,
     PAIRS,
     ROUNDING,
     SLACK,
     STRIDE,
     WALLS,
     NeighbourList,
-    account_for,
     build_list,
     empty_list,
     holds,
@@ -42,15 +56,12 @@ from .state import Disks, World
 
 REST = 1 / 16  # of a step
 MOST = 8  # collisions a disk and step, on average
-EXACT, COARSE = 2.0**-40, 2.0**-20  # of radii, speeds and accelerations
-# A disk in a step is held by: nothing; alone; or so many solutions of `settle`. Then, in radii, it
-# may overlap by its leeway, and touches what is in reach.
+# As `LEEWAY` has it, a disk in a step is held alone; by the last solution. It touches what is in
+# reach, in radii.
 ALONE, LAST = 1, 5
-LEEWAY = 0.0, EXACT, EXACT, COARSE, COARSE, inf
 REACH = 0.0, 0.0, 2.0**-30, 2.0**-16, 2.0**-2, inf
 TURNS = 6  # of `press` a contact, at most
 TOGETHER = -1.0  # in place of an impulse: perhaps others touch these two
-NOBODY, EDGE = -1, 1 << 30  # in place of a disk: none, and the edge of the world
 
 
 class Accelerations(NamedTuple):
@@ -72,15 +83,15 @@ def advance(disks: Disks, world: World, dt: float, count: int) -> list:
     pressed = [(0, 0, 0, 0.0) for _ in range(0)]  # (i, j, row of the collision, force in N)
     acceleration, k = accelerations_of(disks, world), 0
     near = empty_list(disks.radius, len(world.walls))
+    agenda = empty_agenda(near)
     while True:
-        k, first = fly_until_meeting(disks, world, acceleration, near, dt, k, count)
+        k = fly_until_meeting(disks, world, acceleration, near, agenda, dt, k, count)
         if k == count:
             break
         if used_up(near):
-            find_near(disks, world, acceleration.now, near, dt, count - k)
-            first = first_meeting(disks, world, acceleration, near, -dt)
-        if first[1] != NOBODY:
-            resolve(disks, world, acceleration, near, dt, k, first, count, collisions, pressed)
+            find_near(disks, world, acceleration, near, agenda, -dt, dt, count - k)
+        if agenda.length[DUE] > 0 or not holds(near):
+            resolve(disks, world, acceleration, near, agenda, dt, k, count, collisions, pressed)
         k += 1
     if world.friction == 0.0:
         turn(disks, acceleration, dt, count)
@@ -106,12 +117,11 @@ def accelerations_of(disks: Disks, world: World) -> Accelerations:
 
 @kernel
 def fly_until_meeting(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near: NeighbourList, dt: float, k: int, count: int
-):
+    disks: Disks, world: World, acceleration, near: NeighbourList, agenda, dt, k: int, count: int
+) -> int:
     """Take steps from step k on until one in which two meet or the list is used up: in that one all
-    have flown, and nothing else was done. Returns it and its `first_meeting`, as far as the list
-    knows."""
-    first = inf, NOBODY, NOBODY
+    have flown, and nothing else was done. Returns it; the agenda has its meetings, unless the list
+    is used up."""
     while k < count:
         fly(disks, acceleration, dt)
         if world.friction > 0.0:
@@ -119,11 +129,11 @@ def fly_until_meeting(  # type: ignore[no-untyped-def]
         take_step(near, acceleration.strongest * dt * dt)
         if used_up(near):
             break
-        first = first_meeting(disks, world, acceleration, near, -dt)
-        if first[1] != NOBODY:
+        ask_all(disks, world, acceleration, near, agenda, -dt)
+        if agenda.length[DUE] > 0:
             break
         k += 1
-    return k, first
+    return k
 
 
 @kernel
@@ -161,11 +171,15 @@ def turn(disks: Disks, acceleration: Accelerations, dt: float, count: int) -> No
 
 @inlined
 def resolve(  # type: ignore[no-untyped-def]
-    disks, world, acceleration, near, dt: float, k: int, first, count: int, collisions, pressed
+    disks, world, acceleration, near, agenda, dt: float, k: int, count: int, collisions, pressed
 ) -> None:
-    """Meeting after meeting, from the first on, of a step in which all have flown to its end."""
-    most, held, any_held = MOST * len(disks.radius), acceleration.held, False
+    """Meeting after meeting of a step in which all have flown to its end."""
+    most, held, any_held, now = MOST * len(disks.radius), acceleration.held, False, -dt
     for c in range(most + 1):
+        if holds(near):
+            first = first_due(disks, world, acceleration, near, agenda, now, dt)
+        else:
+            first = first_of_all(disks, world, acceleration, near, now)
         now, i, j = first
         alone = near.found[PAIRS] + near.found[WALLS] == 1
         if i == NOBODY or (c == most and (alone or world.restitution == 1.0)):
@@ -182,21 +196,32 @@ def resolve(  # type: ignore[no-untyped-def]
                 level = min(1 + max(held[i], held[max(i, j)], ALONE), LAST) if c < most else LAST
                 any_held = True
                 impulse, hold = settle(
-                    disks, world, acceleration, near, first, level, dt, k, collisions, pressed
+                    disks,
+                    world,
+                    acceleration,
+                    near,
+                    agenda,
+                    first,
+                    level,
+                    dt,
+                    k,
+                    collisions,
+                    pressed,
                 )
             if impulse > 0.0:
                 if len(pressed) > 0:
-                    release(disks, world, acceleration, near, i, j, now, dt, collisions, pressed)
+                    release(
+                        disks, world, acceleration, near, agenda, i, j, now, dt, collisions, pressed
+                    )
                 collisions.append((k, i, j, impulse))
                 if hold > 0.0 and not alone:
                     pressed.append((i, j, len(collisions) - 1, hold))
                     held[i], held[max(i, j)] = max(held[i], ALONE), max(held[max(i, j)], ALONE)
-            account_for(near, disks.position, i, way_of(disks, acceleration.now, i, dt))
+            change(disks, near, agenda, i, way_of(disks, acceleration.now, i, dt))
             if j >= 0:
-                account_for(near, disks.position, j, way_of(disks, acceleration.now, j, dt))
+                change(disks, near, agenda, j, way_of(disks, acceleration.now, j, dt))
         if not holds(near):
-            find_near(disks, world, acceleration.now, near, dt, count - k)
-        first = first_meeting(disks, world, acceleration, near, now)
+            find_near(disks, world, acceleration, near, agenda, now, dt, count - k)
     if any_held:
         held[:] = 0
         pressed.clear()
@@ -204,16 +229,20 @@ def resolve(  # type: ignore[no-untyped-def]
 
 @compiled
 def find_near(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near: NeighbourList, dt: float, left: int
+    disks: Disks, world: World, acceleration, near, agenda, now: float, dt: float, left: int
 ) -> None:
-    """Build the list at the end of a step: in the step, each may have been a step away from it."""
+    """Build the list at the end of a step, and put down all meetings from `now` on: in the step,
+    each may have been a step away from its end."""
     longest = 0.0
     for i in range(len(disks.mass)):
         if disks.mass[i] != inf:
-            longest = max(longest, way_of(disks, acceleration, i, dt))
+            longest = max(longest, way_of(disks, acceleration.now, i, dt))
     near.length[STRIDE] = longest
     build_list(near, disks.position, disks.radius, world, left)
     near.length[SLACK] -= longest
+    agenda.length[INDEXED] = 0
+    if holds(near):
+        ask_all(disks, world, acceleration, near, agenda, now)
 
 
 @kernel
@@ -225,88 +254,6 @@ def way_of(disks: Disks, acceleration, i: int, dt: float) -> float:  # type: ign
     return (speed + strength * abs(dt)) * abs(dt) + ROUNDING * max(abs(x[i, 0]), abs(x[i, 1]))
 
 
-@kernel
-def first_meeting(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near: NeighbourList, now: float
-) -> tuple[float, int, int]:
-    """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
-    the edge. Of meetings at the same instant, that of the least i; of a disk, before a wall."""
-    first = inf, NOBODY, NOBODY
-    if holds(near):
-        for p in range(near.found[PAIRS]):
-            i, j = int(near.first[p]), int(near.second[p])
-            first = sooner(first, of_disks(disks, world, acceleration, near, i, j, now), i, j)
-        for b in range(near.found[WALLS]):
-            i, w = int(near.disk[b]), int(near.wall[b])
-            first = sooner(first, of_wall(disks, world, acceleration, near, i, w, now), i, -1 - w)
-        for e in range(near.found[EDGES]):
-            i = int(near.edge[e])
-            first = sooner(first, of_edge(disks, world, i, now), i, EDGE)
-    else:
-        for i in range(len(disks.radius)):
-            for j in range(i + 1, len(disks.radius)):
-                first = sooner(first, of_disks(disks, world, acceleration, near, i, j, now), i, j)
-            for w in range(len(world.walls)):
-                s = of_wall(disks, world, acceleration, near, i, w, now)
-                first = sooner(first, s, i, -1 - w)
-            first = sooner(first, of_edge(disks, world, i, now), i, EDGE)
-    return first
-
-
-@kernel
-def sooner(  # type: ignore[no-untyped-def]
-    first, s: float, i: int, j: int
-):
-    """The earlier of two meetings."""
-    if s < first[0] or (s == first[0] and i < first[1]):
-        return s, i, j
-    return first
-
-
-@kernel
-def of_disks(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near: NeighbourList, i: int, j: int, now: float
-) -> float:
-    """When two disks meet from `now` on, or inf."""
-    x, radius, mass, held = disks.position, disks.radius, disks.mass, acceleration.held
-    # Who met within the step cannot be farther apart at its end than both ways: passing through is
-    # seen, too.
-    dx, dy = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1]
-    reach = radius[i] + radius[j] + 2.0 * near.length[STRIDE]
-    if dx * dx + dy * dy < reach * reach and not (mass[i] == inf and mass[j] == inf):
-        level = min(held[i if mass[i] != inf else j], held[j if mass[j] != inf else i])
-        return meeting(path_of(disks, world, acceleration.now, i, j), now, LEEWAY[level])
-    return inf
-
-
-@kernel
-def of_wall(  # type: ignore[no-untyped-def]
-    disks: Disks, world: World, acceleration, near: NeighbourList, i: int, w: int, now: float
-) -> float:
-    """When a disk meets a wall from `now` on, or inf."""
-    x, walls, reach = disks.position, world.walls, disks.radius[i] + near.length[STRIDE]
-    left, right = min(walls[w, 0, 0], walls[w, 1, 0]), max(walls[w, 0, 0], walls[w, 1, 0])
-    low, high = min(walls[w, 0, 1], walls[w, 1, 1]), max(walls[w, 0, 1], walls[w, 1, 1])
-    beside = left - reach < x[i, 0] < right + reach and low - reach < x[i, 1] < high + reach
-    if beside and disks.mass[i] != inf:
-        path = path_of(disks, world, acceleration.now, i, -1 - w)
-        return meeting(path, now, LEEWAY[acceleration.held[i]])
-    return inf
-
-
-@kernel
-def of_edge(disks: Disks, world: World, i: int, now: float) -> float:
-    """When the centre of a disk leaves the box from `now` on, or inf."""
-    first, x = inf, disks.position
-    if disks.mass[i] == inf:
-        return inf
-    for axis in range(2):
-        beyond = max(world.low[axis] - x[i, axis], x[i, axis] - world.high[axis])
-        if beyond > 0.0:
-            first = min(first, max(now, -beyond / abs(disks.velocity[i, axis])))
-    return first
-
-
 @compiled
 def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[no-untyped-def]
     """Move disk i as `fly` does, and keep what rounding cuts off."""
@@ -316,37 +263,9 @@ def move(x, remainder, i: int, axis: int, way: float) -> None:  # type: ignore[n
 
 
 @kernel
-def path_of(disks: Disks, world: World, acceleration, i: int, j: int):  # type: ignore[no-untyped-def]
-    """How disk i moves as seen from disk j, or from the start of wall w = -1 - j: place, velocity,
-    acceleration; the wall, which a disk has without length; and the reach."""
-    x, v, a, walls, w = disks.position, disks.velocity, acceleration, world.walls, -1 - j
-    if j >= 0:
-        px, py, pu, pv = x[i, 0] - x[j, 0], x[i, 1] - x[j, 1], v[i, 0] - v[j, 0], v[i, 1] - v[j, 1]
-        pa, pb = a[i, 0] - a[j, 0], a[i, 1] - a[j, 1]
-        return px, py, pu, pv, pa, pb, 0.0, 0.0, disks.radius[i] + disks.radius[j]
-    px, py = x[i, 0] - walls[w, 0, 0], x[i, 1] - walls[w, 0, 1]
-    along, up = walls[w, 1, 0] - walls[w, 0, 0], walls[w, 1, 1] - walls[w, 0, 1]
-    return px, py, v[i, 0], v[i, 1], a[i, 0], a[i, 1], along, up, disks.radius[i]
-
-
-@kernel
 def weights(mass, i: int, j: int) -> tuple[float, float]:  # type: ignore[no-untyped-def]
     """1/kg of the two; a wall's is 0."""
     return 1.0 / mass[i], 1.0 / mass[j] if j >= 0 else 0.0
-
-
-@kernel
-def contact(path, s: float) -> tuple[float, float, float, float]:  # type: ignore[no-untyped-def]
-    """At s: the gap in m, how fast it opens in m/s, and the normal, from the nearest point of the
-    other to the disk."""
-    x, y, u, v, a, b, along, up, reach = path
-    px, py = x + (u + a * s / 2) * s, y + (v + b * s / 2) * s
-    if along != 0.0 or up != 0.0:
-        part = min(max((px * along + py * up) / (along * along + up * up), 0.0), 1.0)
-        px, py = px - part * along, py - part * up
-    distance = sqrt(px * px + py * py)
-    nx, ny = (px / distance, py / distance) if distance > 0.0 else (1.0, 0.0)
-    return distance - reach, (u + a * s) * nx + (v + b * s) * ny, nx, ny
 
 
 @compiled
@@ -369,56 +288,6 @@ def lift(path, s: float, nx: float, ny: float) -> float:  # type: ignore[no-unty
     px, py = px - part * along, py - part * up
     distance = sqrt(px * px + py * py)
     return slide * slide / distance if distance > 0.0 else 0.0
-
-
-@compiled
-def meeting(path, since: float, leeway: float) -> float:  # type: ignore[no-untyped-def]
-    """The first s from `since` to 0 at which the gap is closed and closes on, or inf, also where it
-    ends within the leeway."""
-    low, high = since, 0.0
-    closing, opening = contact(path, low)[1] < 0.0, contact(path, high)[1] >= 0.0
-    if opening and not closing:
-        return inf
-    # it turns in between: from closing to opening, or, as a ball thrown up, the other way
-    if opening == closing:
-        turn = halved(path, low, high, closing)
-        low, high = (low, turn) if closing else (turn, high)
-    if contact(path, high)[0] >= -leeway * path[8]:
-        return inf
-    return low if contact(path, low)[0] <= 0.0 else root(path, low, high)
-
-
-@compiled
-def halved(path, low: float, high: float, closing: bool) -> float:  # type: ignore[no-untyped-def]
-    """Where the gap turns, to a 2^-50 of the step: its least or greatest value does not tell the
-    difference."""
-    for _ in range(50):
-        middle = (low + high) / 2
-        if (contact(path, middle)[1] < 0.0) == closing:
-            low = middle
-        else:
-            high = middle
-    return high if closing else low
-
-
-@compiled
-def root(path, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
-    """Where a gap that is open at low and closed at high closes: Newton, halving where that would
-    leave the bracket."""
-    s = high
-    for _ in range(100):
-        gap, rate, _, _ = contact(path, s)
-        if gap > 0.0:
-            low = s
-        else:
-            high = s
-        following = s - gap / rate
-        if not low < following < high:
-            following = (low + high) / 2
-        if following == s or not low < following < high:
-            break
-        s = following
-    return s
 
 
 @compiled
@@ -446,7 +315,9 @@ def collide(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def release(disks, world, acceleration, near, i, j, s: float, dt, collisions, pressed) -> None:  # type: ignore[no-untyped-def]
+def release(  # type: ignore[no-untyped-def]
+    disks, world, acceleration, near, agenda, i, j, s: float, dt, collisions, pressed
+) -> None:
     """From s on, no force holds a contact of disk i or j that a collision has opened."""
     for p in range(len(pressed)):
         a, b, row, hold = pressed[p]
@@ -458,12 +329,12 @@ def release(disks, world, acceleration, near, i, j, s: float, dt, collisions, pr
                 collisions[row] = (k, a, b, impulse + hold * s)
                 pressed[p] = (a, b, row, 0.0)
                 for d in (a, max(a, b)):
-                    account_for(near, disks.position, d, way_of(disks, acceleration.now, d, dt))
+                    change(disks, near, agenda, d, way_of(disks, acceleration.now, d, dt))
 
 
 @compiled
 def settle(  # type: ignore[no-untyped-def]
-    disks, world, acceleration, near, first, level: int, dt: float, k, collisions, pressed
+    disks, world, acceleration, near, agenda, first, level: int, dt: float, k, collisions, pressed
 ) -> tuple[float, float]:
     """All that touch the two that meet first, and each other, at once: the impulses without bounce
     and then the forces, all >= 0, with which no gap of theirs closes before the end of the step.
@@ -506,7 +377,7 @@ def settle(  # type: ignore[no-untyped-def]
         for d in (i, max(i, j)):
             if disks.mass[d] != inf:
                 acceleration.held[d] = level
-                account_for(near, disks.position, d, way_of(disks, acceleration.now, d, dt))
+                change(disks, near, agenda, d, way_of(disks, acceleration.now, d, dt))
     return TOGETHER, 0.0
 
 

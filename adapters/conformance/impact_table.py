@@ -32,7 +32,7 @@ from crosscheck2d.scenarios.model import Array, Scene
 
 KEPT = Path(__file__).with_name("impact_table.csv")
 README = Path(__file__).parents[1] / "README.md"
-BEGIN, END = "<!-- impact table -->\n", "<!-- end of impact table -->"
+MARK = "impact table"
 STEP_SIZES = (DT, 1 / 60)  # s
 COUNT = 32  # readings of a cell
 PHASES = (np.arange(COUNT) + 0.5) / COUNT  # of a step, at which the bodies touch
@@ -292,11 +292,11 @@ def cell(column: str, *spread: float) -> str:
     return middle if least == most else f"{middle} ({least} to {most})"
 
 
-def with_table(text: str, table: pd.DataFrame) -> str:
-    """The text of adapters/README.md with this table."""
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return before + BEGIN + in_markdown(table) + END + after
+def replace_table(text: str, mark: str, table: str) -> str:
+    """The text of adapters/README.md with this table between its marks."""
+    begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
+    before, _, rest = text.partition(begin)
+    return before + begin + table + end + rest.partition(end)[2]
 
 
 def with_anew(engines: Sequence[str]) -> pd.DataFrame:
@@ -313,7 +313,8 @@ def main(*engines: str) -> None:
         sys.exit(f"no engine is called {', '.join(sorted(unknown))}")
     table = with_anew(engines) if engines else table_of(ROWS)
     table.to_csv(KEPT, index=False, float_format="%.10g")
-    README.write_text(with_table(README.read_text(encoding="utf-8"), kept()), encoding="utf-8")
+    page = README.read_text(encoding="utf-8")
+    README.write_text(replace_table(page, MARK, in_markdown(kept())), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from crosscheck2d.adapters.conformance import impact_table
 from crosscheck2d.adapters.conformance.impact_table import (
     COLUMNS,
     COUNT,
+    MARK,
     PHASES,
     RANGE,
     README,
@@ -22,6 +23,7 @@ from crosscheck2d.adapters.conformance.impact_table import (
     in_markdown,
     kept,
     pairs,
+    replace_table,
     rows_of_table,
 )
 from crosscheck2d.adapters.conformance.probe import DT
@@ -159,10 +161,10 @@ def test_one_engine_is_asked_and_the_rows_of_the_others_are_kept(monkeypatch):
 
 def test_the_table_takes_its_place_and_leaves_the_rest_of_a_text():
     """However often it is written."""
-    text = f"before\n{impact_table.BEGIN}old\n{impact_table.END}\nafter\n"
-    once = impact_table.with_table(text, kept())
-    assert once == f"before\n{impact_table.BEGIN}{in_markdown(kept())}{impact_table.END}\nafter\n"
-    assert impact_table.with_table(once, kept()) == once
+    begin, end = "<!-- impact table -->\n", "<!-- end of impact table -->\nafter\n"
+    once = replace_table(f"before\n{begin}old\n{end}", MARK, "new\n")
+    assert once == f"before\n{begin}new\n{end}"
+    assert replace_table(once, MARK, "new\n") == once
 
 
 # The readings of an engine that is exact, and of one whose cause is known.
