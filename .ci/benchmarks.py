@@ -14,6 +14,7 @@ import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.speed import figures, sizes
+from crosscheck2d.reports.speed.page import write_picture
 from crosscheck2d.reports.speed.tables import summed_up
 
 OUT = Path("reports/out/speed")
@@ -22,16 +23,14 @@ ROUNDS, BUDGET, PATIENCE = 25, 1.0, 10.0
 
 
 def make() -> None:
-    """Measure all, keep the figures, take the picture."""
+    """Measure all, keep the figures, draw the picture."""
     crosscheck = Path(sys.executable).parent / "crosscheck"
     subprocess.run([crosscheck, "speed", "--full", "--resume", "--out", OUT], check=True)
     figures.keep(OUT)
-    subprocess.run(
-        [sys.executable, Path(__file__).parent / "picture.py", OUT / "speed.html"], check=True
-    )
-    kept = ", ".join(str(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED))
+    write_picture(figures.PICTURE, figures.read())
+    paths = (figures.KEPT, figures.ORDERS, figures.EXPLAINED, figures.PICTURE)
     print(
-        f"kept: {kept}, reports/speed/speed.png; what README.md says: python -m"
+        f"kept: {', '.join(map(str, paths))}; what README.md says: python -m"
         " tests.reports.speed.statements"
     )
 

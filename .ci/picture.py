@@ -1,11 +1,12 @@
-"""Takes the README's pictures: the chart of a page, the game, a lesson.
+"""Takes the README's pictures.
 
-uv run python .ci/picture.py reports/out/speed/speed.html | game | lesson
+uv run python .ci/picture.py game | lesson | PAGE.html PICTURE.png
 """
 
 import sys
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Browser, Page
 
 sys.path.insert(0, str(Path(__file__).parent.parent))  # the tests are not installed
@@ -15,9 +16,6 @@ from crosscheck2d.reports.game.command import FIRST
 from crosscheck2d.reports.game.server import Game
 from tests.reports.page.browsing import chromium, served
 
-LEGEND = """() => Plotly.relayout(document.querySelector('#pooled .plot'), {
-  showlegend: true, legend: { x: 1.02, y: 1, itemwidth: 40 },
-  'margin.r': 230, 'font.size': 13, autosize: true })"""
 REPORTS = Path(__file__).parent.parent / "reports"
 PAD = 14  # pixels, so that nothing touches the edge
 STEER = """async ([key, down, frames]) => {
@@ -36,19 +34,6 @@ FLIGHT = [
     ("w", True, 150),
     ("a", True, 30),
 ]
-
-
-def pooled_chart(browser: Browser, page: str) -> None:
-    """The pooled chart of error against cost, as wide as a README, with its legend in it."""
-    tab = browser.new_page(viewport={"width": 980, "height": 1400}, device_scale_factor=2)
-    tab.goto(Path(page).resolve().as_uri())
-    tab.add_style_tag(
-        content="#index,fieldset.legend,#pooled figcaption,.saves{display:none!important}"
-    )
-    tab.add_style_tag(content=".stage{grid-template-columns:1fr!important}")
-    tab.locator("#pooled .chart .main-svg").first.wait_for()
-    tab.evaluate(LEGEND)
-    clip(tab, "speed/speed.png", "#pooled .plot", "#pooled .plot")
 
 
 def game(browser: Browser, url: str) -> None:
@@ -87,15 +72,24 @@ def clip(tab: Page, name: str, first: str, last: str) -> None:
     tab.screenshot(path=REPORTS / name, clip=box, full_page=True)
 
 
-def main(what: str) -> None:
+def first_screen(browser: Browser, page: str, picture: str) -> None:
+    """The first screen of a page, in 128 colours."""
+    tab = browser.new_page(viewport={"width": 1280, "height": 700})
+    tab.goto(Path(page).resolve().as_uri())
+    tab.wait_for_timeout(1000)
+    tab.screenshot(path=picture)
+    Image.open(picture).convert("RGB").quantize(128).save(picture, optimize=True)
+
+
+def main(what: str, picture: str = "") -> None:
     """One picture."""
-    with chromium() as browser:
-        if what in ("game", "lesson"):
-            with served(application(Game(FIRST))) as url:
-                {"game": game, "lesson": lesson}[what](browser, url)
-        else:
-            pooled_chart(browser, what)
+    if picture:
+        with chromium() as browser:
+            first_screen(browser, what, picture)
+        return
+    with chromium() as browser, served(application(Game(FIRST))) as url:
+        {"game": game, "lesson": lesson}[what](browser, url)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -181,14 +181,6 @@ def report(
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help="The folder of a run, finished or not.")
     ],
-    scenes: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="SCENE", help="With --print: scenes to print with the page."),
-    ] = None,
-    printed: Annotated[
-        bool,
-        typer.Option("--print", help="When the page is printed, add half a page for each SCENE."),
-    ] = False,
     timings: Annotated[
         float | None,
         typer.Option(
@@ -203,7 +195,7 @@ def report(
     """
     from crosscheck2d.reports.commands.report import report_again
 
-    report_again(out, scenes or [], printed, timings)
+    report_again(out, timings)
 
 
 @app.command()

@@ -50,7 +50,7 @@ LAYERS = {
         "own_solver",
         "javascript own_engine",
         "engines",
-        "mechanisms conformance",
+        "mechanisms conformance snippets",
     ],
     "reports": [
         "terminal compare",
@@ -58,7 +58,7 @@ LAYERS = {
         "page",
         "check speed stability game tune",
         "lessons",
-        "commands",
+        "commands notebook",
         "cli",
         "__main__",
     ],

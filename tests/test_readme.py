@@ -6,9 +6,12 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+import crosscheck2d
 from crosscheck2d.adapters.conformance.conform import PROBES
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.lessons.catalogue import LESSONS
@@ -159,17 +162,24 @@ def test_the_three_commands_for_many_machines_play_a_run(tmp_path: Path):
     assert (tmp_path / "many" / "report.html").exists()
 
 
-def test_the_python_blocks_run_one_after_the_other(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """They share their names, as in one session."""
+def test_the_python_blocks_run_on_the_scene_beside_them(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """They use the package alone; what they end with is a table of numbers; the disks do meet."""
     monkeypatch.chdir(folder)
-    names: dict[str, object] = {}
-
     blocks = [
         block for text in TEXTS.values() for kind, block in blocks_of(text) if kind == "python"
     ]
     assert blocks
     for block in blocks:
-        exec(block, names)
+        *lines, last = block.strip().splitlines()
+        assert {line for line in lines if "import" in line} == {"import crosscheck2d"}
+        names: dict[str, Any] = {}
+        exec("\n".join(lines), names)
+        table = eval(last, names)
+        assert len(table) == 2 * len({*zip(table.engine, table.profile)}) > 2
+        assert np.isfinite(table.value).all()
+        assert (crosscheck2d.truth(names["scene"]).collisions.j >= 0).any()
 
 
 def test_the_readme_counts_as_the_tables_do():

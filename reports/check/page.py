@@ -4,21 +4,32 @@ file's motion beside the right one."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
+
+import pandas as pd
 
 from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.check.evidence import lines_and_formula
 from crosscheck2d.reports.check.marks import Marked
-from crosscheck2d.reports.check.rows import TASKS, Verdict, shown
+from crosscheck2d.reports.check.rows import TASKS, CheckRow, Verdict, shown
 from crosscheck2d.reports.check.scene_words import faults_of, scene_lines, together
 from crosscheck2d.reports.check.smallest_scene import DT, Smallest
 from crosscheck2d.reports.check.terminal import points_of
 from crosscheck2d.reports.check.verdict import FileCheck, Tally
 from crosscheck2d.reports.page import style
-from crosscheck2d.reports.page.documents import ENGINE, render
+from crosscheck2d.reports.page.kit import (
+    Page,
+    Playback,
+    Section,
+    Table,
+    TableCell,
+    Text,
+    render_page,
+)
+from crosscheck2d.reports.page.own_solvers import sourced
 from crosscheck2d.reports.page.replay import pack_layers, ratio_of
 from crosscheck2d.reports.run.made import sealed
+from crosscheck2d.reports.terminal.counts import listed
 from crosscheck2d.reports.terminal.foreign_text import put_text
 from crosscheck2d.scenarios.model import Trajectory
 
@@ -43,72 +54,125 @@ GROUPS: dict[Verdict, tuple[str, str]] = {
     "right": ("Right", "Asked, and as expected."),
     "not asked": ("Not asked", "These could not be asked; each row says why."),
 }
-SCRIPTS = (*ENGINE, "check/check.js")
 SPEEDS = (0.1, 0.25, 0.5, 1)  # of a replay, simulated seconds in a second
 WATCHED = 4.0  # s, long enough to see a collision
-
-
-class SceneShown(NamedTuple):
-    """A smallest scene on the page: in words, and as a replay with its layers and first speed."""
-
-    smallest: Smallest
-    title: str
-    lines: list[str]
-    layers: list[str]
-    replay: str
-    ratio: float
-    speed: float
 
 
 def write_page(path: Path, marked: Marked) -> None:
     """Write the page of one file, with the smallest scenes that show its faults, to `path`,
     overwriting what is there."""
-    check, scenes = marked.check, marked.scenes
-    shows = [scene_shown(check.path.name, smallest) for smallest in scenes]
-    names = dict.fromkeys(name for one in shows for name in one.layers)
-    looks = {name: style.look(name) if name == style.TRUTH else YOURS for name in names}
-    html = render(
-        "check/check.html.j2",
-        generator=GENERATOR,
-        scripts=SCRIPTS if shows else (),
-        styles=["check/check.css"],
-        looks=looks,
-        name=check.path.name,
-        check=check,
-        points={mark.task: points_of(mark) for mark in marked.tasks},
-        total=marked.total,
-        tasks=TASKS,
-        groups=GROUPS,
-        counted=Tally._fields,
-        shows=shows,
-        together=together,
-        unseen=unseen(check, scenes),
-        speeds=SPEEDS,
-        dt=shown(DT),
-        version=version("crosscheck2d"),
-        digest="" if check.solver is None else check.solver.digest,
+    check, name = marked.check, marked.check.path.name
+    sections = [findings_section(marked)]
+    sections += [scene_section(name, k, one) for k, one in enumerate(marked.scenes, 1)]
+    if not check.passed and (hidden := unseen(check, marked.scenes)):
+        sections.append(Section("", no_scene(check, hidden)))
+    for verdict, (title, about) in GROUPS.items():
+        if rows := [row for row in check.rows if row.verdict == verdict]:
+            folded = verdict in ("right", "not asked")
+            table = rows_table(check, rows)
+            sections.append(Section(title, about, [table], folded, css=verdict))
+    if check.faults:
+        sources = dict.fromkeys(row.read for row in check.faults)
+        sections.append(Section("", f"To read: {'; '.join(sources)}."))
+    layers = {layer for one in marked.scenes for layer in layer_names(name, one)}
+    digest = "" if check.solver is None else f"; sha256 of the file {check.solver.digest}"
+    page = Page(
+        f"{name}: {'no fault found' if check.passed else 'what is wrong, and where'}",
+        sections,
+        GENERATOR,
+        looks={layer: style.look(layer) if layer == style.TRUTH else YOURS for layer in layers},
+        footer=f"Made by crosscheck check {name}{digest}.",
     )
-    put_text(path, sealed(html))
+    put_text(path, sealed(render_page(page)))
+
+
+def findings_section(marked: Marked) -> Section:
+    """What is wrong, with the lines and the formula; then the verdict on each task."""
+    check = marked.check
+    lines = [lines_and_formula(row) for row in check.findings]
+    lines += [[]] * (len(check.sentences) - len(lines))
+    items = [sourced(sentence, of) for sentence, of in zip(check.sentences, lines)]
+    points = {mark.task: points_of(mark) for mark in marked.tasks}
+    rows = {
+        TASKS[task]: [
+            TableCell(word := check.word(task), css=f"status {word.replace(' ', '-')}"),
+            points.get(task, ""),
+            *(count or "" for count in check.tally(task)),
+        ]
+        for task in check.tasks
+    }
+    heads = ["verdict", "points", *Tally._fields]
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=heads, dtype=object)
+    return Section(
+        "",
+        "",
+        [
+            Text([] if len(items) > 1 else items, items if len(items) > 1 else [], ordered=True),
+            *([Text([check.shared])] if check.shared else []),
+            Table(frame, css="plain tasks", corner="task"),
+            Text([marked.total]),
+        ],
+        id="findings",
+    )
+
+
+def scene_section(name: str, number: int, smallest: Smallest) -> Section:
+    """A smallest scene: what it shows, as a replay and in words."""
+    scenario, layers = smallest.scenario, layers_of(name, smallest)
+    labels = {layer: "yours" for layer in layer_names(name, smallest)}
+    labels[style.TRUTH] = smallest.right_is
+    fault = f"{smallest.fault[0].upper()}{smallest.fault[1:]}."
+    facts = [f"Sphere {k}: {line}" for k, line in enumerate(scene_lines(scenario))]
+    facts.append(
+        f"Steps of {shown(DT)} s; e = {style.number(scenario.scene.restitution)}. A program"
+        " searched for it and reduced it to as few spheres and as small numbers as still"
+        " show the fault."
+    )
+    replay = Playback(
+        pack_layers(scenario, layers, more={"labels": labels}),
+        ratio_of(scenario, layers),
+        f"Replay of scene {number}",
+        "Rings spread where a collision is. A spoke is the angle. An arrow at the edge: a sphere"
+        " has left the picture, and is so far beyond the edge.",
+        SPEEDS,
+        speed_of(scenario.duration),
+    )
+    together_words = f" {together(smallest)}" if len(smallest.of) > 1 else ""
+    title = f"The smallest scene that shows {faults_of(smallest)}"
+    return Section(title, fault + together_words, [replay, Text(items=facts)], css="scene")
+
+
+def no_scene(check: FileCheck, hidden: Sequence[int]) -> str:
+    """Why no scene shows these faults."""
+    plural = "s" if len(hidden) > 1 else ""
+    if check.restitution is None:
+        return f"No scene was played with this file. The rows below show the fault{plural}."
+    numbers = listed([str(number) for number in hidden])
+    return (
+        f"No scene of up to three spheres was found that shows fault{plural} {numbers}: the rows"
+        " below do."
+    )
+
+
+def rows_table(check: FileCheck, rows: Sequence[CheckRow]) -> Table:
+    """The questions with one verdict."""
+    cells = []
+    for row in rows:
+        number = check.number_of(row)
+        cause = f"→ fault {number}" if number else f"→ {row.cause}" if row.cause else ""
+        lines = lines_and_formula(row) if row.verdict == "fault" and not number else []
+        asked = sourced(row.asked, lines)
+        notes = (TableCell(cause),) if cause else ()
+        cells.append([row.task, TableCell(asked, notes=notes), row.got, row.expected])
+    heads = ["task", "question", "got", "expected"]
+    frame = pd.DataFrame(cells, [row.name for row in rows], heads, dtype=object)
+    return Table(frame, css="text stack rows", corner="row")
 
 
 def unseen(check: FileCheck, scenes: Sequence[Smallest]) -> list[int]:
     """The numbers of the faults that no scene shows."""
     seen = {k for one in scenes for k in one.of}
     return [k for k in range(1, len(check.findings) + 1) if k not in seen]
-
-
-def scene_shown(name: str, smallest: Smallest) -> SceneShown:
-    """A scene for the page of the file of this name."""
-    scenario, layers = smallest.scenario, layers_of(name, smallest)
-    return SceneShown(
-        smallest,
-        f"The smallest scene that shows {faults_of(smallest)}",
-        scene_lines(scenario),
-        [style.TRUTH if run is None else run.name for run, _ in layers],
-        pack_layers(scenario, layers),
-        ratio_of(scenario, layers),
-        speed_of(scenario.duration),
-    )
 
 
 def speed_of(duration: float) -> float:
@@ -125,3 +189,8 @@ def layers_of(name: str, smallest: Smallest) -> list[tuple[Run | None, Trajector
         [] if smallest.right is None else [(None, smallest.right)]
     )
     return [(yours, smallest.yours), *right]
+
+
+def layer_names(name: str, smallest: Smallest) -> list[str]:
+    """The names of these layers."""
+    return [style.TRUTH if run is None else run.name for run, _ in layers_of(name, smallest)]

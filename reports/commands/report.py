@@ -1,11 +1,11 @@
-"""`crosscheck report OUT`, and the end of every run: tables and page from the journal, summary,
+"""`crosscheck report OUT`, and the end of every run: tables and page from the rows, summary,
 exit status."""
 
 from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -13,13 +13,12 @@ from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.adapters.thrust_grid import off_grid_note
+from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.commands.own_solvers import lines
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.fast_disks import fast_note
-from crosscheck2d.reports.lessons.catalogue import LESSONS
-from crosscheck2d.reports.page import overview
 from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times
-from crosscheck2d.reports.page.situations import by_friction
+from crosscheck2d.reports.page.scenes import SceneScores
 from crosscheck2d.reports.run.arguments import (
     checked_engines,
     default_engines,
@@ -62,29 +61,15 @@ def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
     return sorted(asked - played)
 
 
-def report_again(
-    out: Path, scenes: Sequence[str], printed: bool, timings: float | None
-) -> NoReturn:
-    """Make tables and page of the run in `out` from its rows; `scenes` are printed with the page.
-    With `timings` its engines are timed again, in at most so many s."""
-    if scenes and not printed:
-        refuse([f"{' '.join(scenes)}: to print scenes with the page, name them after --print"])
-    if printed and not scenes:
-        refuse(["--print: name the scenes to print; the overview is always printed"])
+def report_again(out: Path, timings: float | None) -> NoReturn:
+    """Make tables and page of the run in `out` from its rows; with `timings` its engines are timed
+    again, in at most so many s."""
     with opening(out, COMMAND, there=True) as store:
         with keeping(out, lambda: "The rows are kept."), Progress() as progress:
             results = RunResults.read(store)
-            played = sorted({record["scenario"] for record in results.records})
-            if missing := [scene for scene in scenes if scene not in played]:
-                refuse(
-                    [
-                        f"--print {scene}: not in {out}, which has {', '.join(played)}"
-                        for scene in missing
-                    ]
-                )
             if timings is not None:
                 results = time_again(results, timings, progress)
-            report = make_report(results, progress.say, LESSONS, tuple(dict.fromkeys(scenes)))
+            report = make_report(results, progress.say)
         finish(report)
 
 
@@ -108,14 +93,17 @@ def print_summary(report: Report, page: str) -> None:
     """Print the medians over the scenarios at their middle step, the findings, and the path of the
     page."""
     console = Console()
-    for comparisons in filter(None, by_friction(report.comparisons)):
-        headings, rows, without = medians(comparisons, report.untrusted)
-        rough = any(each.scenario.scene.friction for each in comparisons)
-        if rows and len(headings) > 1:
-            print_table(console, headings, rows, title_of(len(comparisons), rough))
-        if without:
+    of_kind: dict[bool, list[SceneScores]] = {False: [], True: []}
+    for scene in report.summary.scenes:
+        of_kind[bool(scene.comparison.scenario.scene.friction)].append(scene)
+    for rough, scenes in of_kind.items():
+        headings, rows, without = medians(scenes, report.summary.names, report.untrusted)
+        if rows and scenes:
+            print_table(console, headings, rows, title_of(len(scenes), rough))
+        if without and scenes:
             console.print(f"Without a model of friction: {', '.join(without)}.", highlight=False)
-        console.print()
+        if scenes:
+            console.print()
     print_list(
         console,
         [*report.findings, *own_solvers(report.said), *notes(report), statuses(report)],
@@ -123,34 +111,6 @@ def print_summary(report: Report, page: str) -> None:
     for line in filter(None, (failures(report, Path(page).parent), times(report))):
         console.print(line, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
-
-
-def medians(
-    comparisons: Sequence[Comparison], untrusted: Set[str]
-) -> tuple[list[str], list[list[str]], list[str]]:
-    """The headings and rows of the summary, the last with the numbers of scenes, and the engines
-    without a row because they do not model friction."""
-    found = overview.summary(comparisons, overview.names_of(comparisons), untrusted)
-    columns, shown = overview.with_numbers(found)
-    without = [name for name, cells in found.items() if cells[-1].text == overview.NO_FRICTION]
-    rows = [
-        [name, *(c.text for c in cells)] for name, cells in shown.items() if name not in without
-    ]
-    if rows and len(comparisons) > 1:
-        rows.append(["in scenes", *map(numbers_of_scenes, zip(*shown.values()))])
-    return ["engine", *map(heading, columns)], rows, without
-
-
-def numbers_of_scenes(column: Sequence[overview.OverviewCell]) -> str:
-    """Of how many scenes the medians of a column are: "9", "5–8", or "" if there is none."""
-    counts = sorted({cell.scenes for cell in column if cell.scenes})
-    return "–".join(map(str, dict.fromkeys((*counts[:1], *counts[-1:]))))
-
-
-def heading(column: overview.SummaryColumn) -> str:
-    """The title of a column above its unit, in lines short enough for 80 columns."""
-    title = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
-    return f"{title}\n{column.short}"
 
 
 def own_solvers(said: Mapping[str, list[str]]) -> list[str]:

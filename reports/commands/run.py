@@ -14,7 +14,6 @@ import psutil
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.reports.commands.own_solvers import checks_of
 from crosscheck2d.reports.commands.report import finish
-from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, of_main_job, opening
 from crosscheck2d.reports.run.bits import kept_bits, write_bits
@@ -73,7 +72,7 @@ def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
             with keeping(request.out, lambda: what_is_kept(store)), Progress() as progress:
                 carry_out(plan, means, store, progress)
                 results = RunResults.read(store)
-                report = make_report(results, progress.say, LESSONS)
+                report = make_report(results, progress.say)
                 if request.bits:
                     write_bits(results)
         except (NoScheduler, OtherVersions) as fault:

@@ -80,6 +80,7 @@ class Verdict:
         value, bound: in that unit.
         at: s, the first sample that fails, else that of the value; nan: the whole run.
         disks: those concerned, a wall w as -1 - w; (): all.
+        event: what happens, where that is more than the words of `VERDICTS`.
     """
 
     id: str
@@ -87,6 +88,7 @@ class Verdict:
     bound: float
     at: float = np.nan
     disks: tuple[int, ...] = ()
+    event: str = ""
 
     @property
     def failed(self) -> bool:
@@ -101,7 +103,7 @@ class Verdict:
     @property
     def text(self) -> str:
         """What is said of a run that fails it."""
-        return in_words(self.id, self.value)
+        return self.event or in_words(self.id, self.value)
 
 
 def verdicts(

@@ -46,7 +46,7 @@ def game_page(
         "game/game.html.j2",
         generator="crosscheck play",
         scripts=["game/field.js", "game/game.js"],
-        styles=["game/game.css"],
+        styles=["page/live.css", "game/game.css"],
         looks=looks_of(rows),
         connects=True,
         rows=rows,

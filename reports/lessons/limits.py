@@ -215,8 +215,9 @@ def in_numbers(case: Case, trial: Trial, limit: Limit) -> dict[str, str]:
         limit.engine: f"{in_words(limit, case)}.",
     }
     if limit.verdict != NEVER_FAILS:
-        tested = f" Tested: {limit.tested}." if limit.tested else ""
-        source = f" Source: {limit.source}." if limit.source else ""
+        shown, its_source = (limit.cause.shown, limit.cause.source) if limit.cause else ("", "")
+        tested = f" Tested: {shown}." if shown else ""
+        source = f" Source: {its_source}." if its_source else ""
         facts["Why"] = f"{why(limit)}{tested}{source}"
     return facts
 

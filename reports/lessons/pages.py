@@ -30,7 +30,7 @@ from crosscheck2d.reports.page.style import Look, look
 from crosscheck2d.reports.run.cells import versions
 
 GENERATOR = "crosscheck lesson"
-STYLES = ["lessons/lesson.css"]
+STYLES = ["page/live.css", "lessons/lesson.css"]
 GROUPS = {
     "A solver, piece by piece": "12345",
     "How engines differ": "6",

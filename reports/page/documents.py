@@ -8,25 +8,19 @@ import hashlib
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
-from jinja2.bccache import Bucket
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.terminal.foreign_text import encoded
-from crosscheck2d.scenarios.truth.cache import folder
 
 REPORTS = Path(__file__).parents[1]
 ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
-# replays; charts, drawn when they come into view, printed and saved
-CHARTED = (*ENGINE, "page/page.js", "page/paper.js", "page/scrolling.js")
 
 
 def render(
@@ -36,9 +30,7 @@ def render(
     scripts: Sequence[str] = (),
     styles: Sequence[str] = (),
     looks: Mapping[str, style.Look] = MappingProxyType({}),
-    plotly: bool = False,
     connects: bool = False,
-    sheet: str = "page/page.css",
     **fields: Any,
 ) -> str:
     """The page of `template`, which extends base.html.j2, as text; templates, scripts, styles:
@@ -47,14 +39,12 @@ def render(
     Args:
         generator: the command that makes it; it marks the file as one that may be overwritten.
         looks: name -> how it is drawn; `who` and `swatch` of macros.html.j2 show these names.
-        plotly: whether its charts need the library, which is then included, deflated.
         connects: whether its scripts may connect to the server of the page.
         fields: the other names of the template; a missing one raises `jinja2.UndefinedError`.
     """
     sources = [(REPORTS / script).read_text(encoding="utf-8") for script in scripts]
-    library = [plotly_source()] if plotly else []
-    text = css(sheet) + "".join((REPORTS / each).read_text(encoding="utf-8") for each in styles)
-    policy = content_policy([*library, *sources]) + ("; connect-src 'self'" if connects else "")
+    text = css() + "".join((REPORTS / each).read_text(encoding="utf-8") for each in styles)
+    policy = content_policy(sources) + ("; connect-src 'self'" if connects else "")
     return fragment(
         template,
         generator=generator,
@@ -65,7 +55,6 @@ def render(
             {name: look._asdict() | {"path": look.path} for name, look in looks.items()}
         ),
         scripts=[Markup(source) for source in sources],
-        library="".join(map(deflated, library)),
         **fields,
     )
 
@@ -73,14 +62,6 @@ def render(
 def fragment(template: str, **fields: Any) -> str:
     """A template as text, filled with `fields`: a page, or a part of one."""
     return environment().get_template(template).render(**fields)
-
-
-def plotly_source() -> str:
-    """The whole library; imported here, because importing takes longer than making a page without
-    charts."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
 
 
 @cache
@@ -92,42 +73,18 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
-        bytecode_cache=CompiledTemplates(home) if (home := folder()) else None,
     )
     made.filters["number"] = style.number
     made.filters["for_script"] = for_script
     return made
 
 
-class CompiledTemplates(FileSystemBytecodeCache):
-    """Templates compiled by an earlier process, beside the cached truths. It only saves time: where
-    nothing can be read or written they are compiled again."""
-
-    def __init__(self, home: Path) -> None:
-        # The code made of a template depends on the version of jinja2 and on the options above.
-        made_by = hashlib.sha256(version("jinja2").encode() + Path(__file__).read_bytes())
-        where = home / "templates" / made_by.hexdigest()[:12]
-        with suppress(OSError):
-            where.mkdir(parents=True, exist_ok=True)
-        super().__init__(str(where))
-
-    def load_bytecode(self, bucket: Bucket) -> None:
-        """Look up a compiled template; see the base class."""
-        with suppress(OSError):
-            super().load_bytecode(bucket)
-
-    def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep a compiled template; see the base class."""
-        with suppress(OSError):
-            super().dump_bytecode(bucket)
-
-
-def css(sheet: str = "page/page.css") -> str:
+def css() -> str:
     """The style sheet of all pages with the colours of style.py in front, for light and for
     dark."""
     light, dark = style.css_variables(dark=False), style.css_variables(dark=True)
     return f":root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n" + (
-        REPORTS / sheet
+        REPORTS / "page" / "kit.css"
     ).read_text(encoding="utf-8")
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+ENDS = 0.75  # of the width: labels of lines that all end right of it stand below each other
 INK, SOFT, RULE, PAPER = "#16191d", "#57626e", "#dfe3e0", "#fefefe"
 VARIABLES = {SOFT: "--soft", RULE: "--line", PAPER: "--page"}
 SETTINGS: Any = {
@@ -82,15 +83,16 @@ def draw_lines(
     y_title: str = "",
     logarithmic: str = "xy",
     x_unit: str = "",
+    y_unit: str = "",
 ) -> None:
     """Draw `lines` with their labels; `logarithmic`: "x", "y", "xy" or ""; the ticks of a
-    logarithmic x axis in µs (`x_unit`) are written as µs, ms and s."""
+    logarithmic axis in µs (`x_unit`, `y_unit`) are written as µs, ms and s."""
     for line in lines:
         draw_line(axes, line)
     for axis, is_log in ((axes.xaxis, "x" in logarithmic), (axes.yaxis, "y" in logarithmic)):
         if is_log:
             (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
-            label_decades(axis, x_unit if axis is axes.xaxis else "")
+            label_decades(axis, x_unit if axis is axes.xaxis else y_unit)
     axes.set_xlabel(x_title)
     if y_title:  # across the top: nobody turns the head
         axes.set_title(y_title, loc="left", fontsize=9, color=SOFT)
@@ -155,29 +157,41 @@ def tick_text(value: float, unit: str = "") -> str:
 def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
     """Write each label at an end of its line, where it covers least.
 
-    Where all lines end at the same x, the labels stand below each other at the right, with a thin
-    line from each end.
+    Where all lines end at the right, the labels stand below each other there, with a thin line from
+    each end.
     """
     ends = [finite_ends(line) for line in lines]
     lines = [line for line, end in zip(lines, ends) if end]
     ends = [end for end in ends if end]
     if not lines:
         return
-    figure = axes.figure
-    to_pixels, height = axes.transData.transform, 11.0 * figure.dpi / 72
+    figure: Any = axes.figure
     axes.autoscale_view()
-    if len({end[-1][0] for end in ends}) == 1 and len(lines) > 1:
+    figure.draw_without_rendering()  # settles the layout, in which labels then find their places
+    figure.set_layout_engine("none")
+    height = 11.0 * figure.dpi / 72
+    longest = 0.58 * height * max(len(line.label) for line in lines)
+    left, bottom, width, tall = axes.get_position().bounds
+    right = min(
+        axes.transAxes.inverted().transform(axes.transData.transform(e[-1]))[0] for e in ends
+    )
+    stacked = len(lines) > 1 and right > ENDS
+    room = (longest + 30 if stacked else 0.5 * longest) / figure.bbox.width
+    axes.set_position((left, bottom, width - room, tall))
+    to_pixels = axes.transData.transform
+    if stacked:
         order = sorted(range(len(lines)), key=lambda k: ends[k][-1][1])
         heights = [to_pixels(ends[k][-1])[1] for k in order]
         for k in range(1, len(heights)):
-            heights[k] = max(heights[k], heights[k - 1] + height)
+            heights[k] = max(heights[k], heights[k - 1] + 1.1 * height)
         for k, y in zip(order, heights):
-            offset = (20, (y - to_pixels(ends[k][-1])[1]) * 72 / figure.dpi)
+            x = axes.bbox.x1 + 8 - to_pixels(ends[k][-1])[0]
+            offset = (x * 72 / figure.dpi, (y - to_pixels(ends[k][-1])[1]) * 72 / figure.dpi)
             write_label(axes, lines[k], ends[k][-1], offset, lead=True)
         return
     drawn = [to_pixels(np.array(end)) for end in ends]
     taken = np.vstack([dense(points) for points in drawn])
-    (left, bottom), (right, top) = to_pixels(
+    (left, bottom), (_, top) = to_pixels(
         [(axes.get_xlim()[0], axes.get_ylim()[0]), (axes.get_xlim()[1], axes.get_ylim()[1])]
     )
     for line, end, points in zip(lines, ends, drawn):
@@ -194,12 +208,14 @@ def label_lines(axes: Axes, lines: Sequence[Line]) -> None:
             ):
                 x, y = point[0] + dx, point[1] + dy
                 covers = (
-                    (taken[:, 0] > x - 3)
-                    & (taken[:, 0] < x + width + 3)
+                    (taken[:, 0] > x - 8)
+                    & (taken[:, 0] < x + width + 8)
                     & (taken[:, 1] > y - 3)
                     & (taken[:, 1] < y + height)
                 ).sum()
-                outside = x < left or x + width > right + 60 or y < bottom or y + height > top + 9
+                outside = (
+                    x < left or x + width > figure.bbox.width or y < bottom or y + height > top + 9
+                )
                 choices.append((covers + 99 * outside + 0.01 * len(choices), dx, dy, anchor, x, y))
         _, dx, dy, anchor, x, y = min(choices, key=lambda choice: choice[0])
         write_label(axes, line, anchor, (dx * 72 / figure.dpi, dy * 72 / figure.dpi))
@@ -255,7 +271,8 @@ def svg_of(figure: Figure, label: str, alone: bool = False) -> Markup:
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     used = set(re.findall(r"[#(]#?([\w-]+)[)\"]", text))
     text = re.sub(r' id="([^"]*)"', lambda m: m[0] if m[1] in used else "", text)
-    text = re.sub(r"(\d+\.\d\d)\d+", r"\1", text)
+    # in attributes only: a label 0.003 stays
+    text = re.sub(r'"[^"]*"', lambda m: re.sub(r"(\d+\.\d\d)\d+", r"\1", m[0]), text)
     text = re.sub(r"\n\s*", "\n", text)
     text = text.replace("font: ", "font-family:inherit;font: ") if not alone else text
     text = re.sub(r' width="[\d.]+pt"| height="[\d.]+pt"', "", text, count=2) if not alone else text

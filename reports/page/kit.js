@@ -11,7 +11,7 @@ async function openRow(row, open = row.nextElementSibling?.className !== "opened
     if (!open) shown?.remove();
     return;
   }
-  const cell = Object.assign(make("td", ""), { colSpan: 99 });
+  const cell = Object.assign(make("td", ""), { colSpan: row.closest("table").querySelector("colgroup").children.length });
   row.after(make("tr", "opened", cell));
   if (!window.DecompressionStream) {
     cell.textContent = "This browser cannot unpack the row; any browser since 2023 can.";
@@ -71,8 +71,15 @@ function begin(root) {
 function drawAll() { Object.values(players).forEach((player) => player.draw()); }
 
 darkness.addEventListener("change", drawAll);
-addEventListener("beforeprint", () => { onPaper = true; drawAll(); });
-addEventListener("afterprint", () => { onPaper = false; drawAll(); });
+// On paper: the paths, and the disks at their ends; pictures side by side stay at their first difference.
+function print(begins) {
+  onPaper = begins;
+  for (const player of Object.values(players)) if (!player.pack.panels) player.seek(begins ? player.until : player.time);
+  drawAll();
+}
+
+addEventListener("beforeprint", () => print(true));
+addEventListener("afterprint", () => print(false));
 addEventListener("hashchange", follow);
 begin(document);
 startReplays(document).then(follow);

@@ -41,6 +41,11 @@ class TableCell:
     span: int = 1
 
     @property
+    def plain(self) -> bool:
+        """Whether it is its text alone."""
+        return not (self.link or self.side or self.notes)
+
+    @property
     def text(self) -> str | Markup:
         """The value as text."""
         return self.value if isinstance(self.value, str) else style.number(self.value)
@@ -77,6 +82,11 @@ class Table:
     corner: str = ""
     caption: str = ""
     kind: ClassVar[str] = "table"
+
+    @property
+    def over(self) -> list[tuple[TableCell, int]]:
+        """(heading, number of columns) above the columns."""
+        return [(as_cell(title), columns) for title, columns in self.spans]
 
     @property
     def heads(self) -> list[TableCell]:
@@ -157,12 +167,9 @@ class Code:
     kind: ClassVar[str] = "code"
 
 
-Part = Table | Chart | Playback | Text | Code
-
-
 @dataclass(frozen=True, eq=False)
 class Section:
-    """A title, a sentence, and parts.
+    """A title, a sentence, and parts; a section may be part of another, or of a row that opens.
 
     Attributes:
         folded: whether only the title is shown until it is clicked; the sentence stands beside it.
@@ -176,6 +183,10 @@ class Section:
     folded: bool = False
     id: str = ""
     css: str = ""
+    kind: ClassVar[str] = "section"
+
+
+Part = Table | Chart | Playback | Text | Code | Section
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +219,6 @@ def render_page(page: Page) -> str:
     return render(
         "page/kit.html.j2",
         generator=page.generator,
-        sheet="page/kit.css",
         scripts=SCRIPTS,
         looks={**style.looks_of(page.names), **page.looks},
         page=page,
@@ -223,6 +233,7 @@ def run_section(about: Mapping[str, Any]) -> Section:
         "Seed": about.get("seed", ""),
         "Started": str(about.get("started", ""))[:16].replace("T", " "),
         "Machine": "; ".join(f"{key}: {value}" for key, value in about["machine"].items()),
+        "Engines": "; ".join(about.get("engines", ())),
         "Versions": ", ".join(f"{key} {value}" for key, value in about["versions"].items()),
     }
     facts = {key: str(value) for key, value in facts.items() if value != ""}

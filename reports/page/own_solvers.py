@@ -6,12 +6,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from markupsafe import Markup
+
 
 class Said(NamedTuple):
     """A sentence of the check, and the lines of the file and the exercise's formula behind it."""
 
     sentence: str
     shown: Sequence[str]
+
+
+def sourced(sentence: str, lines: Sequence[str]) -> Markup:
+    """A sentence, and below it the lines of the file and the formula, as `Said` has them."""
+    below = (
+        Markup("<br><small>{} <code>{}</code></small>").format(*line.split(": ", 1))
+        for line in lines
+    )
+    return Markup("{}{}").format(sentence, Markup("").join(below))
 
 
 def with_lines(says: Sequence[str], shown: Sequence[Sequence[str]]) -> list[Said]:

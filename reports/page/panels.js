@@ -106,7 +106,7 @@ class Replay {
     for (const { name, off } of this.panels) {
       const mine = player.positions(name);
       const worst = exact && mine && Math.max(...mine.map((place, disk) => player.distance(place, exact[disk]) / player.pack.radius[disk]));
-      off.textContent = !exact ? "after the exact answer" : !mine ? "ended" : worst < 0.015 ? "within 0.015 radii" : `${short(worst)} radii off`;
+      off.textContent = !exact ? "after the exact answer" : !mine ? "ended" : worst < 0.015 ? "< 0.015 radii off" : `${short(worst)} radii off`;
     }
   }
 }

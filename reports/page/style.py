@@ -1,5 +1,5 @@
-"""How things look: a colour for each engine, a dash and fill for each profile, one ramp for sizes,
-one format for numbers."""
+"""How things look: a colour for each engine, a dash and fill for each profile, one format for
+numbers."""
 
 from __future__ import annotations
 
@@ -37,23 +37,13 @@ class Look(NamedTuple):
     filled: bool
 
     @property
-    def symbol(self) -> str:
-        """The shape as plotly names it."""
-        return self.shape if self.filled else f"{self.shape}-open"
-
-    @property
     def path(self) -> str:
         """The shape as an SVG path."""
         return PATHS[self.shape]
 
-    @property
-    def plotly_dash(self) -> str:
-        """The dash as plotly writes it."""
-        return ",".join(f"{length}px" for length in self.dash) or "solid"
-
 
 OF_TRUTH = Mark("#16191d", "#f4f4f2", "circle")
-# The shapes as SVG paths about the origin, as large as an 8 px mark of plotly, by plotly's names.
+# The shapes as SVG paths about the origin, 8 px large.
 # Those of `PALETTE`, such as the cross, are for rows without a mark and for files, not for a row to
 # choose.
 PATHS = {
@@ -83,34 +73,6 @@ PALETTE = (
     Mark("#7a4a21", "#e0a878", "bowtie"),
 )
 CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
-
-# Small errors fade into the page, large ones stand out: from pale to deep blue on light, from deep
-# to pale on dark.
-HEAT_BOUNDS = (1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
-HEAT_LIGHT = (
-    "#f7f9f3",
-    "#eaf3e3",
-    "#d7ebd9",
-    "#bfe0d3",
-    "#9ccfcd",
-    "#74b9c6",
-    "#4c9bbb",
-    "#2f78a8",
-    "#24558c",
-    "#1d3468",
-)
-HEAT_DARK = (
-    "#191d22",
-    "#1a252e",
-    "#1a303e",
-    "#1a3d50",
-    "#1b4d64",
-    "#1f6078",
-    "#31778b",
-    "#53939b",
-    "#8ab5a9",
-    "#d3ddb8",
-)
 
 
 def look(engine: str, profile: str = "") -> Look:
@@ -170,28 +132,9 @@ def mark_of_file(path: str) -> Mark:
     return next((mark for mark in marks if mark not in taken), marks[0])
 
 
-def heat(value: float) -> int:
-    """The step of the ramp, 0 (smallest) to 9."""
-    return sum(value > bound for bound in HEAT_BOUNDS)
-
-
-def readable_on(colour: str) -> str:
-    """Near-black or white, whichever has more contrast on `colour` (relative luminance of WCAG
-    2)."""
-    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
-    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-    return "#10151b" if luminance > 0.18 else "#ffffff"
-
-
 def css_variables(dark: bool) -> str:
-    """The colours of engines as CSS custom properties, named by the light one, and the ramp as
-    `--heat-k` and `--on-heat-k`."""
-    ramp = HEAT_DARK if dark else HEAT_LIGHT
-    colours = "".join(f"--{mark.light[1:]}:{mark[dark]};" for mark in marks())
-    return colours + "".join(
-        f"--heat-{k}:{c};--on-heat-{k}:{readable_on(c)};" for k, c in enumerate(ramp)
-    )
+    """The colours of engines as CSS custom properties, named by the light one."""
+    return "".join(f"--{mark.light[1:]}:{mark[dark]};" for mark in marks())
 
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck2d.scenarios.catalogue import scenario as from_catalogue
-from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.files.scene_file import read_scene_file, scenario_of
 from crosscheck2d.scenarios.files.tables import MOST_STEPS
 from crosscheck2d.scenarios.model import Scenario
 
@@ -38,7 +39,7 @@ class SceneSource(NamedTuple):
     def scenario(self) -> Scenario:
         """The scenario."""
         if self.text:
-            scenario = read_scene_file(f"{self.name}.toml", self.text.encode())
+            scenario = scenario_of(tomllib.loads(self.text), f"{self.name}.toml")
         else:
             scenario = from_catalogue(self.name, self.seed)
         return replace(scenario, substeps=self.substeps)

@@ -133,7 +133,7 @@ class Pass:
     seed: int
 
     def __call__(self) -> list[dict[str, Any]]:
-        """A line of the journal for each thing timed; none if not even the warm-up fits into the
+        """A line for each thing timed; none if not even the warm-up fits into the
         time."""
         allow(self.seconds + STARTING)
         started = perf_counter()
@@ -190,7 +190,7 @@ def can(timed: Timed) -> bool:
 
 
 def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
-    """The line of the journal for the samples of one key."""
+    """The line for the samples of one key."""
     costs = [sample.cost for sample in samples]
     if key[0] == "timing":
         _, cell, copy, until = key
@@ -201,7 +201,7 @@ def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
 
 
 def as_played(cell: CellToTime) -> dict[str, Any]:
-    """The line of the journal for a cell that is not timed again: its time as played, an upper
+    """The line for a cell that is not timed again: its time as played, an upper
     bound, because collisions were recorded."""
     until = cell.scenario.duration
     cost = [cell.seconds / until]

@@ -1,5 +1,5 @@
-"""`crosscheck advise`: the cheapest engine and step size that keep an error in one scene, and the
-engine options that it does not need."""
+"""`crosscheck advise`: the cheapest engine and step size that keep an error in one scene, until
+when the others keep it, and the engine options that it does not need."""
 
 from __future__ import annotations
 
@@ -7,20 +7,35 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from math import isfinite
+from dataclasses import replace
+from math import isfinite, isnan
 from typing import Any, NoReturn
 
-from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import ENGINES, row_of, told_apart
+from crosscheck2d.adapters.snippets import write_snippet
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, unknown
-from crosscheck2d.reports.speed.advice import BUSY, LOUD, Advice, Attempt, Inquiry, NoAdvice
+from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.speed.advice import (
+    BUSY,
+    LASTING,
+    LOUD,
+    STATISTICS,
+    Advice,
+    Attempt,
+    Inquiry,
+    NoAdvice,
+    reach,
+)
 from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.speed.scored_part import STARTS
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_table, print_texts
 
-SHOWN = 3  # the cheapest and the next two
+SHOWN = 3  # ranks: the cheapest and the next two
+LIBRARIES, OWN_SOLVERS = "libraries", "solvers of this project"
 
 
 def give_advice(
@@ -32,18 +47,20 @@ def give_advice(
         refuse([unknown("purpose", purpose, PURPOSES) + f"; allowed: {', '.join(PURPOSES)}"])
     bound = bound_of(error)
     (checked,) = checked_scenes([scene], [], False, seed)
-    names = checked_engines(engines, ENGINES)
+    rows = {name: row_of(name) for name in checked_engines(engines, ENGINES)}
+    names = told_apart(rows, open_scene(checked, seed).scene)
     with Progress() as progress:
         try:
-            asked = Inquiry(checked, seed, purpose, os.cpu_count() or 1, progress)
-            advice = asked.advice(bound, names)
-        except NoAdvice as why:
-            say(f"{scene}: {why}")
+            inquiry = Inquiry(checked, seed, os.cpu_count() or 1, progress)
+            advice = inquiry.advice(purpose, bound, names)
+        except NoAdvice as reason:
+            say(f"{scene}: {reason}")
             sys.exit(FAILED)
+    snippet = snippet_of(advice, checked, seed)
     if as_json:
-        print(json.dumps(as_plain(advice, purpose, bound), indent=1, allow_nan=False))
+        print(json.dumps(to_json(advice) | {"snippet": snippet}, indent=1, allow_nan=False))
     else:
-        print_advice(advice, purpose, bound)
+        print_advice(advice, snippet)
     sys.exit(DONE if advice.keeping else FAILED)
 
 
@@ -59,20 +76,49 @@ def bound_of(error: str) -> float:
     return bound
 
 
-def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
+def snippet_of(advice: Advice, scene: str, seed: int) -> str:
+    """Code with the settings of the library that is advised first, in the scene itself or, where
+    none is, for its averages; "" if none is."""
+    for one in (advice, advice.statistics):
+        libraries = [each for _, each in one.ranked if each.is_library] if one else []
+        for each in libraries[:1]:
+            return write_snippet(each.name, open_scene(scene, seed).scene, each.dt)
+    return ""
+
+
+def to_json(advice: Advice) -> dict[str, Any]:
     """The advice as JSON values; a number that is not finite is null."""
     return {
         "scenario": advice.scene,
-        "purpose": purpose,
-        "error_at_most": bound,
+        "purpose": advice.purpose,
+        "error_at_most": advice.bound,
         "until_s": advice.until,
         "duration_s": advice.duration,
         "collisions_judged": advice.collisions,
         "dt_s_tried": list(advice.step_sizes),
-        "cheapest_first": [row_of_attempt(one) for one in advice.keeping],
+        "cheapest_first": [
+            row_of_attempt(one)
+            | {
+                "rank": rank,
+                "error_of_nine_tenths": finite(one.usually),
+                "kept_in": one.kept_in(advice.bound),
+                "starts": len(one.starts),
+            }
+            for rank, one in advice.ranked
+        ],
         "not_within": [
-            row_of_attempt(short.best) | {"error_at_finest": finite(short.finest), "why": short.why}
-            for short in advice.short
+            row_of_attempt(row.best)
+            | {
+                "error_at_finest": finite(row.finest),
+                "kept_until_s": finite(row.usual.until),
+                "kept_from_nine_tenths_until_s": finite(row.usual.lasting),
+                "at_dt_s": row.usual.dt,
+                "longest_until_s": finite(row.longest.until),
+                "longest_from_nine_tenths_until_s": finite(row.longest.lasting),
+                "longest_at_dt_s": row.longest.dt,
+                "why": row.why,
+            }
+            for row in advice.short
         ],
         "not_to_the_end": [row_of_attempt(one) | {"why": one.reason} for one in advice.partial],
         "changes": [
@@ -81,12 +127,13 @@ def as_plain(advice: Advice, purpose: str, bound: float) -> dict[str, Any]:
                 "change": change.changed.change,
                 "error_without": finite(change.plain.error),
                 "cost_ratio": finite(change.changed.cost / change.plain.cost),
-                "verdict": change.verdict(bound, advice.floor),
+                "verdict": change.verdict(advice.bound, advice.floor),
             }
             for change in advice.changes
         ],
         "noise": finite(advice.noise),
         "cores_busy": finite(advice.busy),
+        "statistics": to_json(advice.statistics) if advice.statistics else None,
     }
 
 
@@ -94,6 +141,7 @@ def row_of_attempt(one: Attempt) -> dict[str, Any]:
     """An attempt as JSON values."""
     return {
         "engine": one.name,
+        "library": one.is_library,
         "dt_s": one.dt,
         "error": finite(one.error),
         "us_per_simulated_s": finite(one.cost * 1e6),
@@ -105,94 +153,161 @@ def finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def print_advice(advice: Advice, purpose: str, bound: float) -> None:
-    """Print the engines that keep the error, those that do not, the options, and how reliable the
-    times are."""
+def print_advice(advice: Advice, snippet: str = "") -> None:
+    """Print the engines that keep the error, those that do not, the options, how reliable the
+    times are, and the settings of the library that is advised."""
     console = Console()
     console.print(
-        f"{advice.scene}: {PURPOSES[purpose].what}, at most {number(bound)}, {advice.judged}",
+        f"{advice.scene}: {PURPOSES[advice.purpose].what}, at most {number(advice.bound)},"
+        f" {advice.judged}",
         highlight=False,
     )
     console.print()
     if advice.keeping and not advice.quiet:  # before the costs that it concerns
         console.print(f"{sentence_on_times(advice)}\n", highlight=False)
-    if advice.keeping:
-        print_choices(console, advice)
-    else:
-        which = "engine that is right in the whole scene" if advice.partial else "engine"
-        console.print(f"No {which} keeps this error at any step size tried.", style="bold")
+    for group in (LIBRARIES, OWN_SOLVERS):
+        print_group(console, advice, group)
     if advice.partial:
-        console.print()
         print_texts(
             console,
             {one.name: one.reason for one in advice.partial},
             "Not advised: what goes wrong in the whole scene",
         )
+        console.print()
     if advice.short:
+        print_texts(console, {row.best.name: row.why for row in advice.short}, "Why")
         console.print()
-        print_short(console, advice)
     if advice.changes:
-        console.print()
-        print_changes(console, advice, bound)
+        print_changes(console, advice)
     if advice.keeping and advice.quiet:
-        console.print(f"\n{sentence_on_times(advice)}", highlight=False)
+        console.print(f"{sentence_on_times(advice)}\n", highlight=False)
+    if snippet:
+        console.print("The settings that were run:", style="bold")
+        console.print(snippet, highlight=False, markup=False, soft_wrap=True)
 
 
-def print_choices(console: Console, advice: Advice) -> None:
-    """The cheapest and the next two, and the names and costs of the others."""
+def print_group(console: Console, advice: Advice, group: str) -> None:
+    """Print the libraries, or the solvers of this project: those that keep the error, and until
+    when the others do; and where no library does, which do for averages over time."""
+
+    def member(one: Attempt) -> bool:
+        return one.is_library is (group == LIBRARIES)
+
+    ranked = [(rank, one) for rank, one in advice.ranked if member(one)]
+    short = [row for row in advice.short if member(row.best)]
+    partial = any(member(one) for one in advice.partial)
+    if ranked:
+        print_choices(console, advice, ranked, group)
+    elif short or partial:
+        right = " that is right in the whole scene" if partial else ""
+        one = ("library" if group == LIBRARIES else "solver of this project") + right
+        console.print(f"No {one} keeps this error at any step size tried.", style="bold")
+    if short:
+        print_short(console, replace(advice, short=short), group)
+    if ranked or short or partial:
+        console.print()
+    if group == LIBRARIES and advice.statistics is not None:
+        statistics = advice.statistics
+        console.print(
+            f"Averages over time need less: `--for {STATISTICS}` (energies, distance from the"
+            f" start; at most {number(statistics.bound)})",
+            style="bold",
+        )
+        if not statistics.quiet and statistics.keeping:
+            console.print(sentence_on_times(statistics), highlight=False)
+        print_group(console, statistics, LIBRARIES)
+
+
+def print_choices(
+    console: Console, advice: Advice, ranked: Sequence[tuple[int, Attempt]], group: str
+) -> None:
+    """The first `SHOWN` ranks, and the names and costs of the others; no ranks where times cannot
+    be compared."""
+    shown = [(rank, one) for rank, one in ranked if rank <= SHOWN]
     rows = [
-        [one.name, number(one.dt * 1e3), number(one.error), number(one.cost * 1e6)]
-        for one in advice.keeping[:SHOWN]
+        [
+            str(rank) if advice.quiet else "–",
+            one.name,
+            number(one.dt * 1e3),
+            number(one.error),
+            number(one.usually),
+            number(one.cost * 1e6),
+        ]
+        for rank, one in shown
     ]
-    headings = ["engine", "dt, ms", "error", "µs per\nsimulated s"]
-    title = "Cheapest first, in the whole scene"
+    headings = ["", "engine", "dt, ms", "error", "9 of 10\nwithin", "µs per\nsimulated s"]
+    title = f"{group.capitalize()}, cheapest first, in the whole scene"
     if advice.until < advice.duration:
-        title = f"Cheapest first: error {advice.judged}; cost of the whole scene"
+        title = (
+            f"{group.capitalize()}, cheapest first: error {advice.judged}; cost of the whole scene"
+        )
     print_table(console, headings, rows, title)
-    if dearer := advice.keeping[SHOWN:]:
-        names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for one in dearer)
+    console.print(
+        f"9 of 10 within: the error of nine tenths of runs from {STARTS} instants of a step.",
+        highlight=False,
+    )
+    if dearer := ranked[len(shown) :]:
+        names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for _, one in dearer)
         console.print(f"Also within it: {names}.", highlight=False)
 
 
-def print_short(console: Console, advice: Advice) -> None:
-    """Print the engines that do not keep the error. One that keeps it at a coarser step size than
-    the finest does so by chance: a step size counts only if every finer one keeps it, too."""
-    coarse, *_, fine = advice.step_sizes
-    title = f"Not within it at {number(fine * 1e3)} ms, the finest of the step sizes tried"
-    rows = [
-        [
-            best.name,
-            number(finest),
-            number(best.error),
-            number(best.dt * 1e3) if isfinite(best.error) else "–",
+def print_short(console: Console, advice: Advice, group: str) -> None:
+    """Print how near the engines come that do not keep the error; and of one that only grows until
+    when they keep it, at the usual step size of the scene and at the one that keeps it longest."""
+
+    def until(one: Attempt) -> list[str]:
+        return ["–" if isnan(t) else number(t) for t in (one.until, one.lasting)] + [ms(one.dt)]
+
+    def ms(seconds: float) -> str:
+        return number(seconds * 1e3)
+
+    coarse, fine = ms(advice.step_sizes[0]), ms(advice.step_sizes[-1])
+    short = sorted(advice.short, key=lambda row: (-reach(row.longest), row.best.name))
+    headings, title = ["engine"], f"{group.capitalize()} that do not keep it"
+    rows = [[row.best.name] for row in short]
+    if advice.purpose in LASTING:
+        title += f" to {number(advice.until)} s, and until when"
+        until_at = ["until,\ns", "9 of 10\nuntil, s", "at dt,\nms"]
+        headings += [*until_at, f"longest\n{until_at[0]}", *until_at[1:]]
+        rows = [
+            [*row, *until(x.usual), *until(x.longest), number(x.finest)]
+            for row, x in zip(rows, short)
         ]
-        for best, finest, _ in advice.short
-    ]
-    headings = ["engine", f"error at\n{number(fine * 1e3)} ms", "least\nerror", "at dt,\nms"]
+        headings.append(f"error at\n{fine} ms")
+        note = (
+            f"At the usual step size, and at that of {coarse} to {fine} ms which keeps it longest;"
+            f" 9 of 10: nine tenths of runs from {STARTS} instants of a step keep it until then."
+        )
+    else:
+        headings += [f"error at\n{fine} ms", "least\nerror", "at dt,\nms"]
+        rows = [
+            [*row, number(x.finest), number(x.best.error)]
+            + [ms(x.best.dt) if isfinite(x.best.error) else "–"]
+            for row, x in zip(rows, short)
+        ]
+        note = (
+            f"Tried: {coarse} to {fine} ms. A step size counts only if it and every finer one keep"
+            " the error, and it does from nine tenths of the instants of a step."
+        )
     print_table(console, headings, rows, title)
-    console.print(
-        f"Tried: {number(coarse * 1e3)} to {number(fine * 1e3)} ms. A step size counts only if"
-        " every finer one keeps the error, too.",
-        highlight=False,
-    )
-    console.print()
-    print_texts(console, {best.name: why for best, _, why in advice.short}, "Why")
+    console.print(note, highlight=False)
 
 
-def print_changes(console: Console, advice: Advice, bound: float) -> None:
+def print_changes(console: Console, advice: Advice) -> None:
     """Print the effect of each option of the engines that keep the error."""
     what = "this part of the scene" if advice.until < advice.duration else "the scene"
     title = f"What {what} does not need: one option changed, at the same step size"
     rows = [
         [
             f"{change.plain.name}, {change.changed.change}",
-            f"{number(change.plain.error, 2)} → {number(change.changed.error, 2)}",
+            " → ".join(number(error, 2) for error in change.errors),
             f"× {number(change.changed.cost / change.plain.cost, 2)}",
-            change.verdict(bound, advice.floor),
+            change.verdict(advice.bound, advice.floor),
         ]
         for change in advice.changes
     ]
     print_table(console, ["engine, with", "error", "cost", "verdict"], rows, title, ["verdict"])
+    console.print()
 
 
 def sentence_on_times(advice: Advice) -> str:

@@ -24,6 +24,7 @@ from crosscheck2d.adapters.mechanisms.table import (
 )
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.compare import laws
+from crosscheck2d.reports.compare.causes import LATE, Cause, CauseKind, by_settings, unknown
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.view import beside
 from crosscheck2d.reports.page.style import number
@@ -38,7 +39,6 @@ from crosscheck2d.reports.speed.scored_part import scored
 from crosscheck2d.reports.terminal.counts import listed
 from crosscheck2d.scenarios.model import Scene, Trajectory
 
-LATE = "end-of-step detection"
 SWITCHED = (AIR, SKIN)  # by a setting of each library that has them, which was tried
 SEEN = 0.01  # radii, or of a spin or speed: what is less is not worth a word
 EXERCISE = {"alpha": 1.0, "project": True, "project_walls": True}
@@ -77,16 +77,16 @@ def cause_of(scene: str, seed: int, name: str, substeps: int, purpose: str, boun
     remedy = find_remedy(settings_of(name, scenario.scene, dt), error, bound)
     if remedy.settings:
         falls = f"the error falls from {number(remedy.before)} to {number(remedy.after)}"
-        return f"{does}{remedy.sentence(name)}: {falls}"
+        return does + by_settings(remedy, name, falls).told
     measure = "energy" if purpose == "energy" else "position_radii"
     try:
         mechanism = mechanism_of(scene, seed, name, substeps, measure)
     except NotPlayed as failure:
-        mechanism = f"not known: {failure}"
-    return "; ".join(filter(None, [f"{does}{mechanism}", remedy.sentence(name)]))
+        mechanism = unknown(str(failure))
+    return "; ".join(filter(None, [f"{does}{mechanism.told}", remedy.sentence(name)]))
 
 
-def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) -> str:
+def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) -> Cause:
     """The mechanism without which at most `GONE` of the error in all of the scored part is left; or
     the few that leave no more together with end-of-step detection; or those that were ruled out.
     Raises `NotPlayed`."""
@@ -124,8 +124,9 @@ def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) 
     for parts in (left, together):
         least = min(parts, key=lambda part: parts[part], default="")
         if least and total > LEAST and parts[least] <= GONE * total:
-            return f"{least}: without it {number(parts[least] / total, 2)} of the error is left"
-    return f"not known: without any of these more than half of it is left: {'; '.join(left)}"
+            shown = f"without it {number(parts[least] / total, 2)} of the error is left"
+            return Cause(CauseKind.MECHANISM, least, shown=shown)
+    return unknown(f"without any of these more than half of it is left: {'; '.join(left)}")
 
 
 def ablated(changes: Mapping[str, Any]) -> AblatedReference:

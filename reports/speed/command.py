@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from math import isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
 from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
 from crosscheck2d.reports.compare.pooling import said_of_pool
-from crosscheck2d.reports.page import style
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
 from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.run.made import digest_of
@@ -24,7 +22,7 @@ from crosscheck2d.reports.speed.effort import FULL, QUICK
 from crosscheck2d.reports.speed.explained import sentence
 from crosscheck2d.reports.speed.kept import Kept
 from crosscheck2d.reports.speed.measure import Measured, Measuring
-from crosscheck2d.reports.speed.page import write_page
+from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_page
 from crosscheck2d.reports.speed.plan import SpeedPlan
 from crosscheck2d.reports.speed.results import QUIET, Results
 from crosscheck2d.reports.terminal.console import Console
@@ -32,7 +30,6 @@ from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 
-NEVER, NOT_REACHED = "never", "–"
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
 SPEED = "crosscheck speed"
 
@@ -148,16 +145,6 @@ def print_summary(results: Results, page: str) -> None:
     said += [f"Left out: {what}: {why}." for what, why in results.left_out]
     print_list(console, said)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
-
-
-def cost_of(row: Mapping[Hashable, Any]) -> str:
-    """What an accuracy costs an engine, or in how many scenes it is reached."""
-    if isfinite(row["cost"]):
-        got = f" ({row['got']})" if row["of"] > 1 else ""
-        return style.number(row["cost"]) + got
-    if row["lost"]:
-        return NEVER
-    return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
 
 
 def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:

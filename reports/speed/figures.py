@@ -13,12 +13,14 @@ import pandas as pd
 
 from crosscheck2d.adapters.engines import DISTINCT, ENGINES
 from crosscheck2d.reports.compare.pareto import YARDSTICK
+from crosscheck2d.reports.compare.pooling import WHO
 from crosscheck2d.reports.speed.results import Results
 from crosscheck2d.reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
 # of the same run, errors only
 ORDERS, EXPLAINED = KEPT.with_name("orders.csv"), KEPT.with_name("explained.csv")
+PICTURE = KEPT.with_name("speed.svg")  # of `page.write_picture`
 COLUMNS = ["figure", "engine", "profile", "at", "value", "low", "high", "best", "unit", "note"]
 AGAINST, AGAINST_BARE = f"cost over {YARDSTICK}", "the same less idle steps"
 GATED = (10, 100, 1000)  # disks
@@ -29,9 +31,10 @@ LOOSE = 3.0
 
 def figures(results: Results) -> pd.DataFrame:
     """Columns `COLUMNS`: the pooled points, the cost of each accuracy, the cost by number of
-    disks with its exponent, and what a call costs."""
+    disks with its worst step and exponent, that of a settled pile, and what a call costs."""
     pooled, reached, sizes = results.pooled, results.pooled_reached, results.sizes
     growth, driving = results.growth, results.driving
+    of_worst = [*WHO, "figure", "at", "value", "unit"]
     failed = pooled.failed.map("failed in {}".format) + pooled.of.map(" of {}".format)
     parts = [
         pooled.assign(
@@ -60,6 +63,8 @@ def figures(results: Results) -> pd.DataFrame:
             unit="us/s",
         ),
         sizes.assign(figure="cost of a step", at=sizes.n, value=sizes.cost, unit="us"),
+        sizes.assign(figure="worst step", at=sizes.n, value=sizes.worst, unit="us")[of_worst],
+        settled(results.pile),
         growth.assign(
             figure="exponent", at=growth.most, value=growth.exponent, note=growth.stopped, unit="1"
         ),
@@ -75,6 +80,15 @@ def figures(results: Results) -> pd.DataFrame:
     # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
     names = table.engine + ":" + table.profile
     return table[~names.isin([name for name, row in ENGINES.items() if row.adds_friction])]
+
+
+def settled(pile: pd.DataFrame) -> pd.DataFrame:
+    """A row for each engine and option: the cost of a step of a settled pile."""
+    rows = pile.melt(["name", "n"], var_name="at", value_name="value")
+    names = rows.name.str.split(":", expand=True).reindex(columns=[0, 1])
+    note = rows.n.map("{} disks".format)
+    figure = "step of a settled pile"
+    return rows.assign(figure=figure, engine=names[0], profile=names[1], note=note, unit="us")
 
 
 def cheaper(versus: pd.DataFrame, figure: str, count: str) -> pd.DataFrame:

@@ -1,297 +1,725 @@
-"""Writes speed.html, a single file that loads nothing from elsewhere."""
+"""The page of a measurement as sections of the page kit: each table of `results.py`, and its
+charts of error against cost and of cost against the number of disks."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from crosscheck2d.adapters.mechanisms.table import NAMES
 from crosscheck2d.reports.compare.order import ELSEWHERE, UNSTEADY
-from crosscheck2d.reports.compare.pareto import ACCURACIES, YARDSTICK, said_of_cheaper
-from crosscheck2d.reports.compare.pooling import said_of_pool
+from crosscheck2d.reports.compare.pareto import ACCURACIES, YARDSTICK, front, said_of_cheaper
+from crosscheck2d.reports.compare.pooling import WHO, said_of_pool, without_idle
 from crosscheck2d.reports.page import situations, style
-from crosscheck2d.reports.page.charts import Drawing, packed_charts
-from crosscheck2d.reports.page.documents import CHARTED, render
+from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
+from crosscheck2d.reports.page.kit import (
+    Chart,
+    Page,
+    Part,
+    Section,
+    Table,
+    TableCell,
+    Text,
+    render_page,
+    run_section,
+)
 from crosscheck2d.reports.page.links import neighbours
+from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.speed import budget_tables, charts, explained, tables
-from crosscheck2d.reports.speed.budget import RESIDUAL, TOTALS
+from crosscheck2d.reports.speed import explained, tables
+from crosscheck2d.reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
+from crosscheck2d.reports.speed.explained import LEAST
+from crosscheck2d.reports.speed.plan import PLAIN
 from crosscheck2d.reports.speed.results import QUIET, Results
 from crosscheck2d.reports.speed.scored_part import scored
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck speed"
-FLAGGED = (ELSEWHERE, UNSTEADY)
+COST, ERROR = "engine time per simulated second", "error, radii"
+# radii; smaller errors, a tenth of the finest accuracy asked for, are drawn here
+LOWEST = 1e-7
+BUSY = 0.25  # cores that others keep busy, above which the page warns
 BUILDS = (
     "Each engine runs in one thread: Box2D 3.1 has threads, which are not asked for. Box2D 3.1 is"
     " built with its default, SSE2 or Neon; Rapier is the npm build without SIMD."
 )
-
-
-class SpeedSection(NamedTuple):
-    """A group of charts under one legend, with a table."""
-
-    key: str
-    title: str
-    text: str
-    drawings: dict[str, Drawing]
-    charts: str
-    orders: list[dict[Hashable, Any]]
-    names: list[str]
+VERDICTS = {
+    "exact": "is below 10⁻⁶ at any dt",
+    UNSTEADY: "is not monotone",
+    "failed": "unknown: failed",
+}
+TERMS = {
+    "time of collisions": "a collision is found up to a step late; until then the disks move on"
+    " with the old velocity",
+    "flight": "x += v dt + α a dt², so x is off by (α − ½) a dt t",
+    "restitution": "an e that is not that of the scene: a product of two, or 0 below a threshold",
+    "impulse": "from the velocity before or after gravity; all contacts in one solve; soft and"
+    " speculative contacts in Box2D 3.1",
+    "contact recycling": "a pair that has hardly moved is not tested again: its contact keeps its"
+    " normal, or is missed",
+    "edges of the box": "the exercise sets a disk that leaves a torus onto the opposite edge, "
+    " which cuts off the rest of its step",
+    "friction": "friction that is not that of the scene: a default, a product of two coefficients, "
+    " a narrower cone, a shorter lever arm",
+    "wall skin": "walls that are thicker than the scene states",
+    "position correction": "how an overlap is removed: projected at once, or corrected gradually",
+    "float32": "every number is rounded to 24 binary digits",
+    "CCD, sleep": "the ablated reference does not have these: the engine is compared with itself"
+    " without them",
+    "interplay": "the change by all mechanisms together, minus the sum of the contributions",
+}
+Row = Mapping[Hashable, Any]
+Columns = Mapping[str, str | Callable[[Row], Any]]
 
 
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started,
     seconds, load."""
-    names = (*results.names, *(sweep.name for sweep in results.plan.sweeps), style.TRUTH)
-    looks = style.looks_of(names)
-    answers = situations.answers(middle_scores(results), situated(results), set())
-    html = render(
-        "speed/speed.html.j2",
-        generator=GENERATOR,
-        scripts=CHARTED,
-        styles=["speed/speed.css"],
-        looks=looks,
-        plotly=True,
-        names=results.names,
-        played=played(results.points),
-        about=about,
-        pooled=pooled_section(results),
-        rough=sum(situations.FRICTION in places for places in situated(results).values()),
-        answers=answers,
-        whole=situations.whole(answers),
-        far_off=situations.FAR_OFF,
+    played = results.points[np.isfinite(results.points.error)]
+    engines = played[WHO].drop_duplicates()
+    lead = [
+        f"{counted(len(engines), 'engine')} in {counted(len(results.scenes), 'scene')} with an"
+        " exact answer. The error is the largest distance of any disk from its exact position, in"
+        " radii of that disk, up to the horizon of the answer. The time is that inside step,"
+        " without reading states or collisions, in rounds of all engines in shuffled order. Error"
+        " and time are measured in separate runs.",
+        "For your own scene and error: crosscheck advise my_scene.toml --error 1% names the"
+        " cheapest engine and step size.",
+    ]
+    if about["load"] > BUSY:
+        lead.append(
+            f"The machine was not alone: other work kept {number(about['load'], 2)} of"
+            f" {about['machine']['cores']} cores busy when the timing began. Errors do not depend"
+            " on that; times do."
+        )
+    sections = [
+        *situation_section(results),
+        pooled_section(results),
+        versus_section(results),
+        models_section(results),
+        *budget_sections(results),
+        *option_sections(results),
+        *sweep_sections(results),
+        *size_sections(results),
+        driving_section(results),
+        scenes_section(results),
+    ]
+    if results.left_out:
+        items = [f"{what}: {reason}" for what, reason in results.left_out]
+        sections.append(Section(f"Left out: {len(items)}", "", [Text(items=items)], True))
+    page = Page(
+        "Speed against accuracy",
+        [*sections, run_section(about)],
+        GENERATOR,
+        lead,
+        looks=style.looks_of([*results.names, *(sweep.name for sweep in results.plan.sweeps)]),
         links=neighbours(path, "speed"),
-        sizes=sizes_section(results),
-        options=options_section(results),
-        sweeps=sweep_sections(results),
-        sweep_rows=results.sweeps.to_dict("records"),
-        sections=[section_of(results, name) for name in results.scenes],
-        noise=results.noise_floor(),
-        quiet=results.noise_floor().floor <= QUIET,
-        growth=results.growth.to_dict("records"),
-        models=results.models.to_dict("records"),
-        driving=results.driving.to_dict("records"),
-        option_rows=results.options.to_dict("records"),
-        versus=results.versus.to_dict("records"),
-        own=YARDSTICK,
-        left_out=results.left_out,
-        accuracies=list(ACCURACIES),
-        flagged=FLAGGED,
-        option_scenes=results.plan.option_scenes,
-        budget=budget_section(results),
-        totals=(*TOTALS, RESIDUAL),
+        footer=f"Made by {about['command']}. The errors come out the same, bit for bit; the times"
+        " are this machine's. Every sample is in speed_samples.csv, every error in"
+        " speed_errors.csv.",
     )
-    put_text(path, html)
+    put_text(path, render_page(page))
 
 
-def middle_scores(results: Results) -> pd.DataFrame:
-    """A row for each engine and scene, at the middle of the step sizes measured:
-    `situations.COLUMNS`; angles are not measured here."""
-    points = results.points
-    sizes = points.groupby("scenario").step_size.unique()
-    middle = points.scenario.map({name: sorted(k)[len(k) // 2] for name, k in sizes.items()})
-    here = points[points.step_size == middle]
-    return here.assign(name=here.engine + ":" + here.profile, angle=np.nan)[situations.COLUMNS]
+def table_of(
+    frame: pd.DataFrame, label: str | Callable[[Row], Any], columns: Columns, **more: Any
+) -> Table:
+    """A table with a row for each of a frame; `label` and `columns` (heading -> value) are names
+    of its columns or functions of a row."""
+    rows = frame.to_dict("records")
+
+    def values(of: str | Callable[[Row], Any]) -> list[Any]:
+        return [row[of] if isinstance(of, str) else of(row) for row in rows]
+
+    data = {heading: values(of) for heading, of in columns.items()}
+    return Table(pd.DataFrame(data, index=values(label), dtype=object), **more)
 
 
-def played(points: pd.DataFrame) -> list[str]:
-    """The engines with an error in one of the scenes; one that only adds friction has none in
-    scenes without."""
-    found = points[np.isfinite(points.error)]
-    return list(dict.fromkeys(found.engine + ":" + found.profile))
+def name_of(row: Row) -> str:
+    """`engine:profile` of a row."""
+    return f"{row['engine']}:{row['profile']}"
 
 
-def situated(results: Results) -> dict[str, list[str]]:
-    """Scene -> what `situations.situations_of` says of it, of those that were measured."""
-    seed, found = results.plan.seed, {}
+def failure(row: Row) -> str:
+    """How the run of a row failed; "" if it did not."""
+    return f"{row['status']}: {row['reason']}" if row["status"] != "ok" else ""
+
+
+def situation_section(results: Results) -> list[Section]:
+    """The median error of each engine in the scenes of each situation, at the middle of the step
+    sizes measured, and what it costs."""
+    points, seed = results.points, results.plan.seed
+    of_scene = {}
     for scene in results.plan.scenes:
         if (name := open_scene(scene, seed).name) in results.asks:
-            found[name] = situations.situations_of(*scored(scene, seed))
-    return found
-
-
-def section(
-    key: str,
-    title: str,
-    text: str,
-    drawings: dict[str, Drawing],
-    orders: pd.DataFrame | None = None,
-) -> SpeedSection:
-    """A `SpeedSection`, its figures packed."""
-    traces = [
-        trace["name"]
-        for each in drawings.values()
-        if each.figure is not None
-        for trace in each.figure["data"]
+            of_scene[name] = situations.situations_of(*scored(scene, seed))
+    sizes = points.groupby("scenario").step_size.unique()
+    middle = points.scenario.map({scene: sorted(k)[len(k) // 2] for scene, k in sizes.items()})
+    here = points[points.step_size == middle].assign(situation=points.scenario.map(of_scene))
+    here = here.assign(name=here.engine + ":" + here.profile).explode("situation")
+    found = here.groupby(["situation", "name"], sort=False)[["error", "cost"]].median()
+    titles = [t for t in situations.SITUATIONS if t in set(here.situation)]
+    names = list(dict.fromkeys(here.name))
+    rows = {}
+    for title in titles:
+        errors = found.error.loc[title]
+        best = errors[np.isfinite(errors)].min()
+        rows[title] = [
+            TableCell(
+                errors.get(name, np.nan),
+                css="best" if errors.get(name) == best else "",
+                side=f"{number(found.cost.get((title, name), np.nan))} µs/s",
+            )
+            for name in names
+        ]
+    frame = pd.DataFrame(rows, index=names, dtype=object).T
+    frame.index = [
+        TableCell(title, notes=(TableCell(situations.SITUATIONS[title]),)) for title in titles
     ]
-    names = [name for name in dict.fromkeys(traces) if ":" in name]
-    rows = [] if orders is None else orders.to_dict("records")
-    return SpeedSection(key, title, text, drawings, packed_charts(drawings), rows, names)
+    says = (
+        "The median, over the scenes of a situation, of the largest position error in radii, at the"
+        " middle of the step sizes measured, and of the cost. The report judges all scenes, at"
+        " other step sizes, so its answers may differ."
+    )
+    return [Section("Which engine for what", says, [Table(frame)], id="which")] if titles else []
 
 
-def pooled_section(results: Results) -> SpeedSection:
+def drawn_lines(points: pd.DataFrame) -> list[Line]:
+    """A line for each engine over its step sizes; faint, the time without idle steps and calls;
+    and as the exact answer is drawn, the Pareto front."""
+    has = points[points.cost.notna() & np.isfinite(points.error)]
+    height = np.maximum(has.error.to_numpy(float), LOWEST)
+    best = front(has.cost.to_numpy(float), height)
+    lines = [Line(style.TRUTH, has.cost.to_numpy(float)[best], height[best], faint=True)]
+    for (engine, profile), group in has.groupby(WHO, sort=False):
+        name, error = f"{engine}:{profile}", np.maximum(group.error.to_numpy(float), LOWEST)
+        bare = group.bare if "bare" in group else without_idle(group.cost, group.idle)
+        lines.append(Line(name, bare, error, faint=True))
+        lines.append(Line(name, group.cost, error, name))
+    return lines
+
+
+def write_picture(path: Path, kept: pd.DataFrame) -> None:
+    """The pooled chart of error against cost as a file of its own, from the figures that the
+    repository keeps."""
+    parts = {"pooled error": "error", "pooled cost": "cost", "pooled cost less idle steps": "bare"}
+    rows = kept[kept.figure.isin(parts)].assign(figure=kept.figure.map(parts))
+    points = rows.pivot(index=[*WHO, "at"], columns="figure", values="value").reset_index()
+    figure, axes = new_figure(7.6, 4.6)
+    draw_lines(axes, drawn_lines(points), COST, ERROR, x_unit="µs")
+    label = "Error against engine time of every engine, pooled over the scenes"
+    put_text(path, svg_of(figure, label, alone=True))
+
+
+def chart_of(lines: Sequence[Line], label: str, title: str, caption: str, **axes: Any) -> Chart:
+    """A chart of lines on logarithmic axes."""
+    figure, plot = new_figure(7.6, 4.6)
+    draw_lines(
+        plot, lines, axes.get("x", COST), axes.get("y", ERROR), x_unit=axes.get("unit", "µs")
+    )
+    return Chart(svg_of(figure, label), title, caption)
+
+
+def pooled_section(results: Results) -> Section:
     """All scenarios at once."""
-    count_of_scenes = counted(len(results.scenes), "scene")
-    steps = results.pooled.step_size.nunique()
-    drawings = {
-        "speed": Drawing(
-            "Error against cost",
-            f"Each point is an engine at one of the {counted(steps, 'step size')} that all scenes"
-            f" have: error and cost are geometric means of the middle half of {count_of_scenes}:"
-            f" {', '.join(results.scenes)}. {said_of_pool(results.pooled)} A scene in which an"
-            " engine failed has an infinite error and an infinite cost. The light mark left of a"
-            " point is the cost without that of as many steps and calls in an empty world. Lower"
-            " and further left is better. The broad grey line is the Pareto front: no engine is"
-            " better than its points in both error and cost. The narrow line is the Pareto front"
-            " of the engines that take steps.",
-            charts.speed(results.pooled, tall=True),
-        ),
-        "matched": Drawing(
-            "Cost at matched accuracy",
-            "The cost of reaching an error: that of the cheapest step size from which on all finer"
-            f" steps keep it, too. Each engine is compared with {YARDSTICK} in the scenes in which"
-            f" both reach it. A mark is the geometric mean of the cost of {YARDSTICK} over all its"
-            " scenes, times the geometric mean of the ratios. never: in half of the scenes or more,"
-            " no dt reaches the error, or the engine fails. not yet: in half or more, the finest dt"
-            " measured does not reach it. Hover over a mark for the numbers of scenes."
-            f" {said_of_cheaper(results.pooled_reached)}",
-            charts.matched(results.pooled_reached, tall=True),
-        ),
+    noise, pooled = results.noise_floor(), results.pooled
+    steps, scenes = pooled.step_size.nunique(), counted(len(results.scenes), "scene")
+    floor = "No engine was timed against itself, so the noise floor is not known."
+    if noise.pairs:
+        floor = (
+            f"Noise floor: an engine against itself in the same rounds reads"
+            f" {number(noise.median)}, half of {noise.pairs} pairs from {number(noise.low)} to"
+            f" {number(noise.high)}, the worst {number(noise.least)} and {number(noise.most)}."
+        )
+        if noise.floor > QUIET:
+            floor += (
+                " It should stay within 0.95 and 1.05. Differences of time below this floor mean"
+                " nothing."
+            )
+    caption = (
+        f"Each point is an engine at one of the {counted(steps, 'step size')} that all scenes have:"
+        f" error and cost are geometric means of the middle half of {scenes}:"
+        f" {', '.join(results.scenes)}. {said_of_pool(pooled)} Lower and further left is better. A"
+        " scene in which an engine failed has an infinite error and an infinite cost. Thin lines:"
+        " the time without that of as many steps and calls in an empty world. The black line is the"
+        " Pareto front: no engine is better than its points in both error and cost. Errors below"
+        f" {LOWEST:g} are drawn there."
+    )
+    chart = chart_of(drawn_lines(pooled), "error against cost", "Error against cost", caption)
+    return Section("All scenes pooled", floor, [chart, reached_table(results)], id="pooled")
+
+
+def reached_table(results: Results) -> Table:
+    """What each accuracy costs, over the scenes."""
+    found = results.pooled_reached.assign(name=results.pooled_reached.apply(name_of, axis=1))
+    cells = {
+        (row["name"], row["accuracy"]): TableCell(cost_of(row), row["why"])
+        for row in found.to_dict("records")
     }
-    return section("pooled", "All scenes pooled", "", drawings)
-
-
-def section_of(results: Results, scene: str) -> SpeedSection:
-    """One scenario."""
-    points = results.points[results.points.scenario == scene]
-    reached = results.reached[results.reached.scenario == scene]
-    seeds = int(points.seeds.max())
-    spread = (
-        f" The error is the median over {seeds} seeds, its bar the 95 % bootstrap interval."
-        if seeds > 1
-        else ""
+    names = list(dict.fromkeys(found.name))
+    frame = pd.DataFrame(
+        {accuracy: [cells[name, accuracy] for name in names] for accuracy in ACCURACIES},
+        index=names,
+        dtype=object,
     )
-    noise = results.noise_floor(scene)
-    floor = (
-        " Noise floor: for half of the engines the ratio of two timings is"
-        f" {style.number(noise.low)} to {style.number(noise.high)}."
-        if noise.pairs
-        else ""
+    caption = (
+        "What an error, in radii, costs: µs per simulated second (in how many of the scenes), at"
+        " the cheapest step size from which on all finer steps keep it, too. Each engine is"
+        f" compared with {YARDSTICK} in the scenes in which both reach it: a cost is the geometric"
+        f" mean of that of {YARDSTICK} over all its scenes, times that of the ratios. {NEVER}: in"
+        " half of the scenes or more, no dt reaches the error, or the engine fails; k of n: too few"
+        f" scenes to compare. {said_of_cheaper(results.pooled_reached)}"
     )
-    until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
-    scored = (
-        f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends."
-        if until < whole
-        else ""
-    )
-    wrapping = (points.wrapping > 0).any()
-    budgets = (
-        " The time does not include the wrap, which Python does for engines without one: hover"
-        " over a point to see it."
-        if wrapping
-        else ""
-    )
-    drawings = {
-        "speed": Drawing(
-            "Error against cost",
-            f"A point is one dt; the next point to the right has half of it.{scored}{spread} Time:"
-            " the median of the rounds, with bars from quartile to quartile. The light mark is the"
-            f" time without that of as many steps and calls in an empty world.{floor}{budgets}",
-            charts.speed(points),
-        ),
-        "matched": Drawing(
-            "Cost at matched accuracy",
-            "never: no dt reaches the error, because the engine converges to another motion, or"
-            " fails. not yet: the finest dt measured does not reach it.",
-            charts.matched(reached),
-        ),
-    }
-    return section(scene, scene, results.asks[scene], drawings, results.order_table(scene))
+    return Table(frame, corner="Engine", caption=caption)
 
 
-def sizes_section(results: Results) -> SpeedSection | None:
-    """Cost against the number of disks."""
-    if results.sizes.empty:
-        return None
-    drawing = Drawing(
-        "Cost of a step against the number of disks",
-        "A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. Bars are quartiles; hover for the"
-        f" worst step. {tables.end_of_all_pairs(results.sizes)}"
-        f" {tables.cost_of_sleep(results.measured)} {BUILDS}",
-        charts.sizes(results.sizes, results.growth),
+NEVER, NOT_REACHED = "never", "–"
+
+
+def cost_of(row: Row) -> str:
+    """What an accuracy costs an engine, or in how many scenes it is reached."""
+    if np.isfinite(row["cost"]):
+        got = f" ({row['got']})" if row["of"] > 1 else ""
+        return number(row["cost"]) + got
+    if row["lost"]:
+        return NEVER
+    return f"{row['got']} of {row['of']}" if row["of"] > 1 else NOT_REACHED
+
+
+def versus_section(results: Results) -> Section:
+    """Where engines with end-of-step detection cost less than our own solver."""
+    table = table_of(
+        results.versus,
+        name_of,
+        {
+            "changed": "change",
+            f"time, × {YARDSTICK}": "ratio",
+            "least": "low",
+            "most": "high",
+            "cheaper in scenes": lambda row: f"{row['cheaper']} of {row['scenes']}",
+            "which": "cheaper_in",
+            "without idle steps cheaper in": "bare_cheaper",
+            "which of these": "bare_cheaper_in",
+            "not timed in": "not_timed_in",
+        },
+        css="text",
+        caption="In the same rounds at the same steps, scene by scene; then the same for every"
+        " changed setting, in the scenes in which options are measured. An idle step is the loop"
+        " that drives the engine from Python and the engine's own fixed cost of a step; the rest is"
+        " the cost of the scene.",
     )
-    return section("sizes", "How the cost grows", "", {"sizes": drawing})
+    title = f"Where engines with end-of-step detection cost less than {YARDSTICK}"
+    return Section(title, "scene by scene", [table], True, "versus")
 
 
-def budget_section(results: Results) -> dict[str, Any] | None:
-    """The error budget."""
-    budget = results.measured.budget
+def models_section(results: Results) -> Section:
+    """The cheapest model that answers each scene."""
+    table = table_of(
+        results.models,
+        "scenario",
+        {
+            "exact answer": "truth",
+            "cheapest model to 10⁻⁶": lambda row: row["model"] or "none",
+            "closed form, µs/s": "closed_us",
+            "cheapest engine to 10⁻⁶": lambda row: row["engine"] or "none",
+            "its cost, µs/s": "cost_us",
+            "to 1 %": lambda row: row["loose_engine"] or "none",
+            "its cost at 1 %, µs/s": "loose_us",
+        },
+        css="text",
+    )
+    says = (
+        "How the exact answer of each scene is computed, the cheapest way (engine or closed form)"
+        " to an error below 10⁻⁶ radii, and the cheapest engine with an error below 1 %. Exact"
+        " answers share no code with any engine, even where an engine would be cheaper. –: no"
+        " closed form."
+    )
+    return Section("The cheapest model that answers each scene", says, [table], True, "models")
+
+
+def budget_sections(results: Results) -> list[Section]:
+    """The error budget: its share, in how many scenes each contribution is the largest, and all
+    contributions of each scene."""
+    budget, found = results.measured.budget, results.explained
     if budget.empty:
-        return None
-    table = results.explained
-    contributions = set(table.engine + ":" + table.profile)
-    return {
-        "sentence": explained.sentence(table),
-        "cuts": explained.extent(table).cuts,
-        "absent": [name for name in results.names if name not in contributions],
-        "overview": budget_tables.overview(budget),
-        "scenes": [
-            budget_tables.of_scene(budget, scene) for scene in dict.fromkeys(budget.scenario)
-        ],
-        "off": budget_tables.ablated_in_both(budget),
-        "closed": float(budget.closed_deviation_radii.max()),
-    }
+        return []
+    absent = [n for n in results.names if n not in set(found.engine + ":" + found.profile)]
+    closed = number(float(budget.closed_deviation_radii.max()), 1)
+    texts = [
+        "The ablated reference is the hand-written solver with an option for every mechanism by"
+        " which engines differ. It starts with exact flight and end-of-step detection. Then each"
+        " mechanism of an engine is enabled alone, at the middle dt. The contribution of a"
+        " mechanism is the root mean square of what it changes, over disks and samples, in radii.",
+        "Contributions are vectors and may cancel: their sum can be smaller than any of them. all"
+        " is the ablated reference with all mechanisms enabled, engine is the engine itself, and"
+        " residual is their difference. A scene is evaluated until end-of-step detection alone puts"
+        " a disk off by more than half a radius: beyond that, contributions do not add up. So the"
+        " explained share is that of the evaluated time, with the first seed.",
+    ]
+    if absent:
+        texts.append(
+            "The ablated reference has no mechanism of these engines, so they have no budget:"
+            f" {', '.join(absent)}."
+        )
+    parts: list[Part] = [
+        Text(texts),
+        overview(budget),
+        Text(items=[f"{k}: {v}" for k, v in TERMS.items()]),
+    ]
+    parts.append(Text([f"The contribution of flight equals its formula to {closed} radii."]))
+    if len(cuts := explained.cuts(found)):
+        columns: Columns = {
+            "evaluated, s": "until_s",
+            "exact answer, s": "horizon_s",
+            "share, %": lambda row: f"{100 * row['until_s'] / row['horizon_s']:.0f}",
+        }
+        caption = "Scenes that are not evaluated up to the end of their exact answer"
+        parts.append(table_of(cuts, "scenario", columns, caption=caption))
+    parts.append(contributions(budget))
+    changed = budget[budget[["off_engine_radii", "off_reference_radii"]].max(axis=1) > LEAST]
+    if len(changed):
+        columns = {
+            "scene": "scenario",
+            "without": "contribution",
+            "in the engine, radii": "off_engine_radii",
+            "in the reference, radii": "off_reference_radii",
+            "deviation, radii": lambda row: number(row["off_deviation_radii"], 2),
+        }
+        caption = (
+            f"Mechanisms disabled in the engine itself: {len(changed)}. Disabling one in the engine"
+            " must change as much as in the ablated reference with all others enabled."
+        )
+        parts.append(table_of(changed, name_of, columns, caption=caption))
+    says = f"Explained: {explained.sentence(found)}."
+    return [Section("What the errors are made of", says, parts, True, "budget")]
 
 
-def options_section(results: Results) -> SpeedSection | None:
+def causes(budget: pd.DataFrame) -> list[str]:
+    """The contributions that are causes, of any engine."""
+    found = set(budget.contribution)
+    return [TIME, *(name for name in NAMES if name in found)]
+
+
+def overview(budget: pd.DataFrame) -> Table:
+    """In how many scenes an engine was played, has an error, has it explained, and in how many
+    each contribution is the largest; every engine has its row, also one that failed them all."""
+    columns = ["played", "errors", "explained", *causes(budget)]
+    rows = {}
+    for (engine, profile), group in budget.groupby(WHO, sort=False):
+        played = group[group.note == ""]
+        scenes = played.pivot(index="scenario", columns="contribution", values="position_radii")
+        scenes = scenes.reindex(columns=[TOTAL, RESIDUAL, *causes(budget)]).fillna(0.0)
+        off, known = scenes[scenes[TOTAL] > LEAST], scenes[causes(budget)]
+        largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
+        within = int((off[RESIDUAL] <= explained.TO[0] * off[TOTAL]).sum())
+        counts = [int((largest == cause).sum()) for cause in known.columns]
+        rows[f"{engine}:{profile}"] = [len(scenes), len(off), within, *counts]
+    caption = (
+        "Counts of scenes: those played; those with an error above 10⁻⁹ radii; of these, those with"
+        " a residual below 1 % of the error; and those in which each contribution is the largest."
+    )
+    frame = pd.DataFrame(rows, columns, dtype=object).T
+    return Table(frame, corner="Engine", caption=caption)
+
+
+def contributions(budget: pd.DataFrame) -> Table:
+    """A row for each scene, which opens the root mean squares of each engine in radii: engine, the
+    residual, the contributions of anybody, sum and all."""
+    opens: dict[str, list[Part]] = {}
+    extents = {}
+    for scene, here in budget.groupby("scenario", sort=False):
+        wide = here.assign(name=here.engine + ":" + here.profile).pivot(
+            index="name", columns="contribution", values="position_radii"
+        )
+        of_anybody = [c for c in causes(budget) if c in wide and wide[c].max() > LEAST]
+        columns = [TOTAL, RESIDUAL, *of_anybody, INTERPLAY, SUM, ALL]
+        wide = wide.reindex(
+            columns=columns, index=[*dict.fromkeys(here.engine + ":" + here.profile)]
+        )
+        notes = here[here.note != ""]
+        failed = [f"{name_of(row)} has not played it: {row['note']}" for row in to_rows(notes)]
+        label = f"budget of {scene}"  # a row's label is its address
+        opens[label] = [
+            Table(wide.astype(object), caption="–: this engine does not have the mechanism."),
+            Text(items=failed),
+        ]
+        extents[label] = here[["until_s", "horizon_s", "duration_s"]].iloc[0].tolist()
+    headings = ["evaluated to, s", "exact answer to, s", "duration, s"]
+    frame = pd.DataFrame.from_dict(extents, "index", columns=headings).astype(object)
+    return Table(frame, corner="All contributions in", opens=opens)
+
+
+def to_rows(frame: pd.DataFrame) -> list[dict[Hashable, Any]]:
+    """The rows of a frame."""
+    return frame.to_dict("records")
+
+
+def option_sections(results: Results) -> list[Section]:
     """The cost and the effect of each option that the scenes do not need."""
-    table = results.options
-    if table.empty:
-        return None
-    many = np.isfinite(table.cost_ratio).any()
-    drawings = {
-        "cost": Drawing(
-            "Its cost",
-            "Time divided by that of the matched profile; right of the dotted line the option costs"
-            " more.",
-            charts.options(table, "cost_ratio", "time / time unchanged") if many else None,
-        ),
-        "error": Drawing(
-            "Its effect on the error",
-            "Error divided by that of the matched profile; right of the dotted line it is larger.",
-            charts.options(table, "error_ratio", "error / error unchanged"),
-        ),
-    }
-    return section("options", "Options that a scene does not need", "", drawings)
+    if results.options.empty:
+        return []
+    table = table_of(
+        results.options,
+        name_of,
+        {
+            "change": "change",
+            "scene": "scenario",
+            "time, × unchanged": "cost_ratio",
+            "error, × unchanged": "error_ratio",
+            "error, radii": "error_radii",
+            "unchanged, radii": "error_radii_plain",
+            "failed": failure,
+        },
+        sortable=True,
+        corner="Engine",
+        caption="An error of 0 has no ratio.",
+    )
+    scenes = results.plan.option_scenes
+    says = (
+        "One option at a time is changed in the matched profile, at the middle dt of"
+        f" {len(scenes)} scenes: {', '.join(scenes)}."
+    )
+    return [Section("Options that a scene does not need", says, [table], True, "options")]
 
 
-def sweep_sections(results: Results) -> list[SpeedSection]:
+def sweep_sections(results: Results) -> list[Section]:
     """The effect of more iterations and substeps, and that of smaller steps for the same time."""
     if results.sweeps.empty:
         return []
-    count = results.sweeps.scenario.nunique()
+    pooled = results.pooled_sweeps
+    lines = [
+        Line(
+            f"{engine}:{profile}",
+            group.cost,
+            group.error,
+            str(profile).partition("+")[2] or str(profile),
+        )
+        for (engine, profile), group in pooled.groupby(WHO, sort=False)
+    ]
+    count = counted(results.sweeps.scenario.nunique(), "scene")
     without = ", ".join(
         f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.sweeps)
     )
-    pooled = Drawing(
-        "Pooled",
-        "Dotted: more iterations or substeps at one dt, from left to right; the first and the last"
-        " number are named. Solid: the matched profile, from 4 times that dt to an eighth of it."
-        " Error and cost are divided by those of the matched profile at that dt, where all lines"
-        f" meet. A point is the geometric mean of the middle half of {counted(count, 'scene')}."
-        + (f" These have no ratio, because the divisor is 0: {without}." if without else ""),
-        charts.sweeps(results.pooled_sweeps, relative=True),
+    caption = (
+        "One line goes over more iterations or substeps at one dt; that of the matched profile from"
+        " 4 times that dt to an eighth of it. Error and cost are divided by those of the matched"
+        f" profile at that dt, where all lines meet. A point is the geometric mean of the middle"
+        f" half of {count}."
+        + (f" These have no ratio, because the divisor is 0: {without}." if without else "")
     )
-    each = {
-        str(scene): Drawing(str(scene), open_scene(str(scene), 0).asks, charts.sweeps(points))
-        for scene, points in results.sweeps.groupby("scenario", sort=False)
-    }
-    return [
-        section("sweeps", "More work in a step, or more steps", "", {"sweeps": pooled}),
-        section("sweeps-each", "The same, scene by scene", "", each),
+    words = {"x": "time / time as matched", "y": "error / error as matched", "unit": ""}
+    chart = chart_of(lines, "error against cost of sweeps", "Pooled", caption, **words)
+    table = table_of(
+        results.sweeps,
+        "scenario",
+        {
+            "engine": name_of,
+            "value": lambda row: row["change"] or NOT_REACHED,
+            "dt, s": "dt_s",
+            "error, radii": "error",
+            "95 % over the seeds": interval_of_seeds,
+            "cost, µs/s": "cost",
+            "failed": lambda row: failure(row) if row["failed"] else "",
+        },
+        sortable=True,
+        corner="Scene",
+    )
+    says = (
+        "There are two ways to reduce an error at a higher cost: more iterations or substeps at one"
+        " dt, or a smaller dt. Where a line of iterations is level, these cost time and do not"
+        " reduce the error."
+    )
+    title = "More work in a step, or more steps"
+    return [Section(title, says, [chart, table], True, "sweeps")]
+
+
+def interval_of_seeds(row: Row) -> str:
+    """The 95 % interval of an error; – of one seed."""
+    if row["seeds"] < 2:
+        return NOT_REACHED
+    return f"{number(row['error_low'])} to {number(row['error_high'])}"
+
+
+def size_sections(results: Results) -> list[Section]:
+    """Cost against the number of disks: the mean and the worst step, the growth, and what a
+    settled pile costs with sleeping and without."""
+    costs, growth = results.sizes, results.growth
+    if costs.empty:
+        return []
+    lines = [
+        Line(f"{engine}:{profile}", group.n, group.cost, f"{engine}:{profile}")
+        for (engine, profile), group in costs.groupby(WHO, sort=False)
     ]
+    caption = f"A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. {BUILDS}"
+    words = {"x": "disks", "y": "engine time of a step, µs", "unit": ""}
+    title = "Cost of a step against the number of disks"
+    chart = chart_of(lines, title, title, caption, **words)
+    wide = costs.assign(name=costs.engine + ":" + costs.profile)
+    cells = {
+        (row["name"], row["n"]): TableCell(
+            row["cost"], side=f"worst {number(row['worst'])}", title=quartiles(row)
+        )
+        for row in to_rows(wide)
+    }
+    names, numbers = list(dict.fromkeys(wide.name)), sorted(set(costs.n))
+    steps = pd.DataFrame(
+        {f"{n} disks": [cells.get((name, n), "") for name in names] for n in numbers},
+        index=names,
+        dtype=object,
+    )
+    grown = table_of(
+        growth,
+        name_of,
+        {
+            "exponent from 100 disks on": "exponent",
+            "95 % interval": lambda row: (
+                f"{number(row['low'], 3)} to {number(row['high'], 3)}"
+                if np.isfinite(row["exponent"])
+                else "too few sizes"
+            ),
+            "up to, disks": "most",
+            "then": "stopped",
+        },
+    )
+    parts: list[Part] = [chart, Table(steps, corner="µs a step"), grown]
+    pile = results.pile
+    if len(pile):
+        columns: Columns = {"awake, µs": PLAIN, "with sleeping, µs": "sleeping"}
+        n = int(pile.n.iloc[0])
+        parts.append(table_of(pile, "name", columns, corner=f"A settled pile of {n} disks"))
+    says = tables.end_of_all_pairs(costs)
+    return [Section("How the cost grows", says, parts, id="sizes")]
+
+
+def quartiles(row: Row) -> str:
+    """Quartiles and the fastest of a cost, in words."""
+    return f"{number(row['low'])} to {number(row['high'])}, fastest {number(row['best'])}"
+
+
+def driving_section(results: Results) -> Section:
+    """What the loop in Python costs."""
+    table = table_of(
+        results.driving,
+        name_of,
+        {
+            "a step, µs, many in a call": "step_us",
+            "a call, µs on top": "call_us",
+            "a read-out, µs, median of the scenes": "read_us",
+            "largest, µs": "read_most_us",
+        },
+    )
+    says = (
+        "The cost of a step and of a call in a world with one static disk: the loop around the"
+        " engine, and the engine's own fixed cost of a step. Every time on this page includes this"
+        " cost, and none includes a read-out. An engine that takes many steps in one call pays for"
+        " one call; pymunk and both Box2Ds take one step a call, in a loop of the adapter."
+    )
+    return Section("Driving from Python", says, [table], True, "driving")
+
+
+def scenes_section(results: Results) -> Section:
+    """A row for each scenario, which opens its chart, its orders and all its points."""
+    points = results.points.assign(name=results.points.engine + ":" + results.points.profile)
+    rows, opens = {}, dict[str, list[Part]]()
+    for scene, here in points.groupby("scenario", sort=False):
+        fine = here[np.isfinite(here.error)]
+        best = fine.name[fine.error.idxmin()] if len(fine) else ""
+        until, whole = here.until_s.iloc[0], here.duration_s.iloc[0]
+        rows[str(scene)] = [TableCell(results.asks[str(scene)]), until, whole, best]
+        opens[str(scene)] = scene_parts(results, str(scene), here)
+    headings = ["question", "scored to, s", "duration, s", "nearest engine"]
+    frame = pd.DataFrame.from_dict(rows, "index", columns=headings, dtype=object)
+    says = "A click opens error against cost, the order of convergence, and every point."
+    table = Table(frame, opens=opens, sortable=True, corner="Scene", css="text")
+    return Section("Scene by scene", says, [table], id="scenes")
+
+
+def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part]:
+    """What the row of a scenario opens."""
+    noise, seeds = results.noise_floor(scene), int(points.seeds.max())
+    until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
+    sentences = [
+        "A point is one dt; the next point to the right has half of it. Time: the median of the"
+        " rounds; thin: without that of as many steps and calls in an empty world.",
+        f"Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends."
+        if until < whole
+        else "",
+        f"The error is the median over {seeds} seeds, with its 95 % bootstrap interval."
+        if seeds > 1
+        else "",
+        "Noise floor: for half of the engines the ratio of two timings is"
+        f" {number(noise.low)} to {number(noise.high)}."
+        if noise.pairs
+        else "",
+        "The time does not include the wrap, which Python does for engines without one."
+        if (points.wrapping > 0).any()
+        else "",
+    ]
+    caption = " ".join(filter(None, sentences))
+    chart = chart_of(drawn_lines(points), f"error against cost, {scene}", "", caption)
+    orders = results.orders[results.orders.scenario == scene].merge(
+        results.bindings[results.bindings.scenario == scene], on=["scenario", *WHO], how="left"
+    )
+    reached = {
+        (name_of(row), row["accuracy"]): row
+        for row in to_rows(results.reached[results.reached.scenario == scene])
+    }
+
+    def cost_at(accuracy: str) -> Callable[[Row], TableCell]:
+        def cell(row: Row) -> TableCell:
+            got = reached[name_of(row), accuracy]
+            if np.isnan(got["cost"]):
+                return TableCell(got["why"], css="soft")
+            return TableCell(got["cost"], f"at dt {number(got['dt_s'])} s")
+
+        return cell
+
+    table = table_of(
+        orders,
+        name_of,
+        {
+            "order": lambda row: number(row["slope"], 2),
+            "interval": lambda row: (
+                f"{number(row['low'], 2)} to {number(row['high'], 2)}"
+                if np.isfinite(row["slope"])
+                else ""
+            ),
+            "with finer steps the error": lambda row: TableCell(
+                VERDICTS.get(row["verdict"], row["verdict"]),
+                css="bad" if row["verdict"] in (ELSEWHERE, UNSTEADY) else "",
+            ),
+            "failed of the steps": lambda row: (
+                f"{row['failed']} of {row['steps']}" if row["failed"] else ""
+            ),
+            **{f"{accuracy} of a radius": cost_at(accuracy) for accuracy in ACCURACIES},
+            "empty step, µs": "step_us",
+            "call, µs on top": "call_us",
+            "read-out, µs": "read_us",
+        },
+        caption="Order: the p of error ∝ dtᵖ, with its 95 % interval. Cost: µs per simulated second"
+        " at the largest dt that reaches this accuracy.",
+    )
+    every = table_of(
+        points,
+        "name",
+        {
+            "dt, s": "dt_s",
+            "error, radii": "error",
+            "95 % over the seeds": interval_of_seeds,
+            "cost, µs/s": "cost",
+            "quartiles, µs/s": quartiles,
+            "idle steps, µs/s": "idle",
+            "wrapping, µs/s": "wrapping",
+            "failed": lambda row: (
+                f"{row['failed']} of {row['seeds']}: {failure(row)}" if row["failed"] else ""
+            ),
+        },
+        sortable=True,
+        corner="Engine",
+    )
+    return [chart, table, every]

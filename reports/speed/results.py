@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from crosscheck2d.reports.compare.pareto import ACCURACIES
 from crosscheck2d.reports.compare.pooling import pooled
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.timing import Noise, noise_of
@@ -51,6 +50,7 @@ class Results:
         self.pooled_reached = tables.pooled_reached(poolable(self.reached, asked), self.reached)
         self.sizes = tables.sizes(measured)
         self.growth = tables.growth(self.sizes, measured.stopped)
+        self.pile = tables.pile(measured)
         self.sweeps = tables.sweeps(measured, seed)
         self.pooled_sweeps = tables.pooled_sweeps(self.sweeps)
         self.options = tables.options(measured)
@@ -79,25 +79,6 @@ class Results:
         ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
         return noise_of(ratios.to_numpy(float))
 
-    def order_table(self, scene: str) -> pd.DataFrame:
-        """A row for each engine: order with interval and verdict, and for every accuracy (cost, dt,
-        why) as columns."""
-        orders = self.orders[self.orders.scenario == scene]
-        reached = self.reached[self.reached.scenario == scene]
-        got = dict(
-            zip(
-                zip(reached.engine, reached.profile, reached.accuracy),
-                zip(reached.cost, reached.dt_s, reached.why),
-            )
-        )
-        who = list(zip(orders.engine, orders.profile))
-        wide = orders.copy()
-        for accuracy in ACCURACIES:
-            wide[accuracy] = [got[*each, accuracy] for each in who]
-        beside = self.bindings[self.bindings.scenario == scene].drop(columns="scenario")
-        wide = wide.merge(beside, on=["engine", "profile"], how="left")
-        return wide.assign(name=wide.engine + ":" + wide.profile)
-
     @property
     def files(self) -> dict[str, pd.DataFrame]:
         """The tables, by the names of their CSV files."""
@@ -109,6 +90,7 @@ class Results:
             "speed_orders": self.orders,
             "speed_reached": self.reached,
             "speed_sizes": self.sizes,
+            "speed_pile": self.pile,
             "speed_options": self.options,
             "speed_driving": self.driving,
             "speed_bindings": self.bindings,

@@ -3,7 +3,8 @@ noise floor."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,6 @@ from crosscheck2d.reports.compare.pareto import (
     yardstick_of,
 )
 from crosscheck2d.reports.compare.pooling import POOLED, WHO, pooled
-from crosscheck2d.reports.page import style
 from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, binding_of
 from crosscheck2d.reports.run.timing import WARM_UP
 from crosscheck2d.reports.speed.measure import IN_PILE, SIZE, SLEEPING, WORST_STEP, Measured
@@ -34,6 +34,16 @@ from crosscheck2d.reports.terminal.counts import listed
 from crosscheck2d.scenarios.model import Scenario
 
 NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
+TIMES = ["cost", "low", "high", "best", "wrapping"]
+
+
+def rows_by(
+    table: pd.DataFrame, keys: Sequence[str], row: Callable[[pd.DataFrame], Mapping[str, Any]]
+) -> pd.DataFrame:
+    """A row for each group of `keys`, in the order of appearance: the keys and `row` of the
+    group."""
+    groups = table.groupby(list(keys), sort=False)
+    return pd.DataFrame([dict(zip(keys, key)) | {**row(group)} for key, group in groups])
 
 
 def points(measured: Measured, seed: int) -> pd.DataFrame:
@@ -113,30 +123,28 @@ def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
     interval error_low, error_high; cost (median, µs per simulated second; nan where not timed), its
     quartiles low and high, best, wrapping, rounds.
     """
-    errors = measured.errors[measured.errors.kind == kind]
-    keys, rows = ["scenario", *WHO, "change", "dt_s", "substeps"], []
-    for key, group in errors.groupby(keys, sort=False):
+
+    def over_seeds(group: pd.DataFrame) -> dict[str, Any]:
         values, failed = group.error_radii.to_numpy(float), group[group.status != "ok"]
         low, high = median_interval(values, seed)
-        rows.append(
-            dict(zip(keys, key))
-            | {
-                "until_s": group.until_s.iloc[0],
-                "duration_s": group.duration_s.iloc[0],
-                "seeds": len(group),
-                "failed": len(failed),
-                "status": "ok" if failed.empty else failed.status.iloc[0],
-                "reason": "" if failed.empty else failed.reason.iloc[0],
-                "error": float(
-                    np.percentile(
-                        values, 50, method="higher" if np.isinf(values).any() else "linear"
-                    )
-                ),
-                "error_low": low,
-                "error_high": high,
-            }
-        )
-    return pd.DataFrame(rows).merge(times(measured, kind), on=keys[:-1], how="left")
+        method: Any = "higher" if np.isinf(values).any() else "linear"
+        worst = group.iloc[0] if failed.empty else failed.iloc[0]
+        return {
+            **group[["until_s", "duration_s"]].iloc[0],
+            "seeds": len(group),
+            "failed": len(failed),
+            "status": worst.status,
+            "reason": "" if failed.empty else worst.reason,
+            "error": float(np.percentile(values, 50, method=method)),
+            "error_low": low,
+            "error_high": high,
+        }
+
+    keys = ["scenario", *WHO, "change", "dt_s"]
+    errors = measured.errors[measured.errors.kind == kind]
+    first = measured.samples[(measured.samples.kind == kind) & (measured.samples.copy_of == 0)]
+    times = in_us(summed_up(first, keys))
+    return rows_by(errors, [*keys, "substeps"], over_seeds).merge(times, on=keys, how="left")
 
 
 def doublings(found: pd.DataFrame) -> pd.Series:
@@ -145,18 +153,9 @@ def doublings(found: pd.DataFrame) -> pd.Series:
     return (found.substeps / coarsest).map(np.log2).round().astype(int)
 
 
-def times(measured: Measured, kind: str) -> pd.DataFrame:
-    """scenario, engine, profile, change, dt_s, cost, low, high, best, wrapping (µs per simulated
-    second), rounds."""
-    samples = measured.samples
-    first = samples[(samples.kind == kind) & (samples.copy_of == 0)]
-    return in_us(summed_up(first, ["scenario", *WHO, "change", "dt_s"]))
-
-
 def in_us(table: pd.DataFrame) -> pd.DataFrame:
     """The same times in µs."""
-    columns = ["cost", "low", "high", "best", "wrapping"]
-    return table.assign(**{column: table[column] * 1e6 for column in columns})
+    return table.assign(**{column: table[column] * 1e6 for column in TIMES})
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
@@ -165,60 +164,47 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
     steps, how many were played, and failed, at how many of them a seed failed: what failed has no
     part in slope and verdict.
     """
-    found = measured.errors[measured.errors.kind == SCENE]
-    rows = []
-    for keys, group in found.groupby(["scenario", *WHO], sort=False):
+
+    def fit(group: pd.DataFrame) -> dict[str, Any]:
         errors, changes = (
             group.pivot(index="seed", columns="substeps", values=value).to_numpy(float)
             for value in ("error_radii", "change_radii")
         )
         dt = np.sort(group.dt_s.unique())[::-1]  # coarse to fine, as the columns
         failed = ~np.isfinite(errors)
-        if failed.all() or len(dt) < 2:
-            order = Order(np.nan, np.nan, np.nan, FAILED if failed.all() else "")
-        else:
+        order = Order(np.nan, np.nan, np.nan, FAILED if failed.all() else "")
+        if len(dt) > 1 and not failed.all():
             order = order_of(dt, errors, changes, seed)
         coarsest, finest = np.median(errors[:, [0, -1]], axis=0).tolist()
-        rows.append(
-            dict(zip(["scenario", *WHO], keys))
-            | order._asdict()
-            | {
-                "finest_dt_s": dt[-1],
-                "steps": len(dt),
-                "coarsest_error": coarsest,
-                "finest_error": finest,
-                "failed": int(failed.any(axis=0).sum()),
-            }
-        )
-    return pd.DataFrame(rows)
+        return order._asdict() | {
+            "finest_dt_s": dt[-1],
+            "steps": len(dt),
+            "coarsest_error": coarsest,
+            "finest_error": finest,
+            "failed": int(failed.any(axis=0).sum()),
+        }
+
+    scenes = measured.errors[measured.errors.kind == SCENE]
+    return rows_by(scenes, ["scenario", *WHO], fit)
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
     """A row for each scenario, engine and accuracy: accuracy (radii), cost (µs per simulated
     second), dt_s, why it is not, and lost: it is not at any dt, or failed."""
-    verdicts: dict[tuple[Any, ...], str] = dict(
-        zip(zip(fitted.scenario, fitted.engine, fitted.profile), fitted.verdict)
-    )
-    rows = []
-    for keys, group in found.groupby(["scenario", *WHO], sort=False):
-        for name, accuracy in ACCURACIES.items():
-            dts, costs, errors = (
-                group[column].to_numpy(float) for column in ("dt_s", "cost", "error")
-            )
-            cost, dt, why = cost_to_reach(accuracy, dts, costs, errors, verdicts[tuple(keys)])
-            if why == NOT_REACHED:
-                why = f"not down to dt {group.dt_s.min():.2g} s"
-            rows.append(
-                dict(zip(["scenario", *WHO], keys))
-                | {
-                    "accuracy": name,
-                    "cost": cost,
-                    "dt_s": dt,
-                    "why": why,
-                    "lost": why in (UNREACHABLE, FAILED),
-                }
-            )
-    return pd.DataFrame(rows)
+    keys = ["scenario", *WHO]
+    both = found.merge(fitted[[*keys, "verdict"]], on=keys)
+
+    def reach(accuracy: str, group: pd.DataFrame) -> dict[str, Any]:
+        dts, costs, errors = (group[name].to_numpy(float) for name in ("dt_s", "cost", "error"))
+        verdict = group.verdict.iloc[0]
+        cost, dt, why = cost_to_reach(ACCURACIES[accuracy], dts, costs, errors, verdict)
+        if why == NOT_REACHED:
+            why = f"not down to dt {group.dt_s.min():.2g} s"
+        lost = why in (UNREACHABLE, FAILED)
+        return {"accuracy": accuracy, "cost": cost, "dt_s": dt, "why": why, "lost": lost}
+
+    parts = [rows_by(both, keys, partial(reach, accuracy)) for accuracy in ACCURACIES]
+    return pd.concat(parts).sort_index(kind="stable", ignore_index=True)
 
 
 def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
@@ -231,30 +217,25 @@ def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
     lost: half or more are never or failed. `part`: the rows of `found`, from `reached`, of the
     scenarios that are pooled.
     """
-    rows = []
     own = yardstick_of(found)
-    for (engine, profile, accuracy), group in part.groupby([*WHO, "accuracy"], sort=False):
-        got = int(group.cost.notna().sum())
+
+    def pool(group: pd.DataFrame) -> dict[str, Any]:
+        got, count = int(group.cost.notna().sum()), len(group)
         others = {name: int((group.why == why).sum()) for name, why in NOT_GOT.items()}
-        said = [f"{got} of {len(group)}"]
-        said += [f"{name} in {count}" for name, count in others.items() if count]
-        most = 2 * got > len(group)
-        rows.append(
-            {
-                "scenario": POOLED,
-                "engine": engine,
-                "profile": profile,
-                "accuracy": accuracy,
-                "cost": paired_cost(group, own[own.accuracy == accuracy]) if most else np.nan,
-                "dt_s": np.nan,
-                "why": ", ".join(said),
-                "lost": 2 * int(group.lost.sum()) >= len(group),
-                "of": len(group),
-                "got": got,
-                **others,
-            }
-        )
-    return pd.DataFrame(rows)
+        parts = [f"{got} of {count}", *(f"{name} in {k}" for name, k in others.items() if k)]
+        mine = own[own.accuracy == group.accuracy.iloc[0]]
+        return {
+            "scenario": POOLED,
+            "cost": paired_cost(group, mine) if 2 * got > count else np.nan,
+            "dt_s": np.nan,
+            "why": ", ".join(parts),
+            "lost": 2 * int(group.lost.sum()) >= count,
+            "of": count,
+            "got": got,
+            **others,
+        }
+
+    return rows_by(part, [*WHO, "accuracy"], pool)
 
 
 def noise(measured: Measured) -> pd.DataFrame:
@@ -297,15 +278,8 @@ def idle(found: pd.DataFrame, points: pd.DataFrame, scenarios: Mapping[str, Scen
     """Of each row of `points` what its steps and calls cost where there is nothing to do, µs per
     simulated second; nan where `found`, of `bindings`, does not say."""
     both = points[["scenario", *WHO, "substeps"]].merge(found, on=["scenario", *WHO], how="left")
-    values = [
-        binding_of(
-            row["step_us"],
-            row["step_us"] + row["call_us"],
-            scenarios[row["scenario"]],
-            row["substeps"],
-        )
-        for row in both.to_dict("records")
-    ]
+    rows = zip(both.scenario, both.step_us, both.call_us, both.substeps)
+    values = [binding_of(step, step + call, scenarios[name], k) for name, step, call, k in rows]
     return pd.Series(values, points.index, dtype=float)
 
 
@@ -343,29 +317,21 @@ def end_of_all_pairs(costs: pd.DataFrame) -> str:
     return f"Testing all pairs costs more than {listed(ends)}." if ends else ""
 
 
-def cost_of_sleep(measured: Measured) -> str:
-    """A sentence: what a step of a settled pile costs, and with sleeping allowed; "" if none was
-    timed."""
+def pile(measured: Measured) -> pd.DataFrame:
+    """name, n and what a step of a settled pile of n disks costs, µs: `PLAIN` and `SLEEPING`; no
+    rows if none was timed."""
     samples = measured.samples[measured.samples.kind == IN_PILE]
     costs = in_us(summed_up(samples, [*WHO, "change", "n"]))
     named = costs.assign(name=costs.engine + ":" + costs.profile)
-    table = named.pivot(index="name", columns="change", values="cost")
-    both = [
-        f"{name} {style.number(row[PLAIN], 2)}, with sleeping {style.number(row[SLEEPING], 2)}"
-        for name, row in table.iterrows()
-        if len(row.dropna()) > 1
-    ]
-    if not both:
-        return ""
-    return f"A step of a settled pile of {costs.n.max()} disks costs, in µs: {'; '.join(both)}."
+    wide = named.pivot(index=["name", "n"], columns="change", values="cost")
+    return wide.reindex(columns=[PLAIN, SLEEPING]).dropna().reset_index()
 
 
 def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:
     """engine, profile, exponent of the costs of `sizes`, low, high, most (disks), and where and why
     it was first stopped, `Measured.stopped`."""
-    first = {who: f"{n}: {why}" for (who, n), why in reversed([*stopped.items()])}
-    timed = costs.engine + ":" + costs.profile
-    rows = []
+    first = {name: f"{n}: {why}" for (name, n), why in reversed([*stopped.items()])}
+    timed, rows = costs.engine + ":" + costs.profile, []
     # some engines were stopped at the smallest number of disks
     for name in dict.fromkeys([*timed, *(name for name, _ in stopped)]):
         group = costs[timed == name]
@@ -400,14 +366,6 @@ def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     rounds; no warm-up."""
     counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
     cost = counted["cost"]
-    table = pd.DataFrame(
-        {
-            "cost": cost.median(),
-            "low": cost.quantile(0.25),
-            "high": cost.quantile(0.75),
-            "best": cost.min(),
-            "wrapping": counted["wrapping"].median(),
-            "rounds": cost.size(),
-        }
-    )
-    return table.reset_index()
+    quartiles = {"low": cost.quantile(0.25), "high": cost.quantile(0.75)}
+    table = pd.DataFrame({"cost": cost.median(), **quartiles, "best": cost.min()})
+    return table.assign(wrapping=counted["wrapping"].median(), rounds=cost.size()).reset_index()

@@ -15,23 +15,12 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.reports.compare.pareto import YARDSTICK
 from crosscheck2d.reports.speed.plan import PLAIN
+from crosscheck2d.reports.speed.tables import rows_by
 
 COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != YARDSTICK)
-COLUMNS = [
-    "engine",
-    "profile",
-    "change",
-    "scenes",
-    "ratio",
-    "low",
-    "high",
-    "cheaper",
-    "cheaper_in",
-    "bare_cheaper",
-    "bare_cheaper_in",
-    "not_timed_in",
-]
 KEYS = ["engine", "profile", "change"]
+COLUMNS = [*KEYS, "scenes", "ratio", "low", "high", "cheaper", "cheaper_in"]
+COLUMNS += ["bare_cheaper", "bare_cheaper_in", "not_timed_in"]
 
 
 def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
@@ -52,30 +41,24 @@ def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
     both = plain[plain.name.isin(COMPARED)].merge(own, on=at, how="left")
     if own.empty or both.empty:
         return pd.DataFrame(columns=COLUMNS)
-    rows = pd.concat([both, options_over_own(options)]) if len(options) else both
-    found = [row_of(group) for _, group in rows.groupby(KEYS, sort=False)]
-    return pd.DataFrame(found, columns=COLUMNS)
+    if len(options):  # the changed settings, timed in the same rounds
+        named = options.assign(name=options.engine + ":" + options.profile)
+        costs = named[named.name == YARDSTICK].groupby("scenario").cost_plain.first()
+        changed = named[named.name.isin(COMPARED)]
+        changed = changed.assign(own=changed.scenario.map(costs), idle=np.nan, own_idle=np.nan)
+        both = pd.concat([both, changed])
+    return rows_by(both, KEYS, over_own)[COLUMNS]
 
 
-def options_over_own(options: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, profile, change, cost and own of every changed setting of `COMPARED`, timed
-    in the same rounds."""
-    names = options.engine + ":" + options.profile
-    own = options[names == YARDSTICK].groupby("scenario").cost_plain.first()
-    changed = options[names.isin(COMPARED)]
-    return changed.assign(own=changed.scenario.map(own), idle=np.nan, own_idle=np.nan)
-
-
-def row_of(group: pd.DataFrame) -> dict[str, object]:
+def over_own(group: pd.DataFrame) -> dict[str, object]:
     """One row of `against_own` from those of one engine in all scenes and steps."""
-    known = {key: group[key].iloc[0] for key in KEYS}
     logs = group.assign(log=np.log(group.cost) - np.log(group.own))
     ratios = logs.groupby("scenario", sort=False)["log"].mean()
     timed = np.exp(ratios.dropna())
     bare = ((group.cost - group.idle) - (group.own - group.own_idle)) * group.get("dt_s", np.nan)
     bare = bare.groupby(group.scenario, sort=False).mean().dropna()
     cheaper, bare_cheaper = timed[timed < 1].index, bare[bare < 0].index
-    return known | {
+    return {
         "scenes": len(timed),
         "ratio": np.exp(np.log(timed).mean()),
         "low": timed.min(),

@@ -12,9 +12,7 @@ import numpy as np
 from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.adapters.run import Run, gather
 from crosscheck2d.adapters.runaway import fault_of
-from crosscheck2d.reports.stability.cases_collisions import of_pair
 from crosscheck2d.reports.stability.limits import Case
-from crosscheck2d.reports.stability.phases import EDGE, phase, sampled
 from crosscheck2d.reports.stability.predicates import (
     ANGLE_OFF,
     BOUNCES_OFF,
@@ -22,25 +20,34 @@ from crosscheck2d.reports.stability.predicates import (
     SPRING_GROWS,
     WRONG_DISTANCE,
 )
+from crosscheck2d.reports.stability.scenes import (
+    DT,
+    EDGE,
+    RADIUS,
+    G,
+    disks,
+    free_answer,
+    pair_answer,
+    phase,
+    sampled,
+    scenario_of,
+)
 from crosscheck2d.reports.stability.variants import DrivenEngine, with_variant
-from crosscheck2d.scenarios.families.placing import lay_out
-from crosscheck2d.scenarios.model import NO_COLLISIONS, Array, Scenario, Scene, State, Trajectory
-from crosscheck2d.scenarios.truth.closed_forms import answer, bouncing, flight
+from crosscheck2d.scenarios.model import NO_COLLISIONS, Array, Scenario, State, Trajectory
+from crosscheck2d.scenarios.truth.closed_forms import answer, bouncing
 
-RADIUS, G = 0.25, 10.0
 HEIGHT = 1.25  # m, so that the fall lasts 0.5 s and ends at 5 m/s
 FALLS = 20  # the drop and nine and a half bounces
 OSCILLATION = 400  # steps
 
 
 def ball(x: float, run: int) -> Scenario:
-    """A ball with e = 1 is dropped onto a floor and sampled about 24 times in each flight; x =
-    dt over the time of the fall.
+    """Up to which dt does a ball at e = 1 come back to its height?
 
-    The runs differ in height, which changes the rounding of a step, and in the phase of the
-    first collision within its step: some methods do better than usual where a fall takes a whole
-    number of steps. Their dt over the time of the fall is x, or less by up to one step of the
-    fall.
+    It is sampled about 24 times in each flight; x = dt over the time of the fall. The runs differ
+    in height, which changes the rounding of a step, and in the phase of the first collision within
+    its step: some methods do better than usual where a fall takes a whole number of steps. Their dt
+    over the time of the fall is x, or less by up to one step of the fall.
     """
     height = HEIGHT * (1 + 0.01 * sampled(seed=1)[run])
     fall = sqrt(2 * height / G)
@@ -48,15 +55,7 @@ def ball(x: float, run: int) -> Scenario:
     every = max(1, int(1 / (12 * x)))
     interval = every * dt
     samples = round(FALLS * fall / interval)
-    scene = lay_out(
-        position=[[0, RADIUS + height]],
-        velocity=[[0, 0]],
-        radius=[RADIUS],
-        mass=[1.0],
-        restitution=1.0,
-        gravity=[0, -G],
-        walls=[[[-4, 0], [4, 0]]],
-    )
+    scene = disks([[0, RADIUS + height]], gravity=[0, -G], walls=[[[-4, 0], [4, 0]]])
 
     def truth(t: Array) -> Trajectory:
         legs = bouncing(height, G, 1.0, t[-1])
@@ -64,87 +63,44 @@ def ball(x: float, run: int) -> Scenario:
         position, velocity = (np.stack([0 * y, y], axis=-1)[:, None] for y in (gap + RADIUS, speed))
         return answer(scene, t, (position, velocity), legs.wall_collisions(0, (0,), 1.0, 1.0))
 
-    return Scenario(
-        "ball",
-        "Does it come back?",
-        "the bouncing ball in closed form",
-        scene,
-        samples * interval,
-        interval,
-        (every,),
-        truth=truth,
-    )
+    return scenario_of(scene, samples * interval, interval, every, truth)
 
 
 def scaled(x: float, _run: int) -> Scenario:
     """Two disks of x / 2 m meet head-on at 4 x m/s with e = 1: at x = 1 they approach by 0.13
     radii in 1/60 s."""
-    radius, speed = 0.5 * x, 4.0 * x
-    scene = lay_out(
-        position=[[-2.2 * x, 0], [0, 0]],
-        velocity=[[speed, 0], [0, 0]],
-        radius=[radius, radius],
-        mass=[1.0, 1.0],
-        restitution=1.0,
-    )
-    truth = partial(of_pair, scene)
-    return Scenario(
-        "scaled", "Is it the same scene?", "similarity", scene, 1.0, 1 / 60, (1,), truth=truth
-    )
+    scene = disks([[-2.2 * x, 0], [0, 0]], [[4.0 * x, 0], [0, 0]], radius=0.5 * x)
+    return scenario_of(scene, 1.0, 1 / 60, truth=partial(pair_answer, scene))
 
 
 def far(x: float, _run: int) -> Scenario:
-    """A disk starts x m from the origin and flies at 1 m/s for 1 s in steps of 1/240 s."""
-    scene = lay_out(
-        position=[[x, 0]], velocity=[[1.0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0
-    )
-    truth = partial(of_free_disk, scene)
-    return Scenario("far", "Does it fly on?", "x + v t", scene, 1.0, 1 / 30, (8,), truth=truth)
+    """How far from the origin may a disk at 1 m/s be and still fly on?
 
-
-def of_free_disk(scene: Scene, t: Array) -> Trajectory:
-    """The exact answer of a disk that meets nothing, at the times t (k,) s."""
-    return answer(scene, t, flight(t[:, None, None], scene.position, scene.velocity))
+    For 1 s in steps of 1/240 s.
+    """
+    scene = disks([[x, 0]], [[1.0, 0]])
+    return scenario_of(scene, 1.0, 1 / 30, 8, partial(free_answer, scene))
 
 
 def spinning(x: float, _run: int) -> Scenario:
-    """A disk turns by x rad in each step."""
-    dt = 1 / 64
-    scene = lay_out(
-        position=[[0, 0]],
-        velocity=[[1.0, 0]],
-        radius=[RADIUS],
-        mass=[1.0],
-        restitution=1.0,
-        angular_velocity=[x / dt],
-    )
-    truth = partial(of_free_disk, scene)
-    return Scenario(
-        "spinning", "Does it turn as it spins?", "theta + w t", scene, 0.5, dt, (1,), truth=truth
-    )
+    """How fast may a disk spin?"""
+    scene = disks([[0, 0]], [[1.0, 0]], angular_velocity=[x / DT])
+    return scenario_of(scene, 0.5, DT, truth=partial(free_answer, scene))
 
 
 def oscillator(x: float, _run: int) -> Scenario:
-    """A disk of 1 kg on a spring of 1 N/m, so that w = 1 rad/s; x = w dt."""
-    scene = lay_out(
-        position=[[1.0, 0]], velocity=[[0, 0]], radius=[RADIUS], mass=[1.0], restitution=1.0
-    )
+    """How stiff may a spring be whose force is read off the positions before each step?
+
+    A disk of 1 kg on a spring of 1 N/m, so that w = 1 rad/s; x = w dt.
+    """
+    scene = disks([[1.0, 0]])
 
     def truth(t: Array) -> Trajectory:
         position, velocity = np.zeros((len(t), 1, 2)), np.zeros((len(t), 1, 2))
         position[:, 0, 0], velocity[:, 0, 0] = np.cos(t), -np.sin(t)
         return answer(scene, t, (position, velocity))
 
-    return Scenario(
-        "oscillator",
-        "Does it keep its swing?",
-        "cos w t",
-        scene,
-        OSCILLATION * x,
-        x,
-        (1,),
-        truth=truth,
-    )
+    return scenario_of(scene, OSCILLATION * x, x, truth=truth)
 
 
 def on_spring(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
@@ -152,9 +108,10 @@ def on_spring(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
     engine would write it."""
     states: list[State] = []
     status, reason, settings = "ok", "", {}
+    dt = scenario.sample_interval
     with closing(driven.make()) as engine:
         try:
-            engine.load(scenario.scene, scenario.sample_interval)
+            engine.load(scenario.scene, dt)
             settings = engine.settings()
             states.append(engine.read())
             for _ in range(scenario.intervals):
@@ -166,75 +123,37 @@ def on_spring(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
                     break
         except Unsupported as refusal:
             status, reason = "unsupported", str(refusal)
-    name, profile = driven.name.split(":")
     trajectory = gather(scenario, states, NO_COLLISIONS) if states else None
-    return scenario, Run(
-        name,
-        profile,
-        scenario.name,
-        scenario.sample_interval,
-        status,
-        reason,
-        trajectory,
-        settings=settings,
-    )
+    name, profile = driven.name.split(":")
+    run = Run(name, profile, scenario.name, dt, status, reason, trajectory, settings=settings)
+    return scenario, run
 
 
+FALL_STEPS = (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2)
+LARGER = (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3)
+SMALLER = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3)
 DECADES = (1.0, 10.0, 100.0, 1e3, 3e3, 1e4, 3e4, 1e5, 1e6, 1e7, 1e8)
-
+TURNS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0)
+SWINGS = (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0)
+SUBSTEPS = with_variant("16_substeps")
 ALONE = (
     Case(
         "bounce_drift",
-        "Up to which dt does a ball at e = 1 come back to its height?",
-        "dt / fall time",
-        (0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2),
         ball,
+        "dt / fall time",
+        FALL_STEPS,
         BOUNCES_OFF,
         runs=16,
-        also=(*with_variant("16_substeps"), *with_variant("position_correction")),
+        also=(*SUBSTEPS, *with_variant("position_correction")),
     ),
-    Case(
-        "scale_up",
-        "How much larger may a scene be made and stay the same?",
-        "scale",
-        (1.0, 3.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3),
-        scaled,
-        SCALED_DEVIATION,
+    *(
+        Case(f"scale_{way}", scaled, "scale", values, SCALED_DEVIATION, asks)
+        for way, values, asks in (
+            ("up", LARGER, "How much larger may a scene be made and stay the same?"),
+            ("down", SMALLER, "How much smaller may a scene be made and stay the same?"),
+        )
     ),
-    Case(
-        "scale_down",
-        "How much smaller may a scene be made and stay the same?",
-        "scale",
-        (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3),
-        scaled,
-        SCALED_DEVIATION,
-    ),
-    Case(
-        "far_from_origin",
-        "How far from the origin may a disk at 1 m/s be and still fly on?",
-        "offset",
-        DECADES,
-        far,
-        WRONG_DISTANCE,
-        unit="m",
-    ),
-    Case(
-        "spin",
-        "How fast may a disk spin?",
-        "w dt",
-        (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
-        spinning,
-        ANGLE_OFF,
-        unit="rad",
-        also=with_variant("16_substeps"),
-    ),
-    Case(
-        "stiff_force",
-        "How stiff may a spring be whose force is read off the positions before each step?",
-        "w dt",
-        (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0),
-        oscillator,
-        SPRING_GROWS,
-        play=on_spring,
-    ),
+    Case("far_from_origin", far, "offset", DECADES, WRONG_DISTANCE, unit="m"),
+    Case("spin", spinning, "w dt", TURNS, ANGLE_OFF, unit="rad", also=SUBSTEPS),
+    Case("stiff_force", oscillator, "w dt", SWINGS, SPRING_GROWS, play=on_spring),
 )

@@ -7,34 +7,44 @@ no collision here is followed by another, so that no rounding grows and the hori
 
 from __future__ import annotations
 
+from functools import partial
 from math import ceil, hypot
 
 import numpy as np
 
-from crosscheck2d.reports.stability.cases_collisions import AFTER, LEAD, stepped
 from crosscheck2d.reports.stability.limits import Case
-from crosscheck2d.reports.stability.phases import phase
 from crosscheck2d.reports.stability.predicates_friction import (
     CREEPS,
     FRICTION_OFF,
     ROLLING_OFF,
     SLIPS,
 )
+from crosscheck2d.reports.stability.scenes import (
+    AFTER,
+    LEAD,
+    RADIUS,
+    G,
+    disks,
+    phase,
+    scenario_of,
+    stepped,
+)
+from crosscheck2d.reports.stability.scenes import (
+    DT as REST_DT,
+)
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY
-from crosscheck2d.scenarios.families.friction import IMPACT, ROLL, start_of, turning_answer
-from crosscheck2d.scenarios.families.placing import lay_out
+from crosscheck2d.scenarios.families.friction import start_of, turning_answer
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 from crosscheck2d.scenarios.truth.closed_forms import at_rest
 from crosscheck2d.scenarios.truth.sliding import bounce, slide, spinning_pair
 
-RADIUS, SOLID, G = 0.25, 2.0, 10.0  # SOLID: m r2 / I
+SOLID = 2.0  # m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped
 # A step displacement of 0.05 radii: an engine that takes its lever arm to the middle of the overlap
 # is off by half of that at most.
 DT = 0.05 * RADIUS / FALL
 PHASES = 8  # runs at a value, each with the collision elsewhere in its step
 FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
-REST_DT = 1 / 64
 
 
 def rough_bounce(
@@ -42,14 +52,12 @@ def rough_bounce(
 ) -> Scenario:
     """A disk falls onto a floor at `FALL`, along it at `along` m/s, with a spin in rad/s."""
     height = FALL * DT * (LEAD + phase(run))
-    scene = lay_out(
-        position=[[0.0, RADIUS + height]],
-        velocity=[[along, -FALL]],
+    scene = disks(
+        [[0.0, RADIUS + height]],
+        [[along, -FALL]],
         angular_velocity=[spin],
-        radius=[RADIUS],
-        mass=[1.0],
         walls=FLOOR,
-        restitution=e,
+        e=e,
         friction=mu,
     )
 
@@ -59,47 +67,45 @@ def rough_bounce(
         collision = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    asks = "Does friction brake and turn the disk?"
-    return stepped("rough-bounce", asks, scene, DT, truth, IMPACT)
+    return stepped(scene, DT, truth)
 
 
 def spinning_into(x: float, run: int) -> Scenario:
-    """A spinning disk of mass 1 meets one of mass x that rests: they stick, e = 0.5, friction 1."""
+    """How unequal may two masses be that exchange spin?
+
+    A spinning disk of mass 1 meets one of mass x that rests: they stick, e = 0.5, friction 1.
+    """
     start = -2 * RADIUS - FALL * DT * (LEAD + phase(run))
-    scene = lay_out(
-        position=[[start, 0.0], [0.0, 0.0]],
-        velocity=[[FALL, 0.0], [0.0, 0.0]],
+    scene = disks(
+        [[start, 0.0], [0.0, 0.0]],
+        [[FALL, 0.0], [0.0, 0.0]],
         angular_velocity=[1.0 / RADIUS, 0.0],
-        radius=[RADIUS, RADIUS],
         mass=[1.0, x],
-        restitution=0.5,
+        e=0.5,
         friction=1.0,
     )
 
     def truth(t: Array) -> Trajectory:
         legs, impulse = spinning_pair(scene, 0)
-        return turning_answer(
-            scene, t, legs.at(t), [(float(legs.start[1]), 0, 1, float(impulse[0]))]
-        )
+        collision = (float(legs.start[1]), 0, 1, float(impulse[0]))
+        return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped("spinning-into", "Do they exchange spin and speed?", scene, DT, truth, IMPACT)
+    return stepped(scene, DT, truth)
 
 
-def on_floor(asks: str, speed: float, friction: float, slope: float, steps: int) -> Scenario:
+def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenario:
     """A disk touches a floor and has no spin; gravity leans forward by `slope`, its tangent.
 
     A leaning gravity stands for a slope: so the disk touches the floor exactly in float64.
     """
     cosine = 1 / hypot(1.0, slope)
     sine = slope * cosine
-    scene = lay_out(
-        position=[[0.0, RADIUS]],
-        velocity=[[speed, 0.0]],
-        radius=[RADIUS],
-        mass=[1.0],
+    scene = disks(
+        [[0.0, RADIUS]],
+        [[speed, 0.0]],
         walls=[[[-10.0, 0.0], [10.0 + speed * steps * REST_DT, 0.0]]],
         gravity=[G * sine, -G * cosine],
-        restitution=0.0,
+        e=0.0,
         friction=friction,
     )
 
@@ -110,134 +116,84 @@ def on_floor(asks: str, speed: float, friction: float, slope: float, steps: int)
         place[..., :2] += scene.position
         return turning_answer(scene, t, (place, moves), [(0.0, 0, -1, 0.0)])
 
-    duration = steps * REST_DT
-    return Scenario("on-floor", asks, ROLL, scene, duration, REST_DT, (1,), truth=truth)
+    return scenario_of(scene, steps * REST_DT, REST_DT, truth=truth)
 
 
 def cone(x: float, run: int) -> Scenario:
-    """x = e; friction 0.1, so that the rim slips during the whole collision."""
+    """Up to which e does friction in a bounce follow Coulomb's law?
+
+    Friction 0.1, so that the rim slips during the whole collision.
+    """
     return rough_bounce(5.0, run, e=x)
 
 
 def strong(x: float, run: int) -> Scenario:
-    """x = friction, enough for the rim to stick; e = 0.5."""
+    """How large may friction be where the rim sticks in a bounce?
+
+    e = 0.5.
+    """
     return rough_bounce(3.0, run, e=0.5, mu=x)
 
 
 def whirling(x: float, run: int) -> Scenario:
-    """x = w dt, e = 0, friction 0.5."""
+    """How fast may a disk spin that falls onto a floor with friction?
+
+    x = w dt, e = 0, friction 0.5.
+    """
     return rough_bounce(0.0, run, spin=x / DT, mu=0.5)
 
 
 def sliding(x: float, run: int) -> Scenario:
-    """x = v dt / R; friction 0.5. The runs differ in where within its step the slide ends, by up
-    to one step."""
+    """How far may a disk slide in a step and still come to roll at 2/3 of its speed?
+
+    Friction 0.5. The runs differ in where within its step the slide ends, by up to one step.
+    """
     friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / REST_DT
     slides = speed / (3 * friction * G)
-    steps = ceil(1.5 * slides / REST_DT) + AFTER
-    return on_floor("Does it come to roll?", speed, friction, 0.0, steps)
+    return on_floor(speed, friction, 0.0, ceil(1.5 * slides / REST_DT) + AFTER)
 
 
 def nearly_slipping(x: float, _run: int) -> Scenario:
-    """x = 1 - tan(angle) / 3 mu: up to tan(angle) = 3 mu a solid disk rolls; friction 0.25, 1 s."""
-    return on_floor("Does it roll?", 0.0, 0.25, 3 * 0.25 * (1 - x), 64)
+    """How near to the steepest slope for rolling does a disk still roll?
+
+    Up to tan(angle) = 3 mu a solid disk rolls; friction 0.25, 1 s.
+    """
+    return on_floor(0.0, 0.25, 3 * 0.25 * (1 - x), 64)
 
 
 def in_corner(x: float, _run: int) -> Scenario:
-    """A disk lies in a corner for x steps, on a floor and against a wall; friction 0.5."""
-    scene = lay_out(
-        position=[[RADIUS, RADIUS]],
-        velocity=[[0.0, 0.0]],
-        radius=[RADIUS],
-        mass=[1.0],
-        walls=[[[-1.0, 0.0], [4.0, 0.0]], [[0.0, -1.0], [0.0, 4.0]]],
-        gravity=[-3.0, -G],
-        restitution=0.0,
-        friction=0.5,
-    )
+    """For how many steps does a disk stay at rest in a corner?
+
+    On a floor and against a wall, friction 0.5: the normal forces alone carry it.
+    """
+    walls = [[[-1.0, 0.0], [4.0, 0.0]], [[0.0, -1.0], [0.0, 4.0]]]
+    scene = disks([[RADIUS, RADIUS]], walls=walls, gravity=[-3.0, -G], e=0.0, friction=0.5)
     every = max(1, int(x) // 100)
-    return Scenario(
-        "in-corner",
-        "Does it stay?",
-        "equilibrium: the normal forces alone carry it",
-        scene,
-        int(x) // every * every * REST_DT,
-        every * REST_DT,
-        (every,),
-        truth=lambda t: at_rest(scene, t),
-    )
+    duration = int(x) // every * every * REST_DT
+    return scenario_of(scene, duration, every * REST_DT, every, lambda t: at_rest(scene, t))
 
 
+CONES = (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+FRICTIONS = (0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8)
+TURNS = (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0)
+RATIOS = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8)
+SLIDES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+SLOPES = (0.9, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5)
+rough = partial(Case, also=WITH_FRICTION_ONLY)
 FRICTION = (
-    Case(
-        "friction_in_bounce",
-        "Up to which e does friction in a bounce follow Coulomb's law?",
-        "e",
-        (0.05, 0.07, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0),
-        cone,
-        FRICTION_OFF,
-        runs=PHASES,
-        also=WITH_FRICTION_ONLY,
-    ),
-    Case(
-        "strong_friction",
-        "How large may friction be where the rim sticks in a bounce?",
-        "friction",
-        (0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8),
-        strong,
-        FRICTION_OFF,
-        runs=PHASES,
-        also=WITH_FRICTION_ONLY,
-    ),
-    Case(
-        "spin_in_bounce",
-        "How fast may a disk spin that falls onto a floor with friction?",
-        "w dt",
-        (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
-        whirling,
-        FRICTION_OFF,
-        unit="rad",
-        runs=PHASES,
-        also=WITH_FRICTION_ONLY,
-    ),
-    Case(
-        "friction_mass_ratio",
-        "How unequal may two masses be that exchange spin?",
-        "m2 / m1",
-        (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8),
-        spinning_into,
-        FRICTION_OFF,
-        runs=PHASES,
-        also=WITH_FRICTION_ONLY,
-    ),
-    Case(
-        "slide_to_roll",
-        "How far may a disk slide in a step and still come to roll at 2/3 of its speed?",
-        "v dt / R",
-        (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
-        sliding,
-        ROLLING_OFF,
-        runs=4,
-        also=WITH_FRICTION_ONLY,
-    ),
-    Case(
-        "critical_slope",
-        "How near to the steepest slope for rolling does a disk still roll?",
-        "1 - tan(angle) / 3 mu",
-        (0.9, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3, 1e-4, 1e-5),
-        nearly_slipping,
-        SLIPS,
-        also=WITH_FRICTION_ONLY,
-    ),
-    Case(
+    rough("friction_in_bounce", cone, "e", CONES, FRICTION_OFF, runs=PHASES),
+    rough("strong_friction", strong, "friction", FRICTIONS, FRICTION_OFF, runs=PHASES),
+    rough("spin_in_bounce", whirling, "w dt", TURNS, FRICTION_OFF, unit="rad", runs=PHASES),
+    rough("friction_mass_ratio", spinning_into, "m2 / m1", RATIOS, FRICTION_OFF, runs=PHASES),
+    rough("slide_to_roll", sliding, "v dt / R", SLIDES, ROLLING_OFF, runs=4),
+    rough("critical_slope", nearly_slipping, "1 - tan(angle) / 3 mu", SLOPES, SLIPS),
+    rough(
         "creep_at_rest",
-        "For how many steps does a disk stay at rest in a corner?",
+        in_corner,
         "steps",
         (100.0, 1e3, 1e4, 1e5),
-        in_corner,
         CREEPS,
         whole=True,
-        also=WITH_FRICTION_ONLY,
         refines=False,
         quick_values=(100.0, 1e4),
     ),

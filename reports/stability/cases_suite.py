@@ -53,11 +53,11 @@ SEEDS = 4  # runs at a value of a random scene
 SUITE = tuple(
     Case(
         f"dt_{name}",
-        build().asks,
+        partial(at_dt, name),
         "dt",
         dense_ladder(build()),
-        partial(at_dt, name),
         USABLE,
+        build().asks,
         unit="s",
         runs=SEEDS if name in RANDOM else 1,
         ratio=1.2,

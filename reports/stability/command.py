@@ -18,14 +18,15 @@ from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import Limit
 from crosscheck2d.reports.stability.maps import MAPS
-from crosscheck2d.reports.stability.overview import in_words
+from crosscheck2d.reports.stability.overview import MARKS, in_words
 from crosscheck2d.reports.stability.page import write_page
 from crosscheck2d.reports.stability.results import (
     StabilityPlan,
     StabilityResults,
     carry_out,
     case_named,
-    export_failures,
+    done_before,
+    expected,
     read,
     table,
     tasks_of,
@@ -43,15 +44,6 @@ SEE = (
     "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"
     " --vary see --help"
 )
-MARKS = {
-    "–": "did not fail at any value tried",
-    "everywhere": "fails at every value",
-    "refused": "the engine does not play the scene",
-    "≤": "fails at this value and below, works above",
-    "≥": "fails at this value and above, works below",
-    "*": "works again at a harsher value, or also fails at the gentlest value",
-}
-"""Mark in the table of limits -> its meaning."""
 LIMITS, LAWS, MAP, PAGE = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
 STABILITY = "crosscheck stability"
 
@@ -88,6 +80,8 @@ def find(plan: StabilityPlan, fresh: bool, out: Path) -> NoReturn:
     if not tasks_of(plan) and {*plan.engines} <= {*WITH_FRICTION_ONLY}:
         refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in plan.engines])
     with opening(out, STABILITY, fresh) as store:
+        tasks = [task for task in tasks_of(plan) if task not in done_before(plan, store)]
+        Console(stderr=True).print(f"{expected(tasks, plan.workers)}.", highlight=False)
         kept = "The finished part is kept: give the same command again"
         with keeping(out, lambda: kept), Progress() as progress:
             carry_out(plan, store, progress)
@@ -107,11 +101,10 @@ def write_files(store: Store) -> StabilityResults:
     store.export(LIMITS, table(results.limits).to_csv(index=False))
     columns = ["scene", "engine", *AtGap._fields[:-1]]
     store.export(LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
-    columns = ["map", "engine", "x", "y", "reading", "failed", "event"]
+    columns = ["map", "engine", "x", "y", "reading", "failed", "verdict", "event"]
     store.export(MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
-    export_failures(store)
     with store.exporting(PAGE) as path:
-        write_page(path, store.folder, results)
+        write_page(path, results)
     return results
 
 

@@ -13,11 +13,17 @@ import numpy as np
 
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.mechanisms.settings import find_remedy, settings_of, without_finer
+from crosscheck2d.reports.compare.causes import (
+    ACTS_AT_END,
+    Cause,
+    CauseKind,
+    by_mechanisms,
+    unknown,
+)
 from crosscheck2d.reports.compare.faces import ALONG, first_on_line
-from crosscheck2d.reports.stability.ablations import ACTS_AT_END, reason_by_ablation
 from crosscheck2d.reports.stability.cases_collisions import BULLETS
-from crosscheck2d.reports.stability.limits import NOT_KNOWN, Limit
-from crosscheck2d.reports.stability.predicates import judge
+from crosscheck2d.reports.stability.limits import Limit
+from crosscheck2d.reports.stability.predicates import REFUSED, judge
 from crosscheck2d.reports.stability.predicates_usable import GHOST
 from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
@@ -26,21 +32,22 @@ from crosscheck2d.scenarios.model import Array, Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
 FINER = 8
+SAYS_SO = "the engine's message says so"
 
 
-def finer(one: Scenario) -> Scenario:
+def finer(scenario: Scenario) -> Scenario:
     """The same scene in steps of an eighth."""
-    return replace(one, substeps=(one.substeps[0] * FINER,))
+    return replace(scenario, substeps=(scenario.substeps[0] * FINER,))
 
 
-def at_home(one: Scenario) -> Scenario:
+def at_home(scenario: Scenario) -> Scenario:
     """The same scene, moved along x so that its middle is at the origin."""
-    return similar(one, shift=-float(np.mean(one.scene.position[:, 0])))
+    return similar(scenario, shift=-float(np.mean(scenario.scene.position[:, 0])))
 
 
-def joined(one: Scenario) -> Scenario:
+def joined(scenario: Scenario) -> Scenario:
     """The same scene with walls that touch on one line joined into one."""
-    walls, scene = list[Array](), one.scene
+    walls, scene = list[Array](), scenario.scene
     lines = np.array([first_on_line(scene.walls, w) for w in range(len(scene.walls))])
     for line in np.unique(lines):
         start, end = scene.walls[line]
@@ -52,12 +59,12 @@ def joined(one: Scenario) -> Scenario:
         last = np.append(first[1:], len(spans)) - 1
         walls += [start + np.outer(pair, way) for pair in zip(spans[first, 0], reach[last])]
     whole: Scene = replace(scene, walls=np.array(walls).reshape(-1, 2, 2))
-    return with_oracle(replace(one, scene=whole))
+    return with_oracle(replace(scenario, scene=whole))
 
 
-def unchanged(one: Scenario) -> Scenario:
+def unchanged(scenario: Scenario) -> Scenario:
     """The same scene."""
-    return one
+    return scenario
 
 
 class Intervention(NamedTuple):
@@ -65,7 +72,7 @@ class Intervention(NamedTuple):
 
     Attributes:
         engines, varied: patterns of engines and of what is varied, for which it is tried.
-        reason: why it failed, if it works with the change.
+        reason: why it failed, if it works with the change; None: that is not known.
         how: the change in words.
         change: what is done to the scene.
         engine: the engine that plays it instead; "": the same.
@@ -73,7 +80,7 @@ class Intervention(NamedTuple):
 
     engines: str
     varied: str
-    reason: str
+    reason: str | None
     how: str
     change: Callable[[Scenario], Scenario] = unchanged
     engine: str = ""
@@ -83,48 +90,23 @@ class Intervention(NamedTuple):
         return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
 
 
-SAYS_SO = "the engine's message says so"
+PIECES = "the walls of one floor act as several; join them into one wall"
+FLOAT32 = "positions are float32, too coarse so far from the origin"
+TOO_LARGE = f"{ACTS_AT_END}, and the step is too large for that"
+UNSWEPT, EIGHTHS = "disks are not swept against each other", "in steps of an eighth"
 INTERVENTIONS = {
-    "joined": Intervention(
-        "*",
-        "*",
-        "the walls of one floor act as several; join them into one wall",
-        "on a floor of one wall",
-        joined,
-    ),
-    "at_home": Intervention(
-        "box2d*",
-        "offset",
-        "positions are float32, too coarse so far from the origin",
-        "at the origin",
-        at_home,
-    ),
+    "joined": Intervention("*", "*", PIECES, "on a floor of one wall", joined),
+    "at_home": Intervention("box2d*", "offset", FLOAT32, "at the origin", at_home),
     "in_order": Intervention(
         "reference:[el]*", "*", ACTS_AT_END, "as reference:ordered", engine="reference:ordered"
     ),
     # For matter a smaller step is ambiguous: its friction, its friction of the air and its resting
     # threshold depend on the step, too.
-    "finer_matter": Intervention(
-        "matter:*",
-        "[!d]*",
-        f"{NOT_KNOWN}; the step is too large for something in it",
-        "in steps of an eighth",
-        finer,
-    ),
-    "finer": Intervention(
-        "*",
-        "[!d]*",
-        f"{ACTS_AT_END}, and the step is too large for that",
-        "in steps of an eighth",
-        finer,
-    ),
+    "finer_matter": Intervention("matter:*", "[!d]*", None, EIGHTHS, finer),
+    "finer": Intervention("*", "[!d]*", TOO_LARGE, EIGHTHS, finer),
     **{
         f"{bullets.partition(':')[0]}_swept": Intervention(
-            bullets.removesuffix("+bullets"),
-            "*",
-            "disks are not swept against each other",
-            f"as {bullets}",
-            engine=bullets,
+            bullets.removesuffix("+bullets"), "*", UNSWEPT, f"as {bullets}", engine=bullets
         )
         for bullets in BULLETS
     },
@@ -134,8 +116,6 @@ later. The settings of the engine come after `FIRST`.
 
 Where the step itself is varied, a finer one is not tried.
 """
-
-
 FIRST = ("joined",)
 
 
@@ -147,16 +127,15 @@ def intervention_of(
 
     A refusal needs no other explanation.
     """
-    seen = search.failure(limit)
-    if seen is None or seen[1].status == "unsupported":
+    failure = search.failure(limit)
+    if failure is None or failure[1].status == "unsupported":
         return ""
-    scenario, _ = seen
     for name in names:
         intervention = INTERVENTIONS[name]
         if intervention.fits(search.engine, search.case.varies):
-            changed = intervention.change(scenario)
-            engine = intervention.engine or search.engine
-            if not judge(search.case.predicate, changed, play_as(engine, changed)).failed:
+            changed = intervention.change(failure[0])
+            run = play_as(intervention.engine or search.engine, changed)
+            if not judge(search.case.predicate, changed, run).failed:
                 return name
     return ""
 
@@ -164,19 +143,18 @@ def intervention_of(
 def with_settings(search: LimitSearch, limit: Limit) -> Limit:
     """The limit with the settings of the engine with which the run that failed at it works, or with
     those that do not help."""
-    seen = search.failure(limit)
-    if seen is None or seen[1].status == "unsupported" or "+" in search.engine:
+    failure = search.failure(limit)
+    if failure is None or failure[1].status == "unsupported" or "+" in search.engine:
         return limit
-    scenario, predicate = seen[0], search.case.predicate
+    scenario, predicate = failure[0], search.case.predicate
 
     def error(parameters: Mapping[str, Any]) -> float:
         chosen, steps = without_finer(parameters)
         driven = DrivenEngine(search.engine, partial(row_of(search.engine).make, **chosen))
         finer = replace(scenario, substeps=(scenario.substeps[0] * steps,))
-        judged, run = search.case.play(driven, finer)
-        reading = judge(predicate, judged, run)
-        share = abs(reading.value) / (predicate.bound or 1.0)
-        if reading.failed:
+        verdict = judge(predicate, *search.case.play(driven, finer))
+        share = abs(verdict.value) / (predicate.bound or 1.0)
+        if verdict.failed:
             return share if share > 1.0 else np.inf
         return float(np.fmin(share, 1.0))  # nan: there is nothing to judge
 
@@ -187,25 +165,29 @@ def with_settings(search: LimitSearch, limit: Limit) -> Limit:
     return replace(limit, settings=words, settings_help=helps)
 
 
-def reason_by_intervention(limit: Limit, varied: str) -> tuple[str, str, str]:
-    """The reason for a failure that has none in the table, its source, and how it was tested, or
-    ""."""
+def cause_by_replays(limit: Limit, varied: str) -> Cause | None:
+    """The cause of a failure that has none in the table, as what removes it shows; None if nothing
+    failed."""
     failing = limit.failing
     if failing is None:
-        return "", "", ""
+        return None
     if limit.settings_help:
-        return limit.settings, "", "works with it"
+        return Cause(CauseKind.SETTING, limit.settings, shown="works with it")
     if limit.mechanisms:
-        return reason_by_ablation(limit)
+        return by_mechanisms(limit.mechanisms, limit.engine)
+    ghost = f"a {GHOST}: " * (failing.broken == GHOST)
     if intervention := INTERVENTIONS.get(limit.intervention):
-        words = f"a {GHOST}: " * (failing.broken == GHOST) + intervention.reason
-        return words, "", f"works {intervention.how}"
-    if failing.broken == "refused":
-        return "the engine refuses it", "", SAYS_SO
+        shown = f"works {intervention.how}"
+        if intervention.reason is None:
+            cause = unknown(shown, "the step is too large for something in it")
+            return cause._replace(text=ghost + cause.text)
+        return Cause(CauseKind.INTERVENTION, ghost + intervention.reason, shown=shown)
+    if failing.broken == REFUSED:
+        return Cause(CauseKind.REFUSAL, "the engine refuses it", shown=SAYS_SO)
     tried = dict.fromkeys(
         intervention.how
         for name, intervention in INTERVENTIONS.items()
         if name not in FIRST and intervention.fits(limit.engine, varied)
     )
-    also = [f"it also fails {', '.join(tried)}"] if tried else []
-    return "; ".join([NOT_KNOWN, *also, *filter(None, [limit.settings])]), "", ""
+    also = f"it also fails {', '.join(tried)}" if tried else ""
+    return unknown("", also, limit.settings)

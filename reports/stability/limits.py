@@ -10,7 +10,8 @@ from math import nan, sqrt
 
 from crosscheck2d.adapters.engines import DISTINCT
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.stability.predicates import Predicate
+from crosscheck2d.reports.compare.causes import Cause
+from crosscheck2d.reports.stability.predicates import REFUSED, Predicate
 from crosscheck2d.reports.stability.variants import (
     DRIVEN_ENGINES,
     WITH_FRICTION_ONLY,
@@ -19,7 +20,7 @@ from crosscheck2d.reports.stability.variants import (
 )
 from crosscheck2d.scenarios.model import Scenario
 
-EXACT, NOT_KNOWN = "the exact answer", "not known"
+EXACT = "the exact answer"
 LIMIT, NEVER_FAILS, NEVER_WORKS, ONLY_BEYOND = (
     "limit",
     "does not fail",
@@ -38,12 +39,14 @@ class Form:
         ratio: the ratio of failing to working value at which bisection stops.
         whole: whether every run at every value is played, also after a failure, and whether
             the scan has the values that only this form has.
+        timeout: s a case may take on one engine.
     """
 
     name: str
     few: int
     ratio: float
     whole: bool
+    timeout: float
 
 
 # A gas meets a bad cluster of contacts sooner or later: one in 20 of pymunk's gases is off by 1 %
@@ -51,8 +54,8 @@ class Form:
 # value at which more than a quarter of the seeds fail does not.
 RARELY = 1 / 4
 ALL = 10**6  # runs: more than any case has
-QUICK = Form("quick", few=4, ratio=1.05, whole=False)
-FULL = Form("full", few=ALL, ratio=1.01, whole=True)
+QUICK = Form("quick", few=4, ratio=1.05, whole=False, timeout=600.0)
+FULL = Form("full", few=ALL, ratio=1.01, whole=True, timeout=3600.0)
 FORMS = {form.name: form for form in (QUICK, FULL)}
 
 
@@ -63,16 +66,16 @@ def once(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
 
 @dataclass(frozen=True)
 class Case:
-    """One way to fail.
+    """One way to fail: a row of the stability report.
 
     Attributes:
         name: lower-case words, as they stand in limits.csv.
-        asks: the question in one sentence.
-        parameter: what is varied, dimensionless where it can be.
-        values: to scan, from gentle to harsh.
         scene: (value, number of the run from 0) -> the scenario; it is played at its only step
             size. Fewer runs are the first of more.
+        parameter: what is varied, dimensionless where it can be.
+        values: to scan, from gentle to harsh.
         predicate: decides whether a run fails.
+        asks: the question in one sentence, if it is not the first of the docstring of `scene`.
         unit: of the parameter; "1" for a ratio.
         runs: at a value: 1 where nothing differs, else phases of the collision within a step, or
             seeds.
@@ -93,11 +96,11 @@ class Case:
     """
 
     name: str
-    asks: str
+    scene: Callable[[float, int], Scenario]
     parameter: str
     values: tuple[float, ...]
-    scene: Callable[[float, int], Scenario]
     predicate: Predicate
+    asks: str = ""
     unit: str = "1"
     runs: int = 1
     whole: bool = False
@@ -111,6 +114,12 @@ class Case:
     report: str = ""
 
     @property
+    def question(self) -> str:
+        """What it asks, in one sentence."""
+        first = (self.scene.__doc__ or "").split("\n\n")[0]
+        return self.asks or " ".join(first.split())
+
+    @property
     def harsher(self) -> int:
         """1 if larger values are harsher, -1 if smaller values are."""
         return 1 if self.values[-1] > self.values[0] else -1
@@ -120,6 +129,10 @@ class Case:
         """The name of what is varied; for a scene file (FILE.toml:speed) the word that `--vary`
         takes."""
         return self.name.rpartition(":")[2] if ":" in self.name else self.parameter
+
+    def with_unit(self, text: str) -> str:
+        """The text and the parameter's unit, if it has one."""
+        return text if self.unit == "1" else f"{text}, {self.unit}"
 
     def scan(self, form: Form) -> tuple[float, ...]:
         """The values to scan. The full form adds the values half-way between them, so that it
@@ -133,14 +146,13 @@ class Case:
         if not self.refines or self.by_chance:
             return self.values
         halves = (self.half_way(*pair, self.ratio) for pair in pairwise(self.values))
-        return tuple(
-            sorted({*self.values, *filter(None, halves)}, key=lambda value: self.harsher * value)
-        )
+        values = {*self.values, *filter(None, halves)}
+        return tuple(sorted(values, key=lambda value: self.harsher * value))
 
-    def half_way(self, one: float, other: float, ratio: float) -> float | None:
+    def half_way(self, start: float, end: float, ratio: float) -> float | None:
         """The geometric mean of two values; None if they are within the ratio, or if no whole
         number lies between them where one is needed."""
-        low, high = min(one, other), max(one, other)
+        low, high = min(start, end), max(start, end)
         if high <= low * ratio:
             return None
         if not self.whole:
@@ -152,7 +164,7 @@ class Case:
 @dataclass(frozen=True)
 class Trial:
     """The runs at one value: how many were played, how many failed, the worst reading, and the
-    first that failed.
+    first that failed: when, what happened, the id of its verdict, and the disk (-1: all).
 
     Up to `allowed` of them may fail by chance. `left`: whether the search stopped at a failure
     before it played all runs.
@@ -178,13 +190,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a search found; plain numbers and text, so that it goes into a journal as it is.
+    """What a search found.
 
     Attributes:
         case, engine: names; the engine is a key of `DRIVEN_ENGINES`.
         form: of `FORMS`.
-        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on), or
-            "works only beyond" (at works_at, and not at the gentler fails_at).
+        verdict: "limit", "does not fail" (up to works_at), "never works" (from fails_at on, but for
+            a few values), or "works only beyond" (at works_at, and not at the gentler fails_at).
         works_at: the harshest value before the first failure, where all runs of the form were
             played; nan: none.
         fails_at: the first failure on the way from gentle to harsh: more runs failed than may by
@@ -199,10 +211,11 @@ class Limit:
             found, or looked for.
         settings: of the engine with which the failing run works, in words; without `settings_help`
             those that do not help; "" if none were tried.
-        mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; ""
-            if none were found, or looked for.
-        reason, source: why, and where that stands.
-        tested: how the reason was tested; "": it is a likely one.
+        mechanisms: with which the reference has this limit, as `sufficient_mechanisms`; () if none
+            were found, or looked for.
+        cause: why it fails; None where nothing failed.
+        replay, ratio: of the first failing run, packed for the page, and its height over its width;
+            "" if there is none.
         status: "ok", or why the search was lost, as in `STATUSES` of run.py.
     """
 
@@ -218,10 +231,10 @@ class Limit:
     intervention: str = ""
     settings: str = ""
     settings_help: bool = False
-    mechanisms: str = ""
-    reason: str = ""
-    source: str = ""
-    tested: str = ""
+    mechanisms: tuple[str, ...] = ()
+    cause: Cause | None = None
+    replay: str = ""
+    ratio: float = 1.0
     seconds: float = nan
     status: str = "ok"
 
@@ -233,30 +246,7 @@ class Limit:
     @property
     def refused(self) -> bool:
         """Whether the engine does not play what it meets at `fails_at`: that is no limit of it."""
-        return self.failing is not None and self.failing.broken == "refused"
-
-    @property
-    def word(self) -> str:
-        """The word that a table shows in place of a limit, "" where there is a limit."""
-        if self.status != "ok":
-            return self.status
-        if self.verdict == NEVER_WORKS:
-            return "refused" if self.refused else "everywhere"
-        return "–" if self.verdict == NEVER_FAILS else ""
-
-    @property
-    def sign(self) -> str:
-        """The sign before `fails_at` in a table: "≤" or "≥" if the engine fails up to there and
-        works beyond."""
-        if self.verdict != ONLY_BEYOND:
-            return ""
-        return "≤" if self.works_at > self.fails_at else "≥"
-
-    @property
-    def why(self) -> str:
-        """The reason; an untested one begins with "likely"."""
-        known = self.tested or not self.reason or self.reason.startswith(NOT_KNOWN)
-        return self.reason if known else f"likely: {self.reason}"
+        return self.failing is not None and self.failing.broken == REFUSED
 
     @property
     def runs(self) -> int:
@@ -270,7 +260,5 @@ def engines_of(case: Case, rows: Container[str] = DISTINCT) -> list[str]:
 
     An engine that only adds friction to another plays only the cases that name it.
     """
-    rows_alone = [
-        name for name in DRIVEN_ENGINES if name in rows and name not in WITH_FRICTION_ONLY
-    ]
-    return [name for name in DRIVEN_ENGINES if name in rows_alone or name in case.also]
+    alone = [name for name in DRIVEN_ENGINES if name in rows and name not in WITH_FRICTION_ONLY]
+    return [name for name in DRIVEN_ENGINES if name in alone or name in case.also]

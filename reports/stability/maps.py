@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from math import isfinite, nan
 from typing import Any
-
-import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES, changed
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.stability.cases_collisions import flyby
 from crosscheck2d.reports.stability.cases_gas import gas
 from crosscheck2d.reports.stability.cases_stacks import column
 from crosscheck2d.reports.stability.predicates import RESTITUTION_OFF, Predicate, judge
 from crosscheck2d.reports.stability.predicates_crowds import STANDS
 from crosscheck2d.reports.stability.predicates_gas import ENERGY_DRIFTS
+from crosscheck2d.reports.stability.scenes import flyby
 from crosscheck2d.reports.stability.variants import play_as
 from crosscheck2d.scenarios.model import Scenario
 
@@ -57,38 +56,31 @@ class Map:
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on one engine: rows (x, y, worst reading, whether a run failed, what broke), and the
-    processor time in s that it took."""
+    """A map on one engine: rows (x, y, worst reading, whether a run failed, the id of its verdict,
+    what happened), and the processor time in s that it took."""
 
     name: str
     engine: str
-    cells: tuple[tuple[float, float, float, bool, str], ...]
+    cells: tuple[tuple[float, float, float, bool, str, str], ...]
     status: str = "ok"
     seconds: float = nan
 
     @staticmethod
     def from_record(record: dict[str, Any]) -> MapOf:
-        """From a line of the journal."""
-        cells = tuple(
-            (x, y, float(value), failed, broken) for x, y, value, failed, broken in record["cells"]
-        )
+        """From the value of its row."""
+        cells = tuple((x, y, float(value), *failure) for x, y, value, *failure in record["cells"])
         return MapOf(record["name"], record["engine"], cells, record["status"])
 
 
 def map_of(name: str, engine: str) -> MapOf:
     """Play a map's grid on an engine."""
-    one = MAPS[name]
-    cells = []
-    for x in one.x:
-        for y in one.y:
-            scenarios = [one.scene(x, y, run) for run in range(one.runs)]
-            readings = [
-                judge(one.predicate, scenario, one.play(engine, scenario, x, y))
-                for scenario in scenarios
-            ]
-            worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
-            broken = next((f"{r.broken}: {r.event}" for r in readings if r.failed), "")
-            cells.append((x, y, worst, any(r.failed for r in readings), broken))
+    grid, cells = MAPS[name], []
+    for x, y in product(grid.x, grid.y):
+        scenarios = [grid.scene(x, y, run) for run in range(grid.runs)]
+        verdicts = [judge(grid.predicate, s, grid.play(engine, s, x, y)) for s in scenarios]
+        worst = max((v.value for v in verdicts if isfinite(v.value)), default=nan)
+        first = next(((True, v.id, v.text) for v in verdicts if v.failed), (False, "", ""))
+        cells.append((x, y, worst, *first))
     return MapOf(name, engine, tuple(cells))
 
 
@@ -110,43 +102,47 @@ def collision_at(x: float, y: float, run: int) -> Scenario:
 COLLISIONS_X = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0)
 COLLISIONS_Y = (0.01, 0.1, 0.5, 2.0, 8.0, 32.0, 128.0, 512.0)
 
-MAPS = {
-    one.name: one
-    for one in (
-        Map(
-            "dt_and_speed",
-            "Is a head-on collision of disks of 0.25 m at e = 1 elastic, whatever the step and the"
-            " speed?",
-            "dt (1/64 s)",
-            "closing speed (m/s)",
-            COLLISIONS_X,
-            COLLISIONS_Y,
-            collision_at,
-            RESTITUTION_OFF,
-        ),
-        Map(
-            "mass_ratio_and_iterations",
-            "How many iterations does a heavy disk need that stands on a light one?",
-            "m2 / m1",
-            "iterations (Box2D 3.1: substeps)",
-            (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
-            (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0),
-            lambda x, _y, _run: column(2, np.array([1.0, x])),
-            STANDS,
-            runs=1,
-            only=tuple(name for name, row in ENGINES.items() if row.work),
-            play=with_iterations,
-        ),
-        Map(
-            "packing_and_dt",
-            "How much energy does a gas of 36 disks lose or gain in 100 steps?",
-            "packing",
-            "v dt / R",
-            (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75),
-            (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0),
-            lambda x, y, run: gas(x, run, steps=100, step=y),
-            ENERGY_DRIFTS,
-            runs=1,
-        ),
-    )
-}
+MASSES, COUNTS = (
+    (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4),
+    (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0),
+)
+PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75)
+MOVES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+GRIDS = (
+    Map(
+        "dt_and_speed",
+        "Is a head-on collision of disks of 0.25 m at e = 1 elastic, whatever the step and the"
+        " speed?",
+        "dt (1/64 s)",
+        "closing speed (m/s)",
+        COLLISIONS_X,
+        COLLISIONS_Y,
+        collision_at,
+        RESTITUTION_OFF,
+    ),
+    Map(
+        "mass_ratio_and_iterations",
+        "How many iterations does a heavy disk need that stands on a light one?",
+        "m2 / m1",
+        "iterations (Box2D 3.1: substeps)",
+        MASSES,
+        COUNTS,
+        lambda x, _y, _run: column(2, [1.0, x]),
+        STANDS,
+        runs=1,
+        only=tuple(name for name, row in ENGINES.items() if row.work),
+        play=with_iterations,
+    ),
+    Map(
+        "packing_and_dt",
+        "How much energy does a gas of 36 disks lose or gain in 100 steps?",
+        "packing",
+        "v dt / R",
+        PACKINGS,
+        MOVES,
+        lambda x, y, run: gas(x, run, steps=100, step=y),
+        ENERGY_DRIFTS,
+        runs=1,
+    ),
+)
+MAPS = {grid.name: grid for grid in GRIDS}

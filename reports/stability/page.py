@@ -3,236 +3,402 @@ limit."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import isfinite
+from collections.abc import Sequence
+from math import isfinite, isnan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pandas as pd
+from markupsafe import Markup
 
-from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.page import style
-from crosscheck2d.reports.page.charts import ChartLine, Drawing, figure_of, packed_charts, shortened
-from crosscheck2d.reports.page.documents import CHARTED, render
+from crosscheck2d.reports.page.documents import environment
+from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
+from crosscheck2d.reports.page.kit import (
+    Chart,
+    Page,
+    Part,
+    Playback,
+    Section,
+    Table,
+    TableCell,
+    Text,
+    render_page,
+    run_section,
+)
 from crosscheck2d.reports.page.links import neighbours
-from crosscheck2d.reports.page.replay import pack_layers, ratio_of
-from crosscheck2d.reports.stability import overview
+from crosscheck2d.reports.page.style import TRUTH, number
 from crosscheck2d.reports.stability.cases import FAMILY_OF
-from crosscheck2d.reports.stability.failures import kept_failure, near
-from crosscheck2d.reports.stability.limits import EXACT, FORMS, Case, Limit, Trial
-from crosscheck2d.reports.stability.maps import MAPS
+from crosscheck2d.reports.stability.limits import (
+    EXACT,
+    FORMS,
+    NEVER_FAILS,
+    NEVER_WORKS,
+    Case,
+    Limit,
+)
+from crosscheck2d.reports.stability.maps import MAPS, MapOf
+from crosscheck2d.reports.stability.overview import (
+    MARKS,
+    bracket,
+    findings,
+    held,
+    in_report,
+    in_words,
+    where_it_works,
+    why,
+)
+from crosscheck2d.reports.stability.predicates import REFUSED
 from crosscheck2d.reports.stability.results import StabilityResults, case_named
-from crosscheck2d.reports.stability.touching import GAPS, TOUCHING
+from crosscheck2d.reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, AtGap, LawOf
+from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import put_text
-from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 GENERATOR = "crosscheck stability"
-SECONDS = 5.0  # a replay lasts
+FITS = 12  # columns of the table of limits in the width of a page
+SHARES = (0.3, 1.0, 5.0, 100.0)  # of the bound of a map: where its colours begin
+WHICH_LAW = (
+    "When a disk strikes touching disks, mechanics does not determine the order of their"
+    " collisions. There is no single right answer, so engines are not scored. The table names the"
+    " law that an engine follows, within 2 % of the incoming speed, at gaps from none to a radius."
+    " pairs: Newton's law for one pair after the other; if the disks do not touch, this is the"
+    " exact answer. at once: Newton's law at all contacts in one solve. Both laws conserve the"
+    " energy. If an engine follows neither, the cell shows the share of the energy that remains."
+    " Some engines do not take disks that just touch as a contact. Without a gap they follow pairs,"
+    " but another law if the disks overlap by a rounding error: crosscheck lesson row shows this"
+    " for pymunk."
+)
 
 
-@dataclass(frozen=True)
-class Replay:
-    """The first failing run of an engine: the data of the page's player, its height over its
-    width, and a sentence."""
+def write_page(path: Path, results: StabilityResults) -> None:
+    """Write the page of a stability report to `path`."""
+    names = list(dict.fromkeys(result.engine for result in results.all))
+    sections = [
+        *limit_sections(results.limits, names),
+        *([map_section(results.maps)] if results.maps else []),
+        *([law_section(results.laws)] if results.laws else []),
+        run_section(results.header),
+    ]
+    page = Page(
+        "Where 2D disk solvers fail",
+        sections,
+        GENERATOR,
+        lead(results, names),
+        (*names, TRUTH),
+        links=neighbours(path, "stability"),
+        footer="The table is in limits.csv, the maps are in maps.csv, and the laws of touching"
+        " disks in laws.csv.",
+    )
+    put_text(path, render_page(page))
 
-    engine: str
-    pack: str
-    ratio: float
-    says: str
 
-
-@dataclass(frozen=True)
-class CaseSection:
-    """One case as the page shows it."""
-
-    case: Case
-    limits: list[Limit]
-    replays: list[Replay]
-    reasons: list[overview.SharedReason]
-    drawing: Drawing
-    charts: str
-    held: Mapping[str, str]  # of `overview.held`
-    in_report: str  # of `overview.in_report`
-
-    @property
-    def anchor(self) -> str:
-        """The name as a fragment of a URL."""
-        return "".join(c if c.isalnum() or c in "_-" else "-" for c in self.case.name)
-
-    def cell(self, engine: str) -> overview.LimitCell:
-        """Its limit in the overview; empty where it was not asked."""
-        return overview.cell_of(
-            self.case, next((limit for limit in self.limits if limit.engine == engine), None)
+def lead(results: StabilityResults, names: Sequence[str]) -> list[str | Markup]:
+    """What a limit is, and what is counted."""
+    form, changed = FORMS[results.header["form"]], [name for name in names if "+" in name]
+    how = (
+        "The full form plays all runs of a case at every value, and values half way between those"
+        " of the quick form."
+        if form.whole
+        else f"The quick form plays {form.few} runs at each value, and next to the limit all runs"
+        " of the case; it stops at the first failing run of a value."
+    )
+    cases = list(dict.fromkeys(limit.case for limit in results.limits))
+    alike = sum(case.startswith("dt_") for case in cases)
+    engines = counted(len(names) - len(changed), "engine")
+    counts = f"Each profile of an engine counts as one engine. This page has {engines}"
+    if changed:
+        counts += (
+            f", and {len(changed)} with one setting changed (such as {changed[0]}), which play only"
+            " the cases that name them and have no column in the table of limits"
         )
+    counts += f". {counted(len(cases), 'case')}"
+    if alike:
+        counts += (
+            f"; {alike} of them play a scene of the report at other steps, from fine to coarse"
+        )
+    return [
+        Markup(
+            "One parameter of a scene is changed from gentle to harsh until each engine fails. A"
+            " limit is a bracket around the <b>first</b> failure: the last value at which no run"
+            " fails, and the first value at which a run fails. The bracket is narrowed to {} %, or"
+            " as far as the case allows. {}"
+        ).format(number(100 * (form.ratio - 1)), how),
+        counts + ".",
+    ]
 
-    def replay(self, engine: str) -> Replay | None:
-        """The replay of an engine's failure, if there is one."""
-        return next((replay for replay in self.replays if replay.engine == engine), None)
 
-
-def write_page(path: Path, folder: Path, results: StabilityResults) -> None:
-    """Write the page of a stability report, whose failing runs are in `folder`, to `path`."""
-    limits, maps, laws = results.limits, results.maps, results.laws
+def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Section]:
+    """What was found in a few sentences, and the table of limits, whose rows open."""
+    if not limits:
+        return []
     by_case: dict[str, list[Limit]] = {}
     for limit in limits:
         by_case.setdefault(limit.case, []).append(limit)
-    sections = [section_of(case_named(name), found, folder) for name, found in by_case.items()]
-    names = list(dict.fromkeys(one.engine for one in results.all))
-    looks = style.looks_of((*names, style.TRUTH))
-    html = render(
-        "stability/stability.html.j2",
-        generator=GENERATOR,
-        scripts=(*CHARTED, "stability/stability.js"),
-        styles=["stability/stability.css"],
-        looks=looks,
-        plotly=True,
-        sections=sections,
-        families=families_of(sections),
-        findings=overview.findings(limits),
-        about=results.header,
-        engines=[name for name in names if "+" not in name],
-        engines_changed=[name for name in names if "+" in name],
-        alike=sum(section.case.name == f"dt_{section.case.report}" for section in sections),
-        maps=overview.map_tables(maps),
-        all_maps=MAPS,
-        laws=laws,
-        touching=TOUCHING,
-        gaps=GAPS,
-        words=overview,
-        exact=EXACT,
-        links=neighbours(path, "stability"),
-        form=FORMS[results.header["form"]],
-    )
-    put_text(path, html)
-
-
-def families_of(sections: Sequence[CaseSection]) -> dict[str, list[CaseSection]]:
-    """The headings with their sections, both in the order of first appearance."""
-    found: dict[str, list[CaseSection]] = {}
-    for section in sections:
-        family = FAMILY_OF.get(section.case.name, "A scene of your own")
-        found.setdefault(family, []).append(section)
-    return found
-
-
-def section_of(case: Case, limits: list[Limit], folder: Path) -> CaseSection:
-    """All that the page shows of one case."""
-    replays = [replay for limit in limits if (replay := replay_of(case, limit, folder)) is not None]
-    drawing = readings(case, limits)
-    return CaseSection(
-        case,
-        limits,
-        replays,
-        overview.reasons(limits),
-        drawing,
-        packed_charts({"readings": drawing}),
-        overview.held(case),
-        overview.in_report(case),
-    )
-
-
-def replay_of(case: Case, limit: Limit, folder: Path) -> Replay | None:
-    """The first failing run at the limit, from just before the failure; None if none was kept."""
-    failing = limit.failing
-    if failing is None or not isfinite(failing.value):
-        return None
-    scenario = case.scene(failing.value, failing.first)
-    kept = kept_failure(limit, folder, scenario)
-    if kept is None or failing.disk >= scenario.scene.n:
-        return None
-    played, companion = kept
-    shown = near(failing, scenario)
-    layers: list[tuple[Run | None, Trajectory]] = [(named(limit), played)]
-    if companion is not None and len(companion):
-        layers.append((None, companion))
-    pack = pack_layers(scenario, layers, shown, opening(failing, scenario, shown))
-    says = f"{case.parameter} = {style.number(failing.value)}: {failing.event}"
-    return Replay(limit.engine, pack, ratio_of(scenario, layers), says)
-
-
-def named(limit: Limit) -> Run:
-    """A run with the name of an engine, which decides how it is drawn."""
-    engine, profile = limit.engine.split(":")
-    return Run(engine, profile, limit.case, 0.0)
-
-
-def opening(failing: Trial, scenario: Scenario, shown: np.ndarray) -> dict[str, Any]:
-    """The time at which the player starts, a tenth of the shown time before the failure, and
-    what it marks."""
-    first, last = float(scenario.times[shown[0]]), float(scenario.times[shown[-1]])
-    at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
-    return {
-        "opens": max(first, at - max(0.1 * (last - first), 1.5 * scenario.sample_interval)),
-        "pace": (last - first) / SECONDS,
-        "event": {"t": at, "disk": failing.disk},
-    }
-
-
-def readings(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The worst reading of every engine against the parameter, with the bound above which it
-    fails."""
-    predicate = case.predicate
-    if predicate.bound == 0:
-        return shares(case, limits)
-    title = f"{predicate.name.capitalize()}, {predicate.unit}"
-    caption = (
-        f"The worst of the runs played at each {case.parameter}, harsher to the right. Above the"
-        " dotted line the engine fails. Where a line ends, the engine refused the scene, stopped,"
-        " or gave a value that is not a number."
-    )
-    lines = []
-    for limit in limits:
-        trials = [
-            trial for trial in limit.trials if np.isfinite(trial.worst) and np.isfinite(trial.value)
+    engines = [name for name in names if "+" not in name and any(x.engine == name for x in limits)]
+    index, rows, groups, opens = [], [], [], dict[str, list[Part]]()
+    for name, members in by_case.items():
+        case, of_engine = case_named(name), {limit.engine: limit for limit in members}
+        label = name if name in FAMILY_OF else Path(name).name
+        kept = ", ".join(f"{symbol} {value}" for symbol, value in held(case).items())
+        notes = [
+            TableCell(text, css="soft") for text in (case.with_unit(case.parameter), kept) if text
         ]
-        if len(trials) > 1:
-            x = np.array([trial.value for trial in trials])
-            lines.append(ChartLine(named(limit), x, np.array([abs(t.worst) for t in trials])))
-    if not lines or not any((line.y > 0).any() for line in lines):
-        return Drawing(title, "No engine reads more than 0 anywhere.", None)
-    ends = [min(case.values), max(case.values)]
-    guide = {
-        "type": "scatter",
-        "x": shortened(ends),
-        "y": [predicate.bound or None] * 2,
-        "mode": "lines",
-        "name": "bound",
-        "hoverinfo": "skip",
-        "line": {"color": style.look(style.TRUTH).light, "dash": "dot", "width": 1.3},
-    }
-    figure = figure_of(
-        lines, axis_of(case), predicate.unit, markers=40, guide=[guide], unit=unit_of(case)
+        index.append(TableCell(label, title=case.question, notes=tuple(notes)))
+        rows.append([cell_of(case, of_engine.get(engine)) for engine in engines])
+        groups.append(FAMILY_OF.get(name, "A scene of your own"))
+        opens[label] = case_parts(case, members)
+    heads = [TableCell(name.replace(":", ": "), title=name) for name in engines]
+    frame = pd.DataFrame(rows, index=index, columns=heads, dtype=object)
+    css = "fixed limits" if len(engines) <= FITS else "plain limits"
+    marks = "; ".join(f"{mark}: {meaning}" for mark, meaning in MARKS.items())
+    says = (
+        "Each cell shows the first value, from gentle to harsh, at which an engine fails: the"
+        " deeper the colour, the gentler that value. Below each name are the parameter that is"
+        " varied, and the step size dt and the radius R of the disks that move, if constant. A row"
+        " opens on its failing runs, their causes and all readings."
     )
-    return Drawing(title, caption, figure)
+    table = Table(frame, groups, opens=opens, css=css, corner="case", caption=f"{marks}.")
+    return [
+        Section("In short", parts=[Text(items=findings(limits))], id="summary"),
+        Section("Limits", says, [table], id="limits"),
+    ]
 
 
-def shares(case: Case, limits: Sequence[Limit]) -> Drawing:
-    """The fraction of runs that failed against the parameter, for a case that reads nothing
-    else."""
-    lines = []
+def cell_of(case: Case, limit: Limit | None) -> TableCell:
+    """A limit in the overview; the gentler the value at which it fails, the deeper its colour."""
+    if limit is None:
+        return TableCell("")
+    if limit.verdict == NEVER_FAILS:
+        return TableCell(in_words(limit), f"does not fail up to {number(limit.works_at)}", css="h0")
+    title = f"{limit.verdict}. {why(limit)}"
+    if limit.verdict == NEVER_WORKS or limit.status != "ok":
+        return TableCell(in_words(limit), title, css="bad")
+    gentler = sum(case.harsher * value < case.harsher * limit.fails_at for value in case.values)
+    depth = round(4 * (1 - gentler / len(case.values)))
+    return TableCell(in_words(limit), title, css=f"h{max(1, min(4, depth))}")
+
+
+def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
+    """What opens below the row of a case: its facts, its limits, their causes, the failing runs,
+    and all readings."""
+    replays = [(limit, replay_of(case, limit)) for limit in limits]
+    folds = [fold(limit, replay) for limit, replay in replays if replay]
+    return [
+        Text([Markup("<b>{}</b>").format(case.question), *facts(case)]),
+        limit_table(limits),
+        Text(items=causes(limits)),
+        *([Text([Markup("<b>The first runs that failed</b>"), *folds])] if folds else []),
+        readings(case, limits),
+    ]
+
+
+def facts(case: Case) -> list[str]:
+    """What is varied, what failing is, how the report asks, and what is played."""
+    predicate = case.predicate
+    span = f"from {number(case.values[0])} to {number(case.values[-1])}"
+    unit = f" {predicate.unit}".replace(" 1", "")
+    fails = f"Fails: {predicate.name}, {predicate.means} (above {number(predicate.bound)}{unit})."
+    runs = "Runs: one at each value; nothing in it is random"
+    if case.runs > 1:
+        runs = (
+            f"Runs: up to {case.runs} at each value: the phase of the collision in its step, evenly"
+            " spread and random, or the seed differs; a failure in fewer than one of"
+            f" {case.runs} runs may be missed"
+        )
+    if case.by_chance:
+        runs += f"; one in {round(1 / case.by_chance)} may fail, as the result depends on the seed"
+    sentences = [f"Varied: {case.with_unit(case.parameter)}, {span}. {fails}", f"{runs}."]
+    return [*sentences, f"In the report: {text}"] if (text := in_report(case)) else sentences
+
+
+def limit_table(limits: Sequence[Limit]) -> Table:
+    """The brackets of a case, what they rest on, and what happened."""
+    rows = []
     for limit in limits:
-        trials = [trial for trial in limit.trials if not trial.left]
-        x = np.array([trial.value for trial in trials])
-        lines.append(ChartLine(named(limit), x, np.array([t.failed / t.runs for t in trials])))
+        works, fails = bracket(limit)
+        trial = limit.failing if limit.status == "ok" else limit.trials[0]
+        event = f"{trial.broken}: {trial.event}" if trial else "–"
+        share = f"{trial.failed} of {trial.runs}" if trial else "–"
+        odd = where_it_works(limit)
+        says = TableCell(event, notes=(TableCell(odd, css="soft"),) if odd else ())
+        scanned = "–" if isnan(limit.spacing) else f"× {number(limit.spacing)}"
+        fails_cell = TableCell(fails, css="bad" if limit.verdict == NEVER_WORKS else "")
+        rows.append([works, fails_cell, scanned, share, str(limit.runs), says])
+    heads = ["works at", "fails at", "scanned", "failed there", "runs in all", "what happened"]
+    frame = pd.DataFrame(rows, [limit.engine for limit in limits], heads, dtype=object)
+    caption = "scanned: the largest factor between neighbouring values; a failure between two of"
+    caption += " them can be missed."
+    return Table(frame, css="plain text stack", corner="engine", caption=caption)
+
+
+def causes(limits: Sequence[Limit]) -> list[Markup]:
+    """Every cause once, with its engines, its source and how it was shown."""
+    engines: dict[tuple[str, str, str], list[str]] = {}
+    for limit in limits:
+        if limit.verdict != NEVER_FAILS:
+            source, shown = (limit.cause.source, limit.cause.shown) if limit.cause else ("", "")
+            engines.setdefault((why(limit), source, shown), []).append(limit.engine)
+    items = []
+    for (text, source, shown), names in engines.items():
+        beside = "; ".join(filter(None, [source, f"tested: {shown}" if shown else ""]))
+        items.append(
+            Markup("<b>{}</b>: {} <small>{}</small>").format(", ".join(names), text, beside)
+        )
+    return items
+
+
+def fold(limit: Limit, replay: Playback) -> Markup:
+    """A replay that is drawn when it is opened."""
+    html = environment().get_template("page/kit_parts.html.j2").module.parts([replay])  # type: ignore[attr-defined]
+    return Markup("<details><summary>{}: {}</summary>{}</details>").format(
+        limit.engine, replay.label, html
+    )
+
+
+def replay_of(case: Case, limit: Limit) -> Playback | None:
+    """The first failing run at the limit; None if none was kept."""
+    failing = limit.failing
+    if failing is None or not limit.replay:
+        return None
+    label = f"{case.parameter} = {number(failing.value)}: {failing.event}"
+    beside = EXACT if case.shown_with == EXACT else f"the same gas {case.shown_with}"
     caption = (
-        f"The share of the runs at each {case.parameter} that failed; harsher to the right. Values"
-        " at which the quick form stopped at the first failing run are not drawn."
+        "From just before the failure; at speed 1 all of it takes five seconds. In black:"
+        f" {beside}, where there is one."
     )
-    title = f"{case.predicate.name.capitalize()}, share of runs"
-    figure = figure_of(
-        lines, axis_of(case), "share of runs", log=False, markers=40, unit=unit_of(case)
+    return Playback(limit.replay, limit.ratio, label, caption)
+
+
+def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
+    """The worst reading of every engine against the parameter, with the bound above which it fails;
+    for a case that reads nothing else, the share of runs that failed."""
+    predicate, lines = case.predicate, []
+    for limit in limits:
+        if predicate.bound:
+            trials = [t for t in limit.trials if isfinite(t.worst) and isfinite(t.value)]
+            y = [abs(trial.worst) or np.nan for trial in trials]  # 0 is nowhere on a log scale
+        else:
+            trials = [trial for trial in limit.trials if not trial.left and isfinite(trial.value)]
+            y = [trial.failed / trial.runs for trial in trials]
+        if len(trials) > 1:
+            lines.append(Line(limit.engine, [trial.value for trial in trials], y, limit.engine))
+    if not lines or not any(np.any(np.asarray(line.y) > 0) for line in lines):
+        return Text(["No engine reads more than 0 anywhere."])
+    what = f"{predicate.name.capitalize()}, {predicate.unit}"
+    caption = (
+        f"The worst of the runs played at each value of {case.parameter}, harsher to the right."
+        " Above the dotted line the engine fails. Where a line ends, the engine refused the scene,"
+        " stopped, or gave 0 or a value that is not a number."
     )
-    return Drawing(title, caption, figure)
+    if not predicate.bound:
+        what = f"{predicate.name.capitalize()}, share of runs"
+        caption = (
+            f"The share of the runs at each value of {case.parameter} that failed; harsher to the"
+            " right. Values at which the quick form stopped at the first failing run are not drawn."
+        )
+    figure, axes = new_figure(9.5, 3.6)
+    if predicate.bound:
+        axes.axhline(predicate.bound, color="#57626e", linestyle=":", linewidth=1.3)
+    if case.harsher < 0:
+        axes.invert_xaxis()
+    draw_lines(axes, lines, case.with_unit(case.parameter), what, "xy" if predicate.bound else "x")
+    return Chart(svg_of(figure, f"{what}, of each engine"), "All readings", caption)
 
 
-def unit_of(case: Case) -> str:
-    """The unit of the parameter, "" for a ratio."""
-    return "" if case.unit == "1" else case.unit
+def map_section(maps: Sequence[MapOf]) -> Section:
+    """How many values of each map an engine fails at; its rows open on the maps themselves."""
+    engines = list(dict.fromkeys(result.engine for result in maps))
+    drawn = {(result.engine, result.name): result for result in maps}
+    names = [name for name in MAPS if any(result.name == name for result in maps)]
+    rows = [[map_count(drawn.get((engine, name))) for name in names] for engine in engines]
+    frame = pd.DataFrame(rows, engines, names, dtype=object)
+    opens: dict[str, list[Part]] = {
+        engine: [
+            grid(drawn[engine, name])
+            for name in names
+            if (engine, name) in drawn and drawn[engine, name].cells
+        ]
+        for engine in engines
+    }
+    asks = [f"{name}: {MAPS[name].asks} {fails_where(name)}" for name in names]
+    table = Table(frame, opens=opens, css="plain", corner="engine")
+    says = "At how many of the values each engine fails. A row opens on its maps. An engine that"
+    says += " has no such parameter has no number."
+    return Section("Two parameters at once", says, [Text(items=asks), table], id="maps")
 
 
-def axis_of(case: Case) -> dict[str, Any]:
-    """The parameter's axis: logarithmic, with harsher values to the right."""
-    harsh_left = case.values[0] > case.values[-1]
-    title = case.parameter if case.unit == "1" else f"{case.parameter} ({case.unit})"
-    return {"title": title, "type": "log"} | ({"autorange": "reversed"} if harsh_left else {})
+def fails_where(name: str) -> str:
+    """What failing is in a map."""
+    predicate = MAPS[name].predicate
+    unit = f" {predicate.unit}".replace(" 1", "")
+    return f"An engine fails where {predicate.means}: above {number(predicate.bound)}{unit}."
+
+
+def map_count(result: MapOf | None) -> str:
+    """How many of the values of a map fail."""
+    if result is None or not result.cells:
+        return result.status if result else ""
+    return f"{sum(cell[3] for cell in result.cells)} of {len(result.cells)}"
+
+
+def grid(result: MapOf) -> Table:
+    """A map: a row for each y, from large to small, a column for each x."""
+    chart = MAPS[result.name]
+    at = {cell[:2]: map_cell(*cell[2:], chart.predicate.bound) for cell in result.cells}
+    rows = [[at[x, y] for x in chart.x] for y in reversed(chart.y)]
+    index = [number(y) for y in reversed(chart.y)]
+    heads = [TableCell(number(x, 2)) for x in chart.x]
+    caption = (
+        f"{result.name}. Across: {chart.x_name}. Upwards: {chart.y_name}. Pale: far below the"
+        " bound. Deep, with ×: it fails. r: refused; !: stopped early. Point at a cell for its"
+        " number."
+    )
+    frame = pd.DataFrame(rows, index, heads, dtype=object)
+    return Table(frame, css="plain number", caption=caption)
+
+
+def map_cell(value: float, failed: bool, kind: str, event: str, bound: float) -> TableCell:
+    """A reading, coloured by its share of the bound."""
+    happens = f"{kind}: {event}" if failed else ""
+    if isnan(value):
+        return TableCell("r" if kind == REFUSED else "!", happens, css="bad")
+    depth = sum(value / bound > share for share in SHARES)
+    title = "; ".join(filter(None, [number(value), happens]))
+    return TableCell("×" if failed else "", title, css=f"h{depth}")
+
+
+def law_section(laws: Sequence[LawOf]) -> Section:
+    """The law that each engine follows where a disk strikes touching disks."""
+    ordered = [law for name in TOUCHING for law in laws if law.name == name]
+    rows = []
+    for law in ordered:
+        off = max((at.momentum for at in law.gaps), default=np.nan)
+        cells = [law_cell(at) for at in law.gaps] or [
+            TableCell(law.status, css="bad", span=len(GAPS))
+        ]
+        blank = [""] * (len(GAPS) - len(cells))
+        rows.append([*cells, *blank, "–" if isnan(off) else number(off, 1)])
+    gaps = [TableCell(number(gap) if gap else "touching") for gap in GAPS]
+    heads = [*gaps, TableCell("momentum", notes=(TableCell("off by, at most", css="soft"),))]
+    frame = pd.DataFrame(rows, [law.engine for law in ordered], heads, dtype=object)
+    groups = [f"{law.name}: {TOUCHING[law.name].asks}" for law in ordered]
+    sources = [f"{name}: {TOUCHING[name].source}." for name in dict.fromkeys(x.name for x in laws)]
+    table = Table(
+        frame, groups, [(TableCell("gap in radii"), len(GAPS))], css="plain", corner="engine"
+    )
+    says = WHICH_LAW + " Point at a cell for its numbers."
+    return Section("Touching disks: which law", says, [table, Text(items=sources)], id="touching")
+
+
+def law_cell(at: AtGap) -> TableCell:
+    """The law that an engine follows at a gap, with a colour where it follows none."""
+    if not at.velocity:
+        return TableCell(at.law, css="bad")
+    motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)
+    title = f"{number(at.off, 2)} off, energy {number(at.energy)}; leave with {motion}"
+    if at.law == PAIRS:
+        return TableCell("pairs", title)
+    return (
+        TableCell("at once", title, css="h1")
+        if at.law == AT_ONCE
+        else TableCell(f"energy {at.energy:.2f}", title, css="h3")
+    )

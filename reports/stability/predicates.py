@@ -1,63 +1,70 @@
-"""The predicates: each computes one number with a unit from a run, and has a bound above which the
-run fails."""
+"""What "fails" means: a predicate reads one number off a run and has a bound above which the run
+fails. It gives a `Verdict`, the type of those on whole runs; bounds that both have are kept there.
+
+This file has the predicates of one collision and of one or two disks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.verdicts import MOST_BOUNCE
+from crosscheck2d.reports.compare.verdicts import MOST_BOUNCE, Verdict
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
-
-class Reading(NamedTuple):
-    """A number in the predicate's unit; for a failure its time (s), a sentence, the disk (-1: all),
-    and the name of the predicate."""
-
-    value: float
-    at: float = np.nan
-    event: str = ""
-    broken: str = ""
-    failed: bool = False
-    disk: int = 0
+REFUSED = "refused"
 
 
 class Predicate(NamedTuple):
     """A run fails if its number is above `bound`, or is not a number.
 
     Attributes:
-        name: as it stands in limits.csv.
+        name: the id of its verdict, as it stands in limits.csv.
         unit: of the number.
         bound: the largest that still works.
-        means: what failing is, in words.
-        read: scenario and run, played to its end -> the reading; `failed` and `broken` are filled
-            in by `judge`.
+        read: scenario and run, played to its end -> the verdict; its docstring says what failing
+            is. A verdict of another name says what in particular has failed.
     """
 
     name: str
     unit: str
     bound: float
-    means: str
-    read: Callable[[Scenario, Trajectory], Reading]
+    read: Callable[[Scenario, Trajectory], Verdict]
+
+    @property
+    def means(self) -> str:
+        """What failing is, as a part of a sentence."""
+        text = " ".join((self.read.__doc__ or "").split()).rstrip(".")
+        return text[:1].lower() + text[1:]
 
 
-def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Reading:
-    """Read a run; a run that was refused, stopped early or raised an exception fails with its
-    reason."""
+def judge(predicate: Predicate, scenario: Scenario, run: Run) -> Verdict:
+    """The verdict on a run; one that was refused, stopped early or raised an exception fails with
+    its reason."""
     if run.status != "ok" or run.trajectory is None:
-        outcome = "refused" if run.status == "unsupported" else run.status
+        outcome = REFUSED if run.status == "unsupported" else run.status
         at = float(run.trajectory.t[-1]) if run.trajectory is not None else 0.0
-        return Reading(np.nan, at, run.reason, outcome, True)
+        return Verdict(outcome, np.nan, predicate.bound, at, event=run.reason)
     # positions that overflow make the run fail
     with np.errstate(over="ignore", invalid="ignore"):
-        reading = predicate.read(scenario, run.trajectory)
-    if reading.value <= predicate.bound:
-        return reading
-    return reading._replace(failed=True, broken=reading.broken or predicate.name)
+        verdict = predicate.read(scenario, run.trajectory)
+    return replace(verdict, id=verdict.id or predicate.name, bound=predicate.bound)
+
+
+def read(value: float, at: float, event: str, disk: int | None = 0, kind: str = "") -> Verdict:
+    """A verdict at `at` s on a disk (None: all), which `judge` gives its bound and, where it has no
+    kind, its name."""
+    return Verdict(kind, float(value), np.inf, float(at), () if disk is None else (disk,), event)
+
+
+def worst_of(verdicts: list[Verdict]) -> Verdict:
+    """The one that is farthest above its bound, all of them in units of their bounds."""
+    return max(verdicts, key=lambda verdict: verdict.value)
 
 
 def first_above(t: Array, series: Array, bound: float) -> float:
@@ -68,18 +75,12 @@ def first_above(t: Array, series: Array, bound: float) -> float:
 
 
 def largest(
-    t: Array,
-    series: Array,
-    bound: float,
-    event: str,
-    *,
-    of: float = 1.0,
-    broken: str = "",
-    disk: int = 0,
-) -> Reading:
-    """The largest of a series (k,), in units of `of`, at the first sample above its bound."""
-    value, at = float(series.max()) / of, first_above(t, series, bound)
-    return Reading(value, at, event, broken, disk=disk)
+    t: Array, series: Array, bound: float, event: str, disk: int | None = 0, kind: str = ""
+) -> Verdict:
+    """The largest of a series (k,), at the first sample above its bound; one with a kind of its own
+    is a part of a predicate, in units of its bound."""
+    value = float(series.max()) / (bound if kind else 1.0)
+    return read(value, first_above(t, series, bound), event, disk, kind)
 
 
 def truth_of(scenario: Scenario) -> Trajectory:
@@ -88,115 +89,103 @@ def truth_of(scenario: Scenario) -> Trajectory:
     return scenario.truth(scenario.times)
 
 
-def gain(trajectory: Trajectory) -> Array:
-    """(n,) m/s, the change of each disk's velocity from start to end."""
-    change: Array = np.linalg.norm(trajectory.velocity[-1] - trajectory.velocity[0], axis=1)
-    return change
+def worst_disk(series: Array) -> int:
+    """The disk with the largest of (n,) numbers; 0 if there is none."""
+    return int(np.nanargmax(series)) if np.isfinite(series).any() else 0
 
 
-def _collisions_missed(scenario: Scenario, played: Trajectory) -> Reading:
+def change_of_velocity(trajectory: Trajectory) -> Array:
+    """(n,) m/s, of each disk from start to end."""
+    return laws.lengths(trajectory.velocity[-1] - trajectory.velocity[0])
+
+
+def collisions_missed(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk passes through a disk or a wall that it should collide with."""
     true = truth_of(scenario)
-    should, does = gain(true), gain(played)
-    missed = int(((should > 0) & (does < 0.01 * should)).any())
+    expected, change = change_of_velocity(true), change_of_velocity(played)
+    missed = ((expected > 0) & (change < 0.01 * expected)).any()
     at, wall = float(true.collisions.t[0]), true.collisions.j[0] < 0
     through = "the disk passes through the wall" if wall else "the disks pass through each other"
-    return Reading(missed, at, f"the collision is missed: {through}")
+    return read(float(missed), at, f"the collision is missed: {through}")
 
 
-def _collisions_spurious(scenario: Scenario, played: Trajectory) -> Reading:
-    change = np.linalg.norm(played.velocity - played.velocity[0], axis=2).max(axis=1)
-    share = change / np.linalg.norm(scenario.scene.velocity, axis=1).max()
+def collisions_spurious(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk that touches nothing is deflected."""
+    change = laws.lengths(played.velocity - played.velocity[0]).max(axis=1)
+    share = change / laws.lengths(scenario.scene.velocity).max()
     return largest(played.t, share, 1e-3, "a spurious collision: the disks do not touch")
 
 
-def _restitution_off(scenario: Scenario, played: Trajectory) -> Reading:
-    closing, separating = (
-        float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1])
-    )
-    e = -separating / closing
-    off = abs(e - scenario.scene.restitution)
-    return Reading(
-        off,
-        float(truth_of(scenario).collisions.t[0]),
-        f"the collision has e = {e + 0.0:.3g}",
-    )
+def restitution_off(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The collision does not have the scene's e."""
+    start, end = (float(v[0, 0] - v[1, 0]) for v in (played.velocity[0], played.velocity[-1]))
+    e = -end / start
+    at = truth_of(scenario).collisions.t[0]
+    return read(abs(e - scenario.scene.restitution), at, f"the collision has e = {e + 0.0:.3g}")
 
 
-def _wrong_distance(scenario: Scenario, played: Trajectory) -> Reading:
-    way = np.linalg.norm(played.position[-1] - played.position[0], axis=1)
+def wrong_distance(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A free disk has not moved the right distance."""
     true = truth_of(scenario)
-    ought = np.linalg.norm(true.position[-1] - true.position[0], axis=1)
-    off = np.abs(way - ought) / ought
-    worst = int(np.nanargmax(off)) if np.isfinite(off).any() else 0
-    return Reading(
-        float(off[worst]),
-        float(played.t[-1]),
-        f"disk {worst} has moved {way[worst] / ought[worst]:.4g} times the right distance",
-    )
+    way, expected = (laws.lengths(each.position[-1] - each.position[0]) for each in (played, true))
+    off = np.abs(way - expected) / expected
+    disk = worst_disk(off)
+    event = f"disk {disk} has moved {way[disk] / expected[disk]:.4g} times the right distance"
+    return read(off[disk], played.t[-1], event)
 
 
-def _velocity_off(scenario: Scenario, played: Trajectory) -> Reading:
+def velocity_off(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk leaves the collision with a wrong velocity."""
     true = truth_of(scenario)
-    off = np.linalg.norm(played.velocity[-1] - true.velocity[-1], axis=1)
-    own = np.linalg.norm(true.velocity[-1], axis=1)
-    share = off / np.where(own > 0, own, np.linalg.norm(true.velocity[0], axis=1).max())
-    worst = int(np.nanargmax(share)) if np.isfinite(share).any() else 0
-    return Reading(
-        float(share[worst]),
-        float(true.collisions.t[0]),
-        f"disk {worst} leaves with a wrong velocity",
-    )
+    off = laws.lengths(played.velocity[-1] - true.velocity[-1])
+    own = laws.lengths(true.velocity[-1])
+    share = off / np.where(own > 0, own, laws.lengths(true.velocity[0]).max())
+    disk = worst_disk(share)
+    return read(share[disk], true.collisions.t[0], f"disk {disk} leaves with a wrong velocity")
 
 
-def _scaled_deviation(scenario: Scenario, played: Trajectory) -> Reading:
-    true = truth_of(scenario)
-    off = (np.linalg.norm(played.position - true.position, axis=2) / scenario.scene.radius).max(
-        axis=1
-    )
-    return largest(played.t, off, 0.25, "from here the path differs from that at scale 1")
+def scaled_deviation(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The path, scaled back, differs from that at scale 1."""
+    off = laws.lengths(played.position - truth_of(scenario).position) / scenario.scene.radius
+    event = "from here the path differs from that at scale 1"
+    return largest(played.t, off.max(axis=1), SCALED_DEVIATION.bound, event)
 
 
-def _angle_off(scenario: Scenario, played: Trajectory) -> Reading:
+def angle_off(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The angle of a free disk does not follow its spin."""
     turned = played.t * scenario.scene.angular_velocity[0]
     off = np.abs(played.angle[:, 0] - turned)[1:] / turned[1:]
-    return Reading(
-        float(off[-1]),
-        float(played.t[1]),
-        f"turns {played.angle[-1, 0] / turned[-1]:.4g} times as far as it should",
-    )
+    event = f"turns {played.angle[-1, 0] / turned[-1]:.4g} times as far as it should"
+    return read(off[-1], played.t[1], event)
 
 
-def _spring_grows(_: Scenario, played: Trajectory) -> Reading:
+def spring_grows(_: Scenario, played: Trajectory) -> Verdict:
+    """The energy of an oscillator doubles or halves."""
     energy = (played.velocity**2 + played.position**2).sum(axis=(1, 2)) / 2  # of 1 kg on 1 N/m
     quarter = len(energy) // 4
     # Means over a quarter of the run: the energy of a stable method oscillates within a period.
     factor = float(energy[-quarter:].mean() / energy[:quarter].mean())
     at = first_above(played.t, np.abs(np.log2(energy / energy[0])), SPRING_GROWS.bound)
-    return Reading(
-        abs(float(np.log2(factor))),
-        at,
-        f"after 300 steps the energy is {factor:.3g} times that at the start",
-    )
+    event = f"after 300 steps the energy is {factor:.3g} times that at the start"
+    return read(abs(float(np.log2(factor))), at, event)
 
 
-def _bounces_off(scenario: Scenario, played: Trajectory) -> Reading:
-    heights = apexes(scenario, played)
+def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A bounce changes the height that the ball reaches."""
+    heights, scene = apexes(scenario, played), scenario.scene
     below = played.position[:, 0, 1] < 0
     if len(heights) < 2 or below[-1]:
-        return Reading(
-            np.nan,
-            first_above(played.t, below.astype(float), 0.5),
-            "the ball falls through the floor",
-        )
+        at = first_above(played.t, below.astype(float), 0.5)
+        return read(np.nan, at, "the ball falls through the floor")
     changes = np.diff(heights)
     worst = int(np.argmax(np.abs(changes)))
     word, mean = "higher" if changes[worst] > 0 else "lower", float(np.abs(changes.mean()))
-    return Reading(
-        float(np.abs(changes[worst])),
-        first_bounce(scenario),
+    first = np.sqrt(2 * (scene.position[0, 1] - scene.radius[0]) / -scene.gravity[1])
+    event = (
         f"after bounce {worst + 1} it reaches {abs(changes[worst]):.3g} drop heights {word} than"
-        f" before; the mean over all bounces is {mean:.3g}",
+        f" before; the mean over all bounces is {mean:.3g}"
     )
+    return read(np.abs(changes[worst]), first, event)
 
 
 def apexes(scenario: Scenario, played: Trajectory) -> Array:
@@ -207,68 +196,12 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
     return heights
 
 
-def first_bounce(scenario: Scenario) -> float:
-    """s, when a ball dropped onto y = 0 first reaches it."""
-    scene = scenario.scene
-    return float(np.sqrt(2 * (scene.position[0, 1] - scene.radius[0]) / -scene.gravity[1]))
-
-
-COLLISIONS_MISSED = Predicate(
-    "collisions missed",
-    "collisions",
-    0.0,
-    "a disk passes through a disk or a wall that it should collide with",
-    _collisions_missed,
-)
-COLLISIONS_SPURIOUS = Predicate(
-    "spurious collisions",
-    "of the speed",
-    1e-3,
-    "a disk that touches nothing is deflected",
-    _collisions_spurious,
-)
-RESTITUTION_OFF = Predicate(
-    "restitution off", "1", 0.01, "the collision does not have the scene's e", _restitution_off
-)
-WRONG_DISTANCE = Predicate(
-    "wrong distance",
-    "of the way",
-    0.01,
-    "a free disk has not moved the right distance",
-    _wrong_distance,
-)
-VELOCITY_OFF = Predicate(
-    "velocity off",
-    "of the speed",
-    1e-3,
-    "a disk leaves the collision with a wrong velocity",
-    _velocity_off,
-)
-SCALED_DEVIATION = Predicate(
-    "deviation",
-    "radii",
-    0.25,
-    "the path, scaled back, differs from that at scale 1",
-    _scaled_deviation,
-)
-ANGLE_OFF = Predicate(
-    "angle off",
-    "of the angle",
-    0.02,
-    "the angle of a free disk does not follow its spin",
-    _angle_off,
-)
-BOUNCES_OFF = Predicate(
-    "bounce off",
-    "of the height",
-    MOST_BOUNCE,
-    "a bounce changes the height that the ball reaches",
-    _bounces_off,
-)
-SPRING_GROWS = Predicate(
-    "spring grows",
-    "doublings of energy",
-    1.0,
-    "the energy of an oscillator doubles or halves",
-    _spring_grows,
-)
+COLLISIONS_MISSED = Predicate("collisions missed", "collisions", 0.0, collisions_missed)
+COLLISIONS_SPURIOUS = Predicate("spurious collisions", "of the speed", 1e-3, collisions_spurious)
+RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, restitution_off)
+WRONG_DISTANCE = Predicate("wrong distance", "of the way", 0.01, wrong_distance)
+VELOCITY_OFF = Predicate("velocity off", "of the speed", 1e-3, velocity_off)
+SCALED_DEVIATION = Predicate("deviation", "radii", 0.25, scaled_deviation)
+ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, angle_off)
+BOUNCES_OFF = Predicate("bounce off", "of the height", MOST_BOUNCE, bounce_off)
+SPRING_GROWS = Predicate("spring grows", "doublings of energy", 1.0, spring_grows)

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.verdicts import MOST_MOMENTUM
+from crosscheck2d.reports.compare.verdicts import MOST_MOMENTUM, Verdict
 from crosscheck2d.reports.stability.predicates import (
     Predicate,
-    Reading,
     first_above,
     largest,
+    read,
     truth_of,
+    worst_of,
 )
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
@@ -41,17 +42,10 @@ def approximant() -> tuple[np.ndarray, np.ndarray]:
     """Numerator and denominator, highest power first, of the Pade approximant [4/5] of the virial
     series."""
     series = np.array(VIRIALS) * 2.0 ** np.arange(10)
-    matrix = np.array(
-        [
-            [series[5 + row - col] if 5 + row - col >= 0 else 0.0 for col in range(1, 6)]
-            for row in range(5)
-        ]
-    )
-    below = np.append(1.0, np.linalg.solve(matrix, -series[5:10]))
-    above = np.array(
-        [sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)]
-    )
-    return above[::-1], below[::-1]
+    matrix = [[series[5 + k - m] if 5 + k - m >= 0 else 0.0 for m in range(1, 6)] for k in range(5)]
+    below = np.append(1.0, np.linalg.solve(np.array(matrix), -series[5:10]))
+    above = [sum(below[m] * series[k - m] for m in range(min(k, 5) + 1)) for k in range(5)]
+    return np.array(above)[::-1], below[::-1]
 
 
 def compressibility(packing: float) -> float:
@@ -109,31 +103,30 @@ MOST_OFF = 0.05  # relative to the literature, in addition
 RANGES = 5  # of speed, with equal numbers of disks
 
 
-def _energy_drifts(scenario: Scenario, played: Trajectory) -> Reading:
+def energy_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The energy changes at e = 1."""
     energy = laws.energy(played, scenario.scene)
     off = np.abs(energy / energy[0] - 1)
     event = f"the energy is {energy[-1] / energy[0]:.4g} times that at the start"
-    return largest(played.t, off, ENERGY_DRIFTS.bound, event, disk=-1)
+    return largest(played.t, off, ENERGY_DRIFTS.bound, event, None)
 
 
-def _momentum_drifts(scenario: Scenario, played: Trajectory) -> Reading:
+def momentum_drifts(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The momentum changes by more than a hundred roundings of float32."""
     mass, velocity = scenario.scene.mass[:, None], played.velocity
     momentum = (mass * velocity).sum(axis=1)
-    whole = np.linalg.norm(mass * velocity[0], axis=1).sum()
-    off = np.linalg.norm(momentum - momentum[0], axis=1) / whole
+    whole = laws.lengths(mass * velocity[0]).sum()
+    off = laws.lengths(momentum - momentum[0]) / whole
     event = f"the momentum has changed by {off.max():.3g} of the sum of all momenta"
-    return largest(played.t, off, MOMENTUM_DRIFTS.bound, event, disk=-1)
+    return largest(played.t, off, MOMENTUM_DRIFTS.bound, event, None)
 
 
-def _gas_diverges(scenario: Scenario, played: Trajectory) -> Reading:
-    drift = (
-        np.linalg.norm(played.position - truth_of(scenario).position, axis=2)
-        / scenario.scene.radius
-    )
-    off = drift.max(axis=1)
-    worst = int(np.argmax(drift[-1]))
-    event = f"disk {worst} is at another position"
-    return largest(played.t, off, GAS_DIVERGES.bound, event, disk=worst)
+def gas_diverges(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The disks of the two runs are at different positions."""
+    off = laws.lengths(played.position - truth_of(scenario).position) / scenario.scene.radius
+    disk = int(np.argmax(off[-1]))
+    event = f"disk {disk} is at another position"
+    return largest(played.t, off.max(axis=1), GAS_DIVERGES.bound, event, disk)
 
 
 def in_blocks(series: Array) -> Array:
@@ -148,67 +141,60 @@ def block_error(blocks: Array) -> float:
     return float(blocks.std(ddof=1)) / sqrt(len(blocks))
 
 
-def _temperatures_part(scenario: Scenario, played: Trajectory) -> Reading:
+def temperatures_part(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The temperatures of light and heavy disks differ by half a doubling plus 4 block errors."""
     mass = scenario.scene.mass
     kinetic = mass * (played.velocity**2).sum(axis=2) / 2
     light, heavy = (kinetic[:, mass == kind].mean(axis=1) for kind in (mass.min(), mass.max()))
     blocks = np.log2(in_blocks(heavy) / in_blocks(light))
     off = max(0.0, abs(float(blocks.mean())) - ERRORS * block_error(blocks))
     at = first_above(played.t, np.abs(np.log2(heavy / light)), 1.0)
-    return Reading(
-        off, at, f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones", disk=-1
-    )
+    event = f"heavy disks are {2 ** blocks.mean():.3g} times as hot as light ones"
+    return read(off, at, event, None)
 
 
-def _wrong_gas(scenario: Scenario, played: Trajectory) -> Reading:
-    collisions = played.collisions
-    ought = literature(scenario)
-    met = counted(played, collisions.j >= 0, np.ones(len(collisions)))
-    parts = [*_speeds(played), _deviation("rate", met, ought.rate, "Enskog's rate of collisions")]
-    if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
-        exchanged = counted(played, collisions.j < 0, collisions.impulse)
-        parts.append(
-            _deviation("pressure", exchanged, ought.force, "the pressure of the virial series")
+def wrong_gas(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series
+    by 5 % plus 4 block errors."""
+    collisions, at = played.collisions, float(played.t[len(played) // 10])
+    expected, shares = literature(scenario), in_blocks(shares_of_speeds(played))
+    words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
+    parts = [
+        deviation(
+            "not Maxwell", shares[:, k], 1 / RANGES, f"the share that {word} fifth should be", at
         )
-    return max(parts, key=lambda part: part.value)._replace(at=float(played.t[len(played) // 10]))
+        for k, word in enumerate(words)
+    ]
+    met = counted(played, collisions.j >= 0, np.ones(len(collisions)))
+    parts.append(deviation("rate", met, expected.rate, "Enskog's rate of collisions", at))
+    if not np.isnan(collisions.impulse).any():  # Box2D 3.1 reports no impulses
+        force = counted(played, collisions.j < 0, collisions.impulse)
+        whose = "the pressure of the virial series"
+        parts.append(deviation("pressure", force, expected.force, whose, at))
+    return worst_of(parts)
 
 
 def literature(scenario: Scenario) -> Gas:
     """The `Gas` of the literature for the scenario's equal disks, at their initial temperature."""
     scene = scenario.scene
     size = scene.walls.max(axis=(0, 1)) - scene.walls.min(axis=(0, 1))
-    temperature = scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n
-    return gas_in_box(
-        scene.n, float(scene.radius[0]), size, float(temperature), float(scene.mass[0])
-    )
+    temperature = float(scene.mass[0] * (scene.velocity**2).sum() / 2 / scene.n)
+    return gas_in_box(scene.n, float(scene.radius[0]), size, temperature, float(scene.mass[0]))
 
 
 def counted(played: Trajectory, which: NDArray[np.bool_], weights: Array) -> Array:
     """(`BLOCKS`,) sums of the weights of some collisions, per second, in blocks after the first
     tenth."""
     edges = np.linspace(0.1 * played.t[-1], played.t[-1], BLOCKS + 1)
-    return np.histogram(played.collisions.t[which], edges, weights=weights[which])[0] / np.diff(
-        edges
-    )
+    sums, _ = np.histogram(played.collisions.t[which], edges, weights=weights[which])
+    return sums / np.diff(edges)
 
 
-def _deviation(what: str, blocks: Array, ought: float, whose: str) -> Reading:
+def deviation(kind: str, blocks: Array, expected: float, whose: str, at: float) -> Verdict:
     """The relative error of a mean, less `ERRORS` block errors, in units of `MOST_OFF`."""
-    ratio, error = float(blocks.mean()) / ought, block_error(blocks) / ought
+    ratio, error = float(blocks.mean()) / expected, block_error(blocks) / expected
     off = max(0.0, abs(ratio - 1) - ERRORS * error) / MOST_OFF
-    return Reading(off, event=f"{ratio:.3f} ± {error:.3f} times {whose}", broken=what, disk=-1)
-
-
-def _speeds(played: Trajectory) -> list[Reading]:
-    """The share of the disks in each range of speed, compared with Maxwell's law."""
-    shares = in_blocks(shares_of_speeds(played))
-    words = ("the slowest", *("those between",) * (RANGES - 2), "the fastest")
-    return [
-        _deviation(
-            "not Maxwell", shares[:, k], 1 / RANGES, f"the share that {words[k]} fifth should be"
-        )
-        for k in range(RANGES)
-    ]
+    return read(off, at, f"{ratio:.3f} ± {error:.3f} times {whose}", None, kind)
 
 
 def shares_of_speeds(played: Trajectory) -> Array:
@@ -220,39 +206,15 @@ def shares_of_speeds(played: Trajectory) -> Array:
     Maxwell's exp(-m v2 / 2kT) for many.
     """
     energy = (played.velocity**2).sum(axis=2)
-    n = energy.shape[1]
     share = energy / energy.sum(axis=1, keepdims=True)
-    rank = 1 - (1 - share) ** (n - 1)
+    rank = 1 - (1 - share) ** (energy.shape[1] - 1)
     bins = np.clip((rank * RANGES).astype(int), 0, RANGES - 1)
     shares: Array = (bins[:, :, None] == np.arange(RANGES)).mean(axis=1)
     return shares
 
 
-ENERGY_DRIFTS = Predicate(
-    "energy drifts", "of the energy", 0.01, "the energy changes at e = 1", _energy_drifts
-)
-MOMENTUM_DRIFTS = Predicate(
-    "momentum drifts",
-    "of all momenta",
-    MOST_MOMENTUM,
-    "the momentum changes by more than a hundred roundings of float32",
-    _momentum_drifts,
-)
-GAS_DIVERGES = Predicate(
-    "diverges", "radii", 1e-3, "the disks of the two runs are at different positions", _gas_diverges
-)
-TEMPERATURES_PART = Predicate(
-    "temperatures part",
-    "doublings",
-    0.5,
-    "the temperatures of light and heavy disks differ by half a doubling plus 4 block errors",
-    _temperatures_part,
-)
-WRONG_GAS = Predicate(
-    "wrong gas",
-    "of the bound",
-    1.0,
-    "the speeds, collision rate or wall pressure differ from Maxwell, Enskog or the virial series"
-    " by 5 % plus 4 block errors",
-    _wrong_gas,
-)
+ENERGY_DRIFTS = Predicate("energy drifts", "of the energy", 0.01, energy_drifts)
+MOMENTUM_DRIFTS = Predicate("momentum drifts", "of all momenta", MOST_MOMENTUM, momentum_drifts)
+GAS_DIVERGES = Predicate("diverges", "radii", 1e-3, gas_diverges)
+TEMPERATURES_PART = Predicate("temperatures part", "doublings", 0.5, temperatures_part)
+WRONG_GAS = Predicate("wrong gas", "of the bound", 1.0, wrong_gas)

@@ -9,7 +9,7 @@ from crosscheck2d.reports.compare.collisions import match, pair_keys, who
 from crosscheck2d.reports.compare.faces import on_faces, thrown_off
 from crosscheck2d.reports.compare.verdicts import MOST_LOST, MOST_OVERLAP, Verdict, verdicts
 from crosscheck2d.reports.compare.view import cut
-from crosscheck2d.reports.stability.predicates import Predicate, Reading, largest
+from crosscheck2d.reports.stability.predicates import Predicate, largest, read, worst_of
 from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
 
@@ -18,37 +18,36 @@ LEAST_WAY = 0.01  # radii between two samples; smaller distances are rounding
 STEADY = 1e-9  # of a velocity; a smaller change between two samples is the rounding of the answer
 
 
-def _usable(scenario: Scenario, played: Trajectory) -> Reading:
-    judged = verdicts(scenario, played, scenario.dt(scenario.substeps[0]))
+def usable(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A number is not finite, a disk goes through a wall or a disk, energy grows by 5 %, disks
+    overlap by a tenth of a radius, a disk in free flight moves by half its distance only (its speed
+    is capped, or its position has too few digits), or a collision is wrong."""
     parts = [
-        _overlap(scenario, played),
-        _slowed(scenario, played),
-        _wrong_collisions(scenario, played),
-        _thrown(scenario, played),
-        *(_reading(verdict) for verdict in judged if verdict.id in ("tunnelled", "energy_gained")),
+        overlaps(scenario, played),
+        slowed(scenario, played),
+        wrong_collisions(scenario, played),
+        thrown(scenario, played),
     ]
+    for verdict in verdicts(scenario, played, scenario.dt(scenario.substeps[0])):
+        if verdict.id in ("tunnelled", "energy_gained"):
+            value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
+            disk = verdict.disks[0] if verdict.disks else None
+            parts.append(read(value, verdict.at, verdict.text, disk, verdict.id))
     # for a single free disk nothing is checked
-    return max(filter(None, parts), key=lambda part: part.value, default=Reading(0.0))
+    return worst_of([part for part in parts if part] or [read(0.0, np.nan, "")])
 
 
-def _reading(verdict: Verdict) -> Reading:
-    """A verdict in units of its bound."""
-    value = verdict.value / verdict.bound if verdict.bound else 2 * verdict.value
-    disk = verdict.disks[0] if verdict.disks else -1
-    return Reading(value, verdict.at, verdict.text, verdict.id, disk=disk)
-
-
-def _overlap(scenario: Scenario, played: Trajectory) -> Reading | None:
+def overlaps(scenario: Scenario, played: Trajectory) -> Verdict | None:
     """Any overlap in any sample: a verdict allows for the approach in a step, but here the step is
     what is too large."""
     if scenario.scene.n + len(scenario.scene.walls) < 2:
         return None
     overlap = laws.penetration(played, scenario.scene)
-    event, most = f"an overlap of {overlap.max():.3g} radii", MOST_OVERLAP
-    return largest(played.t, overlap, most, event, of=most, broken="penetration", disk=-1)
+    event = f"an overlap of {overlap.max():.3g} radii"
+    return largest(played.t, overlap, MOST_OVERLAP, event, None, "penetration")
 
 
-def _slowed(scenario: Scenario, played: Trajectory) -> Reading | None:
+def slowed(scenario: Scenario, played: Trajectory) -> Verdict | None:
     """The largest part of its distance that a disk loses in a sample interval of free flight: its
     position has too few digits, or the engine caps its speed.
 
@@ -59,19 +58,13 @@ def _slowed(scenario: Scenario, played: Trajectory) -> Reading | None:
     scene = scenario.scene
     if len(played) < 2 or scene.wrap is not None:
         return None
-    ought = np.maximum(own_distance(scenario, played), exact_distance(scenario, played))
-    ought /= scene.radius
-    went = np.linalg.norm(np.diff(played.position, axis=0), axis=2) / scene.radius
-    lost = np.where(ought > LEAST_WAY, 1 - went / np.where(ought > 0, ought, 1.0), 0.0)
+    expected = np.maximum(own_distance(scenario, played), exact_distance(scenario, played))
+    expected /= scene.radius
+    moved = laws.lengths(np.diff(played.position, axis=0)) / scene.radius
+    lost = np.where(expected > LEAST_WAY, 1 - moved / np.where(expected > 0, expected, 1.0), 0.0)
     k, disk = np.unravel_index(int(lost.argmax()), lost.shape)
     event = f"disk {disk} moves by {max(1 - float(lost[k, disk]), 0.0):.3g} of its distance"
-    return Reading(
-        float(lost.max()) / MOST_LOST,
-        float(played.t[k + 1]),
-        event,
-        "wrong distance",
-        disk=int(disk),
-    )
+    return read(lost.max() / MOST_LOST, played.t[k + 1], event, int(disk), "wrong distance")
 
 
 def own_distance(scenario: Scenario, played: Trajectory) -> Array:
@@ -79,11 +72,8 @@ def own_distance(scenario: Scenario, played: Trajectory) -> Array:
     that stays the same and the disk has not yet collided; else 0."""
     scene, v = scenario.scene, played.velocity
     steady = (v[1:] == v[:-1]).all(axis=2) & ~collided(played, scene, played.t[1:]).any(axis=2)
-    return np.where(
-        steady & ~scene.static,
-        np.linalg.norm(v[1:], axis=2) * scenario.sample_interval,
-        0.0,
-    )
+    distance = laws.lengths(v[1:]) * scenario.sample_interval
+    return np.where(steady & ~scene.static, distance, 0.0)
 
 
 def exact_distance(scenario: Scenario, played: Trajectory) -> Array:
@@ -94,16 +84,13 @@ def exact_distance(scenario: Scenario, played: Trajectory) -> Array:
     if true is None or len(true) < 2:
         return distance
     t, v = true.t, true.velocity
-    met, ought = (collided(each, scenario.scene, t) for each in (played, true))
-    alike = (met == ought).all(axis=2) & (ought[:, :, 0] == 0)
-    free = (np.diff(ought, axis=0) == 0).all(axis=2)
-    change = np.linalg.norm(np.diff(v, axis=0), axis=2)
-    steady = change <= STEADY * np.linalg.norm(v[1:], axis=2)
-    distance[: len(t) - 1] = np.where(
-        alike[1:] & alike[:-1] & free & steady,
-        np.linalg.norm(np.diff(true.position, axis=0), axis=2),
-        0.0,
-    )
+    met, expected = (collided(run, scenario.scene, t) for run in (played, true))
+    alike = (met == expected).all(axis=2) & (expected[:, :, 0] == 0)
+    free = (np.diff(expected, axis=0) == 0).all(axis=2)
+    change = laws.lengths(np.diff(v, axis=0))
+    steady = change <= STEADY * laws.lengths(v[1:])
+    where = alike[1:] & alike[:-1] & free & steady
+    distance[: len(t) - 1] = np.where(where, laws.lengths(np.diff(true.position, axis=0)), 0.0)
     return distance
 
 
@@ -119,38 +106,34 @@ def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
     return counts.cumsum(axis=0)[:-1]
 
 
-def _wrong_collisions(scenario: Scenario, played: Trajectory) -> Reading | None:
+def wrong_collisions(scenario: Scenario, played: Trajectory) -> Verdict | None:
+    """A collision is missed or spurious."""
     scenario, true = answered(scenario)
     if true is None:
         return None
     k = min(len(played), len(true))
     played, true = cut(played, k), cut(true, k)
-    dt = scenario.dt(scenario.substeps[0])
-    mine, its = (on_faces(one, scenario.scene) for one in (played, true))
-    found = match(mine, its, float(true.t[-1]), dt)
-    wrong = found.first_wrong or never_collision(mine, its, float(true.t[-1]) - 3 * dt)
+    actual, exact = (on_faces(run, scenario.scene) for run in (played, true))
+    end, dt = float(true.t[-1]), scenario.dt(scenario.substeps[0])
+    matched = match(actual, exact, end, dt)
+    wrong = matched.first_wrong or never_collision(actual, exact, end - 3 * dt)
     if wrong is None:
         return None
     at, what = wrong
     kind, pair = what.split(maxsplit=1)
-    count = len(found.missed) + len(found.spurious)
-    return Reading(
-        2.0 * max(count, 1),
-        at,
-        f"{kind} collision: {pair}",
-        "collisions",
-        disk=int(pair.split("-")[0]),
-    )
+    count = len(matched.missed) + len(matched.spurious)
+    disk = int(pair.split("-")[0])
+    return read(2.0 * max(count, 1), at, f"{kind} collision: {pair}", disk, "collisions")
 
 
-def _thrown(scenario: Scenario, played: Trajectory) -> Reading | None:
+def thrown(scenario: Scenario, played: Trajectory) -> Verdict | None:
     """A ghost collision: the disk hits the end of the next wall of a floor."""
     scenario, true = answered(scenario)
     if true is None:
         return None
     value, at, disk, wall = thrown_off(played, true, scenario.scene)
     event = f"disk {disk} is thrown off the surface of wall {wall}, where two of its walls meet"
-    return Reading(value, at, event, GHOST, disk=disk)
+    return read(value, at, event, disk, GHOST)
 
 
 def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[float, str] | None:
@@ -158,19 +141,10 @@ def never_collision(played: Collisions, true: Collisions, end: float) -> tuple[f
     leaves out such a collision near the start."""
     hard = (true.impulse > 0) & (true.t < end)
     missed = np.flatnonzero(hard & ~np.isin(pair_keys(true), pair_keys(played)))
-    return (
-        (float(true.t[missed[0]]), f"missed {who(true.i[missed[0]], true.j[missed[0]])}")
-        if len(missed)
-        else None
-    )
+    if not len(missed):
+        return None
+    first = missed[0]
+    return float(true.t[first]), f"missed {who(true.i[first], true.j[first])}"
 
 
-USABLE = Predicate(
-    "unusable",
-    "of the bound",
-    1.0,
-    "a number is not finite, a disk goes through a wall or a disk, energy grows by 5 %, disks"
-    " overlap by a tenth of a radius, a disk in free flight moves by half its distance only (its"
-    " speed is capped, or its position has too few digits), or a collision is wrong",
-    _usable,
-)
+USABLE = Predicate("unusable", "of the bound", 1.0, usable)

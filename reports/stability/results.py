@@ -1,10 +1,10 @@
-"""Carries out the stability report: every case on every engine, written to a journal as each one
+"""Carries out the stability report: every case on every engine, a row for each as it
 ends, and the table of limits."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -24,49 +24,51 @@ from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
-from crosscheck2d.reports.stability.failures import companion_file, failure_files, file_of
-from crosscheck2d.reports.stability.limits import FORMS, NEVER_WORKS, Case, Limit, Trial, engines_of
+from crosscheck2d.reports.stability.failures import with_failure
+from crosscheck2d.reports.stability.limits import (
+    FORMS,
+    FULL,
+    NEVER_WORKS,
+    Case,
+    Limit,
+    Trial,
+    engines_of,
+)
 from crosscheck2d.reports.stability.maps import MAPS, MapOf, map_of
 from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.touching import TOUCHING, LawOf, law_of
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from crosscheck2d.reports.stability.vary import case_of_file
+from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.progress import Progress
 
 COLUMNS = (
-    "engine",
-    "profile",
-    "case",
-    "parameter",
-    "works_at",
-    "fails_at",
-    "unit",
-    "predicate",
-    "seeds",
-    "reason",
-    "verdict",
-    "failed_fraction",
-    "runs",
-    "monotone",
-    "spacing",
-    "tested",
-    "source",
-    "event",
-    "form",
+    *("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate"),
+    *("seeds", "reason", "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested"),
+    *("source", "event", "form", "cause"),
 )
 SOURCE = ("reports/stability/**/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
 HEADER = "stability", "plan"  # kind and key of the row with what was asked for
-TIMEOUT = {"quick": 600.0, "full": 3600.0}  # s a case may take on one engine
-SLOWEST_FIRST = (
-    "long_gas",
-    "long_wrapped_gas",
-    "thermometer",
-    "fast_gas",
-    "dense_gas",
-    "pile_comes_to_rest",
-    "bounce_drift",
-    "equipartition",
-)
+# s of processor time that a search takes in the quick form, the mean of all engines (1200 searches
+# on one machine): of the cases that take longest, and of the mean of the others
+SECONDS = {
+    "thermometer": 6.8,
+    "equipartition": 3.7,
+    "overfull_box": 3.3,
+    "pile_comes_to_rest": 3.2,
+    "dt_gas_of_100": 2.0,
+    "bounce_drift": 1.4,
+    "dense_gas": 1.4,
+    "fast_gas": 0.9,
+    "stiff_force": 0.8,
+    "dt_falling_box": 0.7,
+    "dt_column_of_ten": 0.6,
+    "insertion_order": 0.6,
+}
+OTHERS = 0.16
+FULL_TIMES = 5  # the time of the full form over that of the quick one: 71 searches in both
+# the first in the full form, where they are the longest; in the quick form they are short
+LONGEST = ("long_gas", "long_wrapped_gas")
 
 
 @dataclass(frozen=True)
@@ -114,16 +116,15 @@ class Task:
     engine: str
     form: str
 
-    def __call__(self, added: Mapping[str, EngineRow]) -> tuple[Limit | MapOf | LawOf, list[bytes]]:
-        """In the worker: do it, with the rows that the plan adds among the others; with the files
-        of the first failing run at the limit."""
+    def __call__(self, added: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
+        """In the worker: do it, with the rows that the plan adds among the others."""
         with taking_part(added):
             if self.kind == "limit":
                 return found_limit(self)
             if self.kind == "law":
-                return law_of(self.name, self.engine), []
+                return law_of(self.name, self.engine)
             started = process_time()
-            return replace(map_of(self.name, self.engine), seconds=process_time() - started), []
+            return replace(map_of(self.name, self.engine), seconds=process_time() - started)
 
 
 def case_named(name: str) -> Case:
@@ -131,20 +132,43 @@ def case_named(name: str) -> Case:
     return CASES[name] if name in CASES else case_of_file(*name.rsplit(":", 1))
 
 
-def found_limit(task: Task) -> tuple[Limit, list[bytes]]:
-    """Search; with the files of the first failing run next to the limit."""
+def expected(tasks: Collection[Task], workers: int) -> str:
+    """What these tasks are, and about how long they take, as a sentence."""
+    searches = [task for task in tasks if task.kind == "limit"]
+    cases, engines = ({getattr(task, name) for task in searches} for name in ("name", "engine"))
+    seconds = sum(SECONDS.get(task.name, OTHERS) for task in tasks) / workers
+    parts = [
+        f"{counted(len(searches), 'search', 'searches')} ({counted(len(cases), 'case')},"
+        f" {counted(len(engines), 'engine')})",
+        counted(len(tasks) - len(searches), "other table"),
+    ]
+    times = FULL_TIMES if any(task.form == FULL.name for task in tasks) else 1
+    minutes = max(1, round(seconds * times / 60))
+    least = "at least" if times > 1 else "about"
+    return (
+        f"{' and '.join(parts if len(tasks) > len(searches) else parts[:1])}: {least}"
+        f" {counted(minutes, 'minute')} in {counted(workers, 'process', 'processes')}"
+    )
+
+
+def found_limit(task: Task) -> Limit:
+    """Search, and explain the first failing run at the limit."""
     started = process_time()
     search = LimitSearch(case_named(task.name), task.engine, FORMS[task.form])
     limit = with_replays(search, replace(search.limit(), case=task.name))
-    files = failure_files(search, limit)
-    return replace(limit, seconds=process_time() - started), files
+    limit = with_failure(search, limit)
+    return replace(limit, seconds=process_time() - started)
+
+
+def done_before(plan: StabilityPlan, store: Store) -> set[Task]:
+    """The tasks of the plan that have a row and ended well."""
+    rows = {task: store.get(task.kind, plan.key(task)) for task in tasks_of(plan)}
+    return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
 
 
 def carry_out(plan: StabilityPlan, store: Store, progress: Progress) -> None:
     """Do every task that has no row yet, and write the row of each as it ends."""
-    tasks = {task: plan.key(task) for task in tasks_of(plan)}
-    rows = {task: store.get(task.kind, key) for task, key in tasks.items()}
-    done = {task for task, row in rows.items() if row and row.value["status"] == "ok"}
+    tasks, done = {task: plan.key(task) for task in tasks_of(plan)}, done_before(plan, store)
     header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form}
     wanted = [(key, asdict(task)) for task, key in tasks.items()]
     store.put(*HEADER, header | {"tasks": wanted})
@@ -152,17 +176,11 @@ def carry_out(plan: StabilityPlan, store: Store, progress: Progress) -> None:
         task: partial(task, plan.added) for task in tasks if task not in done
     }
     progress.start(len(work), len(tasks))
-    with closing(run_all(work, plan.workers, TIMEOUT[plan.form])) as results:
+    with closing(run_all(work, plan.workers, FORMS[plan.form].timeout)) as results:
         for task, result in results:
-            reason, files = "", []
-            if isinstance(result, Failure):
-                reason = result.reason
-                result = failed(task, result)
-            else:
-                result, files = result
+            reason = result.reason if isinstance(result, Failure) else ""
+            result = failed(task, result) if isinstance(result, Failure) else result
             store.put(task.kind, tasks[task], asdict(result))
-            for number, file in enumerate(files):
-                store.put("failure", f"{tasks[task]}-{number}", None, file)
             progress.done(f"{task.name}  {task.engine}", result.status, reason)
 
 
@@ -181,8 +199,7 @@ def tasks_of(plan: StabilityPlan) -> list[Task]:
             for engine in engines_of(case_named(name), ENGINES)
             if engine.split("+")[0] in plan.engines
         ]
-    rank = {name: k for k, name in enumerate(SLOWEST_FIRST)}
-    return sorted(tasks, key=lambda task: rank.get(task.name, len(rank)))
+    return sorted(tasks, key=lambda task: (task.name not in LONGEST, -SECONDS.get(task.name, 0.0)))
 
 
 def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
@@ -234,26 +251,10 @@ def read(store: Store) -> StabilityResults:
         return order.get(task.name, len(order)), task.name, engines.index(task.engine)
 
     ordered = [results[task] for task in sorted(results, key=place)]
-    limits = [one for one in ordered if isinstance(one, Limit)]
-    maps = [one for one in ordered if isinstance(one, MapOf)]
-    laws = [one for one in ordered if isinstance(one, LawOf)]
-    return StabilityResults(explained(limits), maps, laws, plan.value)
-
-
-def export_failures(store: Store) -> None:
-    """Write the files of the failing runs, which the page shows."""
-    plan = store.get(*HEADER)
-    assert plan is not None
-    names = {}
-    for key, wanted in plan.value["tasks"]:
-        for number in range(2):
-            if row := store.get("failure", f"{key}-{number}"):
-                path = file_of(wanted["name"], wanted["engine"], store.folder)
-                path = companion_file(path) if number else path
-                name = path.relative_to(store.folder).as_posix()
-                names[name] = key
-                store.export(name, row.blob)
-    store.delete_exports("trajectories", names)
+    limits = explained([result for result in ordered if isinstance(result, Limit)])
+    maps = [result for result in ordered if isinstance(result, MapOf)]
+    laws = [result for result in ordered if isinstance(result, LawOf)]
+    return StabilityResults(limits, maps, laws, plan.value)
 
 
 def engines_now() -> list[str]:
@@ -264,13 +265,11 @@ def engines_now() -> list[str]:
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
-    """The limit in a line of the journal, in which numbers that are not finite are text."""
-    trials = tuple(
-        Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"]
-    )
-    return Limit(
-        **record | floats(record, "works_at", "fails_at", "spacing", "seconds") | {"trials": trials}
-    )
+    """The limit in the value of a row."""
+    trials = (Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
+    numbers = floats(record, "works_at", "fails_at", "spacing", "seconds", "ratio")
+    whole = {"trials": tuple(trials), "mechanisms": tuple(record["mechanisms"])}
+    return Limit(**record | numbers | whole)
 
 
 def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
@@ -288,6 +287,7 @@ def row_of(limit: Limit) -> dict[str, Any]:
     case = case_named(limit.case)
     failing = limit.failing if limit.status == "ok" else limit.trials[0]
     engine, profile = limit.engine.split(":")
+    cause = limit.cause
     return {
         "engine": engine,
         "profile": profile,
@@ -298,16 +298,17 @@ def row_of(limit: Limit) -> dict[str, Any]:
         "unit": case.unit,
         "predicate": failing.broken if failing else case.predicate.name,
         "seeds": max(trial.runs for trial in limit.trials),
-        "reason": limit.why,
+        "reason": cause.sentence if cause else "",
         "verdict": limit.verdict,
         "failed_fraction": failing.failed / failing.runs if failing else 0.0,
         "runs": limit.runs,
         "monotone": limit.monotone,
         "spacing": shortened(limit.spacing),
-        "tested": limit.tested,
-        "source": limit.source,
+        "tested": cause.shown if cause else "",
+        "source": cause.source if cause else "",
         "event": failing.event if failing else "",
         "form": limit.form,
+        "cause": str(cause.kind) if cause else "",
     }
 
 

@@ -3,11 +3,13 @@ failure, then bisection."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite, isnan, nan
 
 from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.stability.limits import (
     ALL,
     LIMIT,
@@ -19,20 +21,20 @@ from crosscheck2d.reports.stability.limits import (
     Limit,
     Trial,
 )
-from crosscheck2d.reports.stability.predicates import Reading, judge
+from crosscheck2d.reports.stability.predicates import judge
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
 from crosscheck2d.scenarios.model import Scenario
 
 
 @dataclass
 class LimitSearch:
-    """The search for the limit of one case on one engine; keeps the readings at each value, and the
+    """The search for the limit of one case on one engine; keeps the verdicts at each value, and the
     first failing run there."""
 
     case: Case
     engine: str
     form: Form
-    readings: dict[float, list[Reading]] = field(default_factory=dict)
+    readings: dict[float, list[Verdict]] = field(default_factory=dict)
     seen: dict[float, tuple[Scenario, Run]] = field(default_factory=dict)
 
     def limit(self) -> Limit:
@@ -48,12 +50,11 @@ class LimitSearch:
         works = [True] * first + [self.trial(value).works for value in scan[first:]]
         if all(works):
             return self.limit_of(NEVER_FAILS, scan[-1], nan)
-        if not any(works):
-            return self.limit_of(NEVER_WORKS, nan, scan[0])
-        edge = next((k for k in range(1, len(scan)) if works[k - 1] and not works[k]), None)
-        if edge is not None:
+        if edge := first_edge(works):
             return self.limit_of(LIMIT, *self.bracket(scan[edge - 1], scan[edge]))
-        edge = works.index(True)
+        if not works[-1]:
+            return self.limit_of(NEVER_WORKS, nan, scan[0])
+        edge = len(works) - works[::-1].index(False)
         return self.limit_of(ONLY_BEYOND, *self.bracket(scan[edge], scan[edge - 1]))
 
     def bracket(self, good: float, bad: float) -> tuple[float, float]:
@@ -100,10 +101,11 @@ class LimitSearch:
         worst = max((r.value for r in readings if isfinite(r.value)), default=nan)
         if not failed:
             return Trial(value, count, failed, worst)
-        first, one = next((k, reading) for k, reading in enumerate(readings) if reading.failed)
-        seen = one.at, one.event, one.broken, one.disk
+        first, verdict = next((k, each) for k, each in enumerate(readings) if each.failed)
+        disk = verdict.disks[0] if verdict.disks else -1
+        happens = verdict.at, verdict.text, verdict.id, disk
         left = count < self.case.runs
-        return Trial(value, count, failed, worst, first, *seen, self.allowed, left)
+        return Trial(value, count, failed, worst, first, *happens, self.allowed, left)
 
     def limit_of(self, verdict: str, works_at: float, fails_at: float) -> Limit:
         """The limit with all trials from gentle to harsh; at its failing value every run is
@@ -114,16 +116,30 @@ class LimitSearch:
             self.tried(value)
             for value in sorted(self.readings, key=lambda x: self.case.harsher * x)
         )
-        changes = sum(one.works != other.works for one, other in pairwise(trials))
+        changes = sum(before.works != after.works for before, after in pairwise(trials))
         until = [trial.value for trial in trials]
         if verdict == LIMIT:
             until = until[: until.index(fails_at) + 1]
-        spacing = max(
-            (max(one / other, other / one) for one, other in pairwise(until)), default=nan
-        )
+        spacing = max((max(a / b, b / a) for a, b in pairwise(until)), default=nan)
         names = self.case.name, self.engine, self.form.name
         return Limit(*names, verdict, works_at, fails_at, trials, changes <= 1, spacing)
 
     def failure(self, limit: Limit) -> tuple[Scenario, Run] | None:
         """The first run that failed at the limit, for the replay; None if none failed."""
         return self.seen.get(limit.fails_at)
+
+
+def first_edge(works: Sequence[bool]) -> int | None:
+    """The first value that fails after a stretch of values that work, if that is longer than all
+    that fails before it; None if there is none.
+
+    An engine that fails at the gentlest values may work at some harsher ones by luck: a step of a
+    third of the run may meet its one collision. That is no limit.
+    """
+    start = 0
+    for k, (before, after) in enumerate(pairwise(works), 1):
+        if after and not before:
+            start = k
+        if before and not after and k - start > works[:start].count(False):
+            return k
+    return None

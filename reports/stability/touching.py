@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck2d.reports.stability.cases_collisions import LEAD, RADIUS
+from crosscheck2d.reports.stability.predicates import REFUSED
+from crosscheck2d.reports.stability.scenes import LEAD, RADIUS, disks
 from crosscheck2d.reports.stability.variants import play_as
-from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Array, Scenario
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
@@ -76,19 +76,12 @@ class LawOf:
 
     @staticmethod
     def from_record(record: dict[str, Any]) -> LawOf:
-        """From a line of the journal, where what is not finite is text."""
-        gaps = tuple(
-            AtGap(
-                gap,
-                law,
-                float(off),
-                float(momentum),
-                float(energy),
-                tuple((float(x), float(y)) for x, y in velocity),
-            )
-            for gap, law, off, momentum, energy, velocity in record["gaps"]
-        )
-        return LawOf(**record | {"gaps": gaps})
+        """From the value of its row."""
+        gaps = []
+        for gap, law, off, momentum, energy, velocity in record["gaps"]:
+            rows = tuple((float(x), float(y)) for x, y in velocity)
+            gaps.append(AtGap(gap, law, float(off), float(momentum), float(energy), rows))
+        return LawOf(**record | {"gaps": tuple(gaps)})
 
 
 def cradle(n: int) -> Touching:
@@ -126,58 +119,48 @@ TOUCHING = {
 }
 
 
-def scene_of(one: Touching, gap: float) -> Scenario:
+def scene_of(touching: Touching, gap: float) -> Scenario:
     """Disk 0 flies in and arrives in the middle of its fourth step; the scene lasts until long
     after the last collision."""
-    position = (one.position + gap * one.displaced) * RADIUS
+    position = (touching.position + gap * touching.displaced) * RADIUS
     position[0, 0] -= SPEED * DT * (LEAD + 0.5)
-    n = len(position)
-    scene = lay_out(
-        position=position,
-        velocity=[[SPEED, 0], *np.zeros((n - 1, 2))],
-        radius=np.full(n, RADIUS),
-        mass=np.ones(n),
-        restitution=1.0,
-    )
+    scene = disks(position, [[SPEED, 0], *np.zeros((len(position) - 1, 2))])
     crossing = 4 * gap * RADIUS / (SPEED * DT)  # steps: four gaps, or one at a quarter of the speed
     steps = LEAD + 1 + AFTER + ceil(crossing)
-    return Scenario("touching", one.asks, one.source, scene, steps * DT, DT, (1,))
+    return Scenario("touching", touching.asks, touching.source, scene, steps * DT, DT, (1,))
 
 
 @cache
 def answers(name: str, gap: float) -> dict[str, list[Array]]:
     """Law -> the velocities (n, 2) that it allows; if the disks do not touch, the exact answer
     is pair after pair."""
-    one = TOUCHING[name]
+    touching = TOUCHING[name]
     if gap == 0:
-        return one.laws
-    scenario = with_oracle(scene_of(one, gap))
+        return touching.laws
+    scenario = with_oracle(scene_of(touching, gap))
     assert scenario.truth is not None
-    return one.laws | {PAIRS: [scenario.truth(scenario.times).velocity[-1] / SPEED]}
+    return touching.laws | {PAIRS: [scenario.truth(scenario.times).velocity[-1] / SPEED]}
 
 
 def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
     """Play a scene at every gap, and compare with every law."""
-    found = []
+    results = []
     for gap in gaps:
         run = play_as(engine, scene_of(TOUCHING[name], gap))
         if run.status != "ok" or run.trajectory is None:
-            outcome = "refused" if run.status == "unsupported" else run.status
-            found.append(AtGap(gap, outcome, nan, nan, nan, ()))
-            continue
-        velocity = run.trajectory.velocity[-1] / SPEED
-        found.append(named(velocity, gap, answers(name, gap)))
-    return LawOf(name, engine, tuple(found))
+            outcome = REFUSED if run.status == "unsupported" else run.status
+            results.append(AtGap(gap, outcome, nan, nan, nan, ()))
+        else:
+            velocity = run.trajectory.velocity[-1] / SPEED
+            results.append(named(velocity, gap, answers(name, gap)))
+    return LawOf(name, engine, tuple(results))
 
 
 def named(velocity: Array, gap: float, laws: dict[str, list[Array]]) -> AtGap:
     """The law whose velocities are nearest to these (n, 2), in units of the incoming speed."""
-    off = {
-        law: min(float(np.abs(velocity - v).max()) for v in allowed)
-        for law, allowed in laws.items()
-    }
-    nearest = min(off, key=lambda law: off[law])
+    off = {law: min(np.abs(velocity - v).max() for v in vs) for law, vs in laws.items()}
+    nearest = min(off, key=lambda law: float(off[law]))
     momentum = float(np.linalg.norm(velocity.sum(axis=0) - [1, 0]))
     rows = tuple((float(x), float(y)) for x, y in velocity)
     law = nearest if off[nearest] <= NEAR else "none"
-    return AtGap(gap, law, off[nearest], momentum, float((velocity**2).sum()), rows)
+    return AtGap(gap, law, float(off[nearest]), momentum, float((velocity**2).sum()), rows)

@@ -202,11 +202,11 @@ def case_of_file(path: str, what: str) -> Case:
         parameter += f", at dt = {number(one.dt(one.middle_substeps))} s"
     return Case(
         f"{path}:{what}",
-        f"{one.name}: {one.asks}",
+        partial(varied, path, what),
         parameter,
         meant.values or dense_ladder(one),
-        partial(varied, path, what),
         USABLE,
+        f"{one.name}: {one.asks}",
         meant.unit,
         runs=2 if what == "mass_ratio" else 1,
         also=WITH_FRICTION_ONLY if one.scene.friction else (),

@@ -9,7 +9,7 @@ import math
 import re
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -51,18 +51,29 @@ _KINDS = {
 }
 
 
-def read_scene_file(path: str | Path, content: bytes | None = None) -> Scenario:
+def read_scene_file(path: str | Path) -> Scenario:
     """The scenario in a TOML file; its source is the file's name, its truth comes from the oracle,
-    if there is one. `content`: that of the file, if it is known.
+    if there is one.
 
     Raises:
         SceneFileError: with one line per fault, `FILE: KEY = VALUE: what is wrong; what is
             allowed`, at most `MOST_FAULTS`, and one that says that there are more.
     """
+    named = str(path).replace("\n", "\\n")  # for a fault is a line
+    return _read(lambda: _parsed(Path(path)), named, Path(path).name)
+
+
+def scenario_of(table: dict[str, Any], source: str) -> Scenario:
+    """The scenario in a table with the keys of a scene file; raises as `read_scene_file`, with
+    `source` in place of the file."""
+    return _read(lambda: table, source, source)
+
+
+def _read(parse: Callable[[], dict[str, Any]], named: str, source: str) -> Scenario:
     try:
-        file = _checked(_parsed(Path(path), content))
+        file = _checked(parse())
         if not (faults := list(_outside_wrap(file))):
-            scenario = _scenario(file, Path(path).name)
+            scenario = _scenario(file, source)
             faults = list(_overlaps(scenario.scene, len(file.wall)))
     except SceneFileError as error:
         faults = error.faults
@@ -77,18 +88,15 @@ def read_scene_file(path: str | Path, content: bytes | None = None) -> Scenario:
             f"more than {MOST_FAULTS} faults; must be none (the rest is not listed)"
         ]
     if faults:
-        named = str(path).replace("\n", "\\n")  # for a fault is a line
         raise SceneFileError(f"{named}: {fault}" for fault in faults)
     return scenario
 
 
-def _parsed(path: Path, content: bytes | None) -> dict[str, Any]:
+def _parsed(path: Path) -> dict[str, Any]:
     try:
         text = ""
-        if content is None:
-            with opened(path) as file:
-                content = file.read(MOST_BYTES + 1)
-        data = content
+        with opened(path) as file:
+            data = file.read(MOST_BYTES + 1)
         text = data[:MOST_BYTES].decode()
         if len(data) > MOST_BYTES:
             raise SceneFileError([f"larger than {MOST_BYTES} bytes; must be smaller"])

@@ -26,8 +26,9 @@ ROOT = Path(__file__).parents[2]
 ELSEWHERE = """
 import importlib, os, pathlib, signal, sys
 import asyncio, multiprocessing.connection, subprocess, tempfile, socket, shutil
-import hypothesis, jinja2, py_mini_racer, numba, numpy, pandas, platformdirs, plotly, psutil
-import plotly.graph_objects, plotly.io, pydantic, pymunk, Box2D, pyb2d3, rich.console
+import hypothesis, jinja2, py_mini_racer, numba, numpy, pandas, platformdirs, psutil
+import matplotlib.backends.backend_svg, matplotlib.figure, pydantic
+import pymunk, Box2D, pyb2d3, rich.console
 import rich.progress, starlette, starlette.applications, typer, uvicorn, websockets
 for name in ("fcntl", "resource", "pwd", "grp", "termios"):
     sys.modules[name] = None

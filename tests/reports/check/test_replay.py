@@ -72,7 +72,7 @@ def test_where_a_sphere_has_gone_is_said(browser: Browser, tmp_path: Path):
     printed = page.evaluate("players[1].time")
     page.emulate_media(media="print")
     breaks = page.evaluate(
-        "['h2', 'h2+p'].map((each) => getComputedStyle(document.querySelector(each)).breakAfter)"
+        "['h2', '.says'].map((each) => getComputedStyle(document.querySelector(each)).breakAfter)"
     )
     page.context.close()
 

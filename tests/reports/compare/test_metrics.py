@@ -14,7 +14,8 @@ from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, View, cut
-from crosscheck2d.reports.page.findings import findings
+from crosscheck2d.reports.page.findings import nearest, refusals
+from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust, Trajectory
 from crosscheck2d.scenarios.truth.exact import with_oracle
@@ -229,8 +230,10 @@ def test_to_refuse_a_scene_does_not_help_in_the_ranking():
         compare(replace(two, substeps=(4,)), [perfect, *(each[1] for each in runs.values())]),
     ]
 
-    assert "2 scenes: reference:exercise" in findings(tables, set())[0]
-    assert any("pymunk:matched in 1" in sentence for sentence in findings(tables, set()))
+    said = nearest(summarize(tables))
+    assert said.startswith("Nearest to the exact answers: reference:exercise")
+    assert "pymunk:matched" not in said
+    assert refusals(tables) == ["pymunk:matched refused 1 cell: too hard."]
 
 
 def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():

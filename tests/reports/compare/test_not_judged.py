@@ -12,13 +12,14 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.delays import WINDOW
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
-from crosscheck2d.reports.page import overview
-from crosscheck2d.reports.page.charts import CHARTS
-from crosscheck2d.reports.page.findings import findings
+from crosscheck2d.reports.page.findings import findings, nearest
+from crosscheck2d.reports.page.scenes import scenes_of, values
+from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.reports.run.comparing import read_scene_table
 from crosscheck2d.reports.run.diff import changed_numbers
 from crosscheck2d.scenarios.catalogue import scenario
@@ -160,45 +161,32 @@ def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
     return replace(comparison, table=table)
 
 
-def test_what_is_not_judged_is_shown_and_counts_in_no_median_and_for_no_best_mark():
-    """Of two scenes the other one makes the median; where none is left there is none, and nobody is
-    best by it."""
+def test_what_is_not_judged_is_shown_and_counts_in_no_median():
+    """Of two scenes the other one makes the median; where none is left there is none."""
     good = [compared(scenario(name)) for name in ("wall_to_wall", "head_on_equal_e05")]
     half = [good[0], lost(good[1], NAMES[0], "energy_error")]
     none = [lost(one, NAMES[0], "energy_error") for one in good]
-    column = list(overview.SUMMARY).index("energy_error")
-    whole, some, nothing = (overview.summary(each, NAMES, set()) for each in (good, half, none))
-    [row] = [
-        cells
-        for key, _, _, cells in overview.scenario_table(half[1], NAMES)
-        if key == "energy_error"
-    ]
 
-    assert whole[NAMES[0]][column].remark == "in 2 scenes"
-    assert some[NAMES[0]][column].remark == f"in 1 scene, {NOT_JUDGED} in 1"
-    assert (
-        some[NAMES[0]][column].text
-        == overview.summary(good[:1], NAMES, set())[NAMES[0]][column].text
-    )
-    assert (nothing[NAMES[0]][column].text, nothing[NAMES[0]][column].best) == ("–", False)
-    assert nothing[NAMES[1]][column].best
-    assert (row[0].text, row[0].best) == (NOT_JUDGED, False)
-    assert "3 of 90" in row[0].remark
+    def energy(comparisons: list[Comparison]) -> str:
+        headings, rows, _ = medians(scenes_of(comparisons), NAMES, set())
+        return rows[0][headings.index("Energy\nof energy")]
+
+    assert energy(half) == energy(good[:1])
+    assert energy(none) == "–"
+    number = values(half[1])[NAMES[0], "energy_error"]
+    assert number.text == NOT_JUDGED
+    assert "3 of 90" in number.remark
 
 
 def test_a_scene_known_at_its_start_only_beats_nobody():
-    """It is left out of the findings, of the map, and of what is drawn."""
+    """It is left out of the findings, and has no error."""
     nothing = compared(known_until("wall_to_wall", 1))
-    cells = overview.heat_map([nothing], NAMES)["wall_to_wall"]
+    known = compared(scenario("head_on_equal_e05"))
 
-    assert "No scene here has an exact answer" in findings([nothing], set())[0]
-    assert (
-        "answer of head_on_equal_e05, by"
-        in findings([nothing, compared(scenario("head_on_equal_e05"))], set())[0]
-    )
-    assert {(cell.text, cell.heat) for cell in cells} == {(NOT_JUDGED, -1)}
-    for chart in CHARTS.values():
-        chart.draw(nothing)
+    assert "No scene here has an exact answer" in findings(summarize([nothing]))[0]
+    assert "answer of head_on_equal_e05:" in nearest(summarize([nothing, known]))
+    [scene] = scenes_of([nothing])
+    assert all(np.isnan(scene.error(name)) for name in NAMES)
 
 
 def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp_path: Path):
@@ -245,7 +233,7 @@ def test_a_failed_run_is_no_number_that_is_not_judged():
 def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
     """The only engine broke the protocol: there is an exact answer, and nobody to be held to it."""
     comparisons = [compared(known_until("slow_collision", 50))]
-    alone, without = findings(comparisons, set(NAMES))[0], findings([], set())[0]
+    alone, without = nearest(summarize(comparisons, NAMES)), nearest(summarize([]))
 
     assert (
         alone

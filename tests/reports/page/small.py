@@ -12,8 +12,8 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.lessons.catalogue import LESSONS
-from crosscheck2d.reports.page.report import write_page
+from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.scenarios.catalogue import scenario
 
 HOSTILE = (
@@ -42,7 +42,7 @@ def played(name: str, **changes: Any) -> Comparison:
 
 
 def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
-    """Write their page to `path`; `more` goes to `write_page`."""
+    """Write their page to `path`; `more` goes to `report_page`."""
     probe = {
         "engine": "pymunk",
         "profile": "matched",
@@ -57,6 +57,7 @@ def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
         "dt_s": 1e-3,
         "published_J2": 185.027,
         "ours_J2": 185.027,
+        "made_by": "reference:exercise",
         "source": HOSTILE,
     }
     about = {
@@ -70,14 +71,12 @@ def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
         "versions": {"pymunk": "7.3.1"},
         "started": "2026-01-01T00:00:00+00:00",
     }
-    write_page(
+    page = report_page(
         path,
-        comparisons,
-        untrusted=set(),
-        findings=["One.", HOSTILE, "Three."],
+        summarize(comparisons),
         conformance=conformance,
         known_answers=pd.DataFrame([known]),
         about=about,
-        lessons=LESSONS,
-        **more,
+        **{"first": ["One.", HOSTILE, "Three."], **more},
     )
+    path.write_text(page, encoding="utf-8")

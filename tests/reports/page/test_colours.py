@@ -16,7 +16,7 @@ from crosscheck2d.scenarios.model import Array
 MARKS = {
     name.partition(":")[0]: row.mark for name, row in {**ENGINES, **FETCHED}.items() if row.mark
 } | {f"file {k}": mark for k, mark in enumerate(PALETTE)}
-PAGES = {"light": "#ffffff", "dark": "#14171b"}
+PAGES = {"light": "#fdfdfb", "dark": "#14171a"}
 LEAST_CONTRAST, LEAST_DISTANCE = 3.0, 0.06
 # What is seen, of linear RGB, without one kind of cones (Machado, Oliveira & Fernandes, IEEE TVCG
 # 15, 1291, 2009, table 1, severity 1.0).

@@ -273,7 +273,7 @@ def test_terminal_and_page_begin_with_the_fault_and_do_not_rank_it(tmp_path: Pat
     )
     printed = " ".join(run.stdout.split())
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    first = re.findall(r'<ol class="findings">\s*<li>(.*?)\n', page)
+    first = re.findall(r'<p class="lead">(.*?)</p>', page)
 
     assert run.returncode == 0, run.stderr
     assert f"- mine.js: {words} It breaks a law, so it is not ranked." in printed

@@ -6,36 +6,17 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
 from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import compare
-from crosscheck2d.reports.page.charts import ChartLine, Drawing, figure_of
-from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals, unranked_sentence
-from crosscheck2d.reports.page.first_screen import failed
+from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals
 from crosscheck2d.reports.page.own_solvers import with_lines
-from crosscheck2d.reports.page.page_tables import conformance_matrix, exact_answers
-from crosscheck2d.reports.page.pooled import with_marks
 from crosscheck2d.reports.page.report import how_broken
 from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.truth.exact import OracleTruth
-from crosscheck2d.scenarios.truth.record import CERTIFIED, SEARCHED, TWO_PRECISIONS
 from tests.reports.page.browsing import overhang
-
-
-def test_who_has_no_mark_in_the_chart_has_none_in_its_legend():
-    """A line of no number is a trace without a mark."""
-    lines = [
-        ChartLine(Run(name, "own", "", 0.0), np.arange(2.0), np.array(y))
-        for name, y in (("a.js", [1.0, np.nan]), ("b.js", [np.nan, np.nan]))
-    ]
-    drawing = Drawing("Error", "", figure_of(lines, {}, "error", mode="markers"))
-
-    assert with_marks({"situations": drawing}) == ["a.js:own"]
 
 
 def test_who_is_not_counted_is_named_with_the_probe_that_it_missed():
@@ -61,32 +42,6 @@ def test_each_sentence_has_its_lines():
         ("Two.", []),
     ]
     assert with_lines(["No fault found."], []) == [("No fault found.", [])]
-
-
-def test_the_first_failure_of_an_engine_is_named():
-    """Its scene and its reason; who refuses has not failed."""
-    scene = scenario("head_on_equal_e09")
-    runs = [
-        Run("a.js", "own", scene.name, 0.1 / k, status, reason)
-        for k, (status, reason) in enumerate(
-            [("error", "SolverFailed: TypeError: x"), ("timeout", "was stopped")], 1
-        )
-    ]
-    refused = Run("pymunk", "shipped", scene.name, 0.1, "unsupported", "no walls")
-
-    assert failed([compare(scene, [*runs, refused])]) == {
-        "a.js:own": "head_on_equal_e09: TypeError: x"
-    }
-
-
-def test_a_file_is_not_asked_where_the_exercise_does_not_ask():
-    """Its number is of the scenes that it plays; the others are counted."""
-    off = pd.DataFrame({"a.js:own": {"head_on": 0.25, "oblique": 1.75, "wall": np.nan}})
-
-    assert unranked_sentence("a.js:own", off, 1.0, 1) == (
-        "a.js is within 1 radius of the exact answer in 1 of 2 scenes, off by 1.8 radii in oblique,"
-        " not asked in 1 scene. It is not ranked among the engines."
-    )
 
 
 def test_a_reason_to_refuse_is_said_once_with_its_cells():
@@ -118,35 +73,11 @@ def test_the_end_of_the_exact_answer_to_a_scene_of_ones_own_is_said():
     ]
 
 
-def test_each_exact_answer_is_counted_by_its_own_method():
-    """Two proven ones, one that rests on a search, and one at two precisions."""
-    one = scenario("falling_box")
-    record = OracleTruth(one).record()
-    methods = [CERTIFIED, SEARCHED, CERTIFIED, TWO_PRECISIONS]
-    answers = [
-        replace(one, truth=OracleTruth(one, replace(record, method=method))) for method in methods
-    ]
-    text = exact_answers([compare(answer, []) for answer in answers])
-
-    assert "4 are computed from collision to collision in many digits (2 proven by" in text
-    assert ", 1 proven but for collisions that a search says never end, 1 at two prec" in text
-
-
-def test_a_refusal_in_the_table_of_probes_is_not_asked():
-    """It is worse than what is kept, and no departure."""
-    rows = [
-        {"engine": "a.js", "profile": "own", "probe": "walls", "verdict": verdict}
-        for verdict in ("keeps", "not asked", "not asked")
-    ]
-
-    assert conformance_matrix(pd.DataFrame(rows)) == {"walls": {"a.js:own": ("not asked", 2)}}
-
-
 @pytest.mark.parametrize("box", ["p", "li", "summary"])
 def test_a_long_path_stays_in_its_box_on_a_phone(browser: Browser, box: str):
     """At 400 px, wherever a solver's file is named outside a table."""
     page = browser.new_page(viewport={"width": 400, "height": 800})
-    css = (Path(__file__).parents[3] / "reports/page/page.css").read_text("utf-8")
+    css = (Path(__file__).parents[3] / "reports/page/kit.css").read_text("utf-8")
     named = f"<{box}><span class=who>/home/{'x' * 300}.py<i>:own</i></span></{box}>"
     page.set_content(f"<style>{css}</style><main>{named}</main>")
     wide = overhang(page)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from crosscheck2d.reports.speed import budget, explained
 from crosscheck2d.reports.speed.budget import RESIDUAL, TOTAL, budget_of
-from crosscheck2d.reports.speed.explained import COLUMNS, Cut, extent, sentence, share
+from crosscheck2d.reports.speed.explained import COLUMNS, cuts, sentence
 from crosscheck2d.reports.speed.scored_part import scored
 
 
@@ -33,17 +32,9 @@ TABLE = made_up(
 )
 
 
-def test_the_share_counts_what_is_not_played_and_what_is_exact_apart():
-    """Three errors: two explained to 1 %, one to 0.1 %; two are rounding, one was not played."""
-    assert share(TABLE) == explained.Share(3, (2, 1), 2, 1, 1, 1)
-
-
-def test_the_extent_counts_scenes_and_seconds_once_and_names_what_is_cut():
-    """However many engines played them."""
-    assert extent(TABLE) == explained.Extent(
-        3, pytest.approx(7.2), pytest.approx(8.0), [Cut("short", 0.2, 1.0)]
-    )
-    assert extent(TABLE).cuts[0].share == pytest.approx(0.2)
+def test_what_is_cut_is_named_once_however_many_engines_played_it():
+    """With how long it is evaluated and how long its exact answer lasts."""
+    assert cuts(TABLE).to_numpy().tolist() == [["short", 0.2, 1.0]]
 
 
 def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
@@ -52,6 +43,7 @@ def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
 
     assert said.startswith(
         "of 3 errors (2 engines in 3 scenes; 2 more below 1e-09 radii; 1 not played) 2 are"
+        " explained to 1 %, 1 to 0.1 %"
     )
     assert "over 7 of 8 simulated seconds: 1 scene is cut" in said
     assert "(short at 0.2 of 1 s)" in said
@@ -72,7 +64,7 @@ def test_the_budget_itself_tells_how_far_it_goes():
     assert 0 < gas.until_s < gas.horizon_s < gas.duration_s
     assert gas.horizon_s == scored("gas_of_100", 0).scenario.duration
     assert fall.until_s == fall.horizon_s == fall.duration_s
-    assert [cut.scenario for cut in extent(table.reset_index()).cuts] == ["gas_of_100"]
+    assert [*cuts(table.reset_index()).scenario] == ["gas_of_100"]
 
 
 def test_a_row_has_the_error_and_what_is_left_of_the_budget():

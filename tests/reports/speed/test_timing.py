@@ -25,7 +25,7 @@ from crosscheck2d.reports.speed.effort import QUICK
 from crosscheck2d.reports.speed.estimate import READY, all_rounds
 from crosscheck2d.reports.speed.measure import IN_PILE, Measured, samples_table
 from crosscheck2d.reports.speed.scored_part import scored
-from crosscheck2d.reports.speed.tables import cost_of_sleep, end_of_all_pairs, summed_up
+from crosscheck2d.reports.speed.tables import end_of_all_pairs, pile, summed_up
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scene
 from tests.reports.speed.clockwork import Sleeper
@@ -213,7 +213,7 @@ def test_a_settled_pile_costs_less_asleep_and_nothing_in_it_moves():
     assert moved < sizes.RADIUS / 5
 
 
-def test_the_cost_of_sleep_is_a_sentence():
+def test_a_settled_pile_is_a_row_awake_and_asleep():
     """Of the engines that were timed both ways."""
     rows = [
         {"kind": IN_PILE, "engine": "a", "profile": "b", "change": change, "n": 100, "cost": cost}
@@ -235,9 +235,9 @@ def test_the_cost_of_sleep_is_a_sentence():
         ]
     )
 
-    said = cost_of_sleep(Measured(samples=samples))
-    assert said == "A step of a settled pile of 100 disks costs, in µs: a:b 20, with sleeping 1."
-    assert cost_of_sleep(Measured()) == ""
+    (row,) = pile(Measured(samples=samples)).to_dict("records")
+    assert row == {"name": "a:b", "n": 100, "": 20.0, "sleeping": 1.0}
+    assert pile(Measured()).empty
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():

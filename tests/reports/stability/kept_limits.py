@@ -160,10 +160,10 @@ def readme_table(engines: Sequence[str], rows: Sequence[Kept]) -> str:
 def in_words(row: Kept) -> str:
     """Where it fails first, to two digits; * where it works again beyond. A spin to three: what is
     2 % off and what is refused at the cap itself are two limits."""
-    words = {"does not fail": "–", "never works": "everywhere"}
     where = style.number(row.fails_at, 3 if row.case == "spin" else 2)
     refused = "refused from " if row.predicate == "refused" else ""
-    return words.get(row.verdict, f"{refused}{where}{'' if row.monotone else '*'}")
+    words = {"does not fail": "–", "never works": "everywhere"}.get(row.verdict, refused + where)
+    return words if row.monotone or row.verdict == "does not fail" else f"{words}*"
 
 
 def keep(folder: Path) -> None:

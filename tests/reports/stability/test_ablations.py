@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from math import nan
 from typing import Any
 
 import pytest
@@ -21,14 +20,14 @@ from crosscheck2d.adapters.mechanisms.table import (
     RESTITUTION,
     mechanisms_of,
 )
-from crosscheck2d.reports.stability.ablations import (
+from crosscheck2d.reports.compare.causes import (
     ACTS_AT_END,
-    END_OF_STEP,
-    Ablations,
-    reason_by_ablation,
-    sufficient_mechanisms,
-    words_of,
+    LATE,
+    Cause,
+    by_mechanisms,
+    mechanism_words,
 )
+from crosscheck2d.reports.stability.ablations import Ablations, sufficient_mechanisms
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained
 from crosscheck2d.reports.stability.limits import QUICK, Limit, Trial
@@ -48,9 +47,9 @@ def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
     ("case", "engine", "mechanisms"),
     [
         # one collision, nothing accelerates
-        ("dt_head_on_equal_e09", "pymunk:matched", END_OF_STEP),
-        ("dt_head_on_equal_e09", "box2d_v3:matched", END_OF_STEP),
-        ("dt_wall_to_wall", "reference:lesson", END_OF_STEP),
+        ("dt_head_on_equal_e09", "pymunk:matched", LATE),
+        ("dt_head_on_equal_e09", "box2d_v3:matched", LATE),
+        ("dt_wall_to_wall", "reference:lesson", LATE),
         # each time it is set onto the wall
         ("dt_wall_to_wall", "reference:exercise", POSITION_CORRECTION),
         ("dt_wall_to_wall", "pymunk:shipped", RESTITUTION),
@@ -66,7 +65,7 @@ def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
 )
 def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, mechanisms: str):
     """Mechanisms with a closed form or a setting of their own."""
-    assert sufficient_mechanisms(*found(case, engine)) == mechanisms
+    assert sufficient_mechanisms(*found(case, engine)) == (mechanisms,)
 
 
 def test_an_ablation_without_the_cause_does_not_have_the_limit():
@@ -98,7 +97,7 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
     limit = search.limit()
 
     assert limit.verdict == "never works"
-    assert sufficient_mechanisms(search, limit) == ""
+    assert sufficient_mechanisms(search, limit) == ()
 
 
 def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does():
@@ -106,7 +105,7 @@ def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does(
     search, limit = found("dt_wall_to_wall", "pymunk:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
-    far = replace(ablations, reading=ablations.reading._replace(value=3 * ablations.reading.value))
+    far = replace(ablations, verdict=replace(ablations.verdict, value=3 * ablations.verdict.value))
 
     assert limit.verdict == "never works"
     assert ablations.alike(ablations.mechanisms)
@@ -118,30 +117,35 @@ def test_of_an_engine_whose_mechanisms_nobody_knows_there_is_no_ablation(engine:
     """End-of-step detection explains nothing in an engine that orders its collisions within the
     step."""
     search = LimitSearch(CASES["overlap_recovery"], engine, QUICK)
-    assert sufficient_mechanisms(search, search.limit()) == ""
+    assert sufficient_mechanisms(search, search.limit()) == ()
+
+
+def causes(limits: list[Limit]) -> list[Cause]:
+    """Their causes."""
+    return [limit.cause for limit in explained(limits) if limit.cause is not None]
 
 
 def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablation():
     """And where it speaks of what the ablation has, it stays, and says how it was tested."""
     failing = Trial(10.0, 1, 1, 2.0, 0)
     limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
-    [kept, other, untested] = explained(
+    [kept, other, untested] = causes(
         [
-            replace(limit, mechanisms=f"{FLIGHT}, {POSITION_CORRECTION}"),
-            replace(limit, mechanisms=FRICTION),
+            replace(limit, mechanisms=(FLIGHT, POSITION_CORRECTION)),
+            replace(limit, mechanisms=(FRICTION,)),
             limit,
         ]
     )
 
-    assert "corrected by a share per step" in kept.reason
+    assert "corrected by a share per step" in kept.text
     assert (
-        kept.tested
+        kept.shown
         == "the reference with end-of-step detection and the engine's flight and position"
         " correction has this limit"
     )
-    assert other.reason == "friction reduces the speed along the contact"
+    assert other.text == "friction reduces the speed along the contact"
     assert other.source == "the engine's default"
-    assert untested.why.startswith("likely: overlaps are corrected")
+    assert untested.sentence.startswith("likely: overlaps are corrected")
 
 
 @pytest.mark.parametrize("engine", [name for name in MECHANISMS if name in ENGINES])
@@ -154,26 +158,20 @@ def test_every_mechanism_has_words(engine: str):
         for mechanism in mechanisms_of(engine, settings, one.scene, one.dt(4))
         if mechanism.parameters
     ]
-    limit = Limit("slow_collision", engine, "quick", "never works", nan, 1.0, ())
 
-    assert reason_by_ablation(replace(limit, mechanisms=END_OF_STEP))[0] == ACTS_AT_END
+    assert by_mechanisms([LATE], engine).text == ACTS_AT_END
     assert len(names) >= 2
     for name in names:
-        assert reason_by_ablation(replace(limit, mechanisms=name))[0] not in ("", ACTS_AT_END)
-    assert (
-        reason_by_ablation(replace(limit, mechanisms=", ".join(names)))[0].count("; ")
-        >= len(names) - 1
-    )
+        assert by_mechanisms([name], engine).text not in ("", ACTS_AT_END)
+    assert by_mechanisms(names, engine).text.count("; ") >= len(names) - 1
 
 
 @pytest.mark.parametrize("engine", [*MECHANISMS, "new:plain"])
 def test_every_name_of_a_mechanism_has_words(engine: str):
     """Whatever engine has it, fetched or new; a name that is none has none."""
-    limit = Limit("slow_collision", engine, "quick", "never works", nan, 1.0, ())
-
     for name in NAMES:
-        assert words_of(name, engine)[2:] != ("", "")
-    both = reason_by_ablation(replace(limit, mechanisms=f"{RESTITUTION}, {RECYCLING}"))[0]
+        assert mechanism_words(name, engine)[2:] != ("", "")
+    both = by_mechanisms([RESTITUTION, RECYCLING], engine).text
     assert both.endswith("; a pair that has hardly moved is not looked at again")
     with pytest.raises(KeyError):
-        words_of("magic", engine)
+        mechanism_words("magic", engine)

@@ -48,16 +48,13 @@ def test_a_report_of_a_package_names_its_version_and_no_file():
         assert (list(plan.added), list(alone.added)) == (["planck:shipped"], [])
 
 
-def found(
-    folder: Path, cases: Sequence[str], engines: Sequence[str]
-) -> dict[tuple[str, str], Limit]:
+def found(cases: Sequence[str], engines: Sequence[str]) -> dict[tuple[str, str], Limit]:
     """The limits that a worker finds."""
     added = {name: FETCHED[name] for name in engines}
-    (folder / "trajectories").mkdir()
     limits = {}
     for case in cases:
         for name in engines:
-            limit = Task("limit", case, name, "quick")(folder, added)
+            limit = Task("limit", case, name, "quick")(added)
             assert isinstance(limit, Limit)
             limits[case, name] = limit
     return limits
@@ -82,11 +79,11 @@ def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
 
 
 @pytest.mark.slow
-def test_what_cuts_a_spin_is_its_limit(tmp_path: Path):
+def test_what_cuts_a_spin_is_its_limit():
     """A quarter of a turn a step in planck, an eighth in Rapier, 2 % of which is off; matched
     planck cuts none, matched Rapier refuses."""
     names = ("planck:shipped", "planck:matched", "rapier2d:shipped", "rapier2d:matched")
-    limits = found(tmp_path, ["spin"], names)
+    limits = found(["spin"], names)
     bracket = 1.05  # that of the quick form
     for name, cut in (("planck:shipped", pi / 2), ("rapier2d:shipped", pi / 4)):
         limit = limits["spin", name]

@@ -13,15 +13,16 @@ import pytest
 
 from crosscheck2d.adapters.engines import FETCHED
 from crosscheck2d.reports.cli import VARIED
+from crosscheck2d.reports.compare.causes import CauseKind
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
 from crosscheck2d.reports.stability.interventions import (
     INTERVENTIONS,
+    cause_by_replays,
     intervention_of,
-    reason_by_intervention,
     with_settings,
 )
-from crosscheck2d.reports.stability.limits import FULL, NOT_KNOWN, QUICK, Limit, Trial
+from crosscheck2d.reports.stability.limits import FULL, QUICK, Limit, Trial
 from crosscheck2d.reports.stability.reasons import reason_of
 from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
@@ -64,9 +65,10 @@ def test_a_reason_is_what_the_failing_run_works_without(what: str, engine: str, 
     out by themselves."""
     limit = found(what, engine)
 
-    assert expected in limit.reason
-    assert limit.tested.startswith("works ")
-    assert limit.why == limit.reason
+    assert limit.cause is not None
+    assert expected in limit.cause.text
+    assert limit.cause.shown.startswith("works ")
+    assert limit.cause.sentence == limit.cause.text
 
 
 def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_called_not_known():
@@ -75,21 +77,26 @@ def test_where_no_intervention_helps_an_ablation_may_show_why_and_else_it_is_cal
     path = str(SCENES / "two.toml")
     search = LimitSearch(case_of_file(path, "dt"), "pymunk:matched", QUICK)
     [limit] = explained([with_replays(search, replace(search.limit(), case=f"{path}:dt"))])
-    assert limit.why == "a collision takes effect at the end of the step in which it is found"
+    assert limit.cause is not None
+    assert limit.cause[:2] == (
+        CauseKind.MECHANISM,
+        "a collision takes effect at the end of the step in which it is found",
+    )
     assert (
-        limit.tested == "the reference with end-of-step detection and nothing else has this limit"
+        limit.cause.shown
+        == "the reference with end-of-step detection and nothing else has this limit"
     )
 
     failing = limit.failing
     assert failing is not None
     nothing = replace(
-        limit, case="x.toml:speed", mechanisms="", trials=(replace(failing, broken="collisions"),)
+        limit, case="x.toml:speed", mechanisms=(), trials=(replace(failing, broken="collisions"),)
     )
-    reason, _, tested = reason_by_intervention(nothing, "speed")
-    assert reason.startswith(NOT_KNOWN)
-    assert "in steps of an eighth" in reason
-    assert tested == ""
-    assert replace(nothing, reason=reason).why == reason
+    cause = cause_by_replays(nothing, "speed")
+    assert cause is not None
+    assert (cause.kind, cause.shown) == (CauseKind.UNKNOWN, "")
+    assert "in steps of an eighth" in cause.sentence
+    assert cause.sentence == cause.text
 
 
 def test_the_answer_of_a_similar_scene_is_the_one_of_the_scene():
@@ -217,4 +224,4 @@ def test_what_ended_without_a_result_has_no_reason_of_physics():
     )
     [known] = explained([lost])
 
-    assert (known.reason, known.tested) == ("", "")
+    assert known.cause is None

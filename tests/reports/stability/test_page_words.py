@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from crosscheck2d.reports.page.sections import limits_of
 from crosscheck2d.reports.page.situations import FAR_OFF
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import LIMIT, Case, Limit, Trial
 from crosscheck2d.reports.stability.overview import findings, held, in_report, in_words
-from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+from crosscheck2d.scenarios.catalogue import scenario
 
 COLUMN = "column_of_ten"
 
@@ -66,11 +65,3 @@ def test_the_column_of_the_report_and_that_of_the_limits_are_told_apart():
     assert f"more than {number(FAR_OFF)} radius" in said
     assert CASES["column"].predicate.means in said
     assert f"{COLUMN} is the same scene, at dt {dt} ms; here dt is varied." in same
-
-
-def test_the_report_names_the_cases_that_name_its_scene():
-    """Both ways; scenes with friction and the reader's own have none."""
-    for name in SCENARIOS:
-        asked = {case.name for case in CASES.values() if case.report == name}
-        assert set(limits_of(scenario(name))) == asked
-    assert limits_of(scenario(COLUMN)) == [f"dt_{COLUMN}", "column"]

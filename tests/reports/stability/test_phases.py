@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crosscheck2d.reports.stability.phases import EDGE, phase
+from crosscheck2d.reports.stability.scenes import EDGE, phase
 
 
 def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():

@@ -13,6 +13,7 @@ import pytest
 from crosscheck2d.adapters.engines import FETCHED, row_of
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.compare.causes import CauseKind
 from crosscheck2d.reports.compare.faces import first_on_line, on_faces, thrown_off
 from crosscheck2d.reports.stability.cases import CASES as LIMITS_OF
 from crosscheck2d.reports.stability.explain import explained, with_replays
@@ -59,8 +60,8 @@ def test_a_ghost_collision_is_named_and_gone_on_one_wall(engine: str):
     assert (disk, wall) == (0, 0)
     assert np.isfinite(at)
     reading = judge(USABLE, scenario, run)
-    assert reading.broken == "ghost collision"
-    assert "where two of its walls meet" in reading.event
+    assert reading.id == "ghost collision"
+    assert "where two of its walls meet" in reading.text
 
 
 @pytest.mark.slow
@@ -69,8 +70,11 @@ def test_the_reason_of_a_ghost_collision_is_the_walls_that_meet(engine: str):
     """The failing run works when the walls are joined."""
     with taking_part({engine: FETCHED[engine]} if engine in FETCHED else {}):
         limit = limit_of(PIECES, "dt", engine)
-    assert limit.reason.startswith("a ghost collision: the walls of one floor act as several; join")
-    assert limit.tested == "works on a floor of one wall"
+    assert limit.cause is not None
+    assert limit.cause.text.startswith(
+        "a ghost collision: the walls of one floor act as several; join"
+    )
+    assert limit.cause.shown == "works on a floor of one wall"
 
 
 def test_walls_that_are_in_line_to_seven_digits_are_one_surface():
@@ -94,8 +98,9 @@ def test_a_default_is_named_with_what_to_set(case: str, engine: str, setting: st
     """The setting that leaves least, not the first with which the failing run just works."""
     search = LimitSearch(LIMITS_OF[case], engine, QUICK)
     [limit] = explained([with_replays(search, search.limit())])
-    assert limit.reason.startswith(setting)
-    assert limit.tested == "works with it"
+    assert limit.cause is not None
+    assert limit.cause.text.startswith(setting)
+    assert (limit.cause.kind, limit.cause.shown) == (CauseKind.SETTING, "works with it")
 
 
 @pytest.mark.slow
@@ -104,7 +109,8 @@ def test_a_wrong_distance_is_no_ghost_collision():
     limit = limit_of(PIECES, "dt", "reference:ordered")
     assert limit.failing is not None
     assert limit.failing.broken != "ghost collision"
-    assert limit.reason == "the walls of one floor act as several; join them into one wall"
+    assert limit.cause is not None
+    assert limit.cause.text == "the walls of one floor act as several; join them into one wall"
 
 
 def limit_of(path: Path, what: str, engine: str) -> Limit:

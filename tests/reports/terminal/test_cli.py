@@ -52,7 +52,7 @@ def test_help_loads_no_number_library():
         "import sys; from crosscheck2d.reports.cli import app\n"
         "from typer.testing import CliRunner\n"
         "assert CliRunner().invoke(app, ['run', '--help']).exit_code == 0\nprint([name for"
-        " name in ('numpy', 'pandas', 'numba', 'plotly', 'pymunk') if name in sys.modules])"
+        " name in ('numpy', 'pandas', 'numba', 'matplotlib', 'pymunk') if name in sys.modules])"
     )
 
     assert (

@@ -1,0 +1,253 @@
+"""The first table: who is nearest, in which settings, at what cost, and what is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import Comparison, compare
+from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.scene_map import map_section
+from crosscheck2d.reports.page.scenes import ANGLE, scenes_of
+from crosscheck2d.reports.page.situations import (
+    CROWDS,
+    ENGINE,
+    EXACT,
+    FLIGHT,
+    FRICTION,
+    OWN,
+    ROWS,
+    SINGLE,
+    SPIN,
+    STACKS,
+    grouped,
+    situations_of,
+)
+from crosscheck2d.reports.page.summary import WITHOUT, Summary, summarize
+from crosscheck2d.reports.page.trade_offs import cost_against_size, error_against_cost, limits
+from crosscheck2d.reports.run.timing import noise_of
+from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
+
+NAMES = (
+    *("reference:exercise", "reference:ordered", "pymunk:shipped", "pymunk:matched"),
+    *("box2d:shipped", "box2d:matched"),
+)
+SCENES = ("free_fall", "oblique_e09", "slow_collision", "friction_bounce_e1_mu01")
+WHERE = {
+    "free_fall": [FLIGHT, SPIN],
+    "oblique_e09": [SINGLE, SPIN],
+    "line_gas": [ROWS],
+    "rest_on_floor": [STACKS],
+    "gas_of_100": [CROWDS],
+    "slip_to_roll": [FRICTION],
+}
+
+
+def played(name: str) -> Comparison:
+    """A scene through all `NAMES`, and the reference with friction where there is some."""
+    one = replace(scenario(name), substeps=scenario(name).substeps[1:3])
+    names = [*NAMES, *["reference:coulomb"] * bool(one.scene.friction)]
+    dts = [one.dt(k) for k in one.substeps]
+    return compare(one, [play(ENGINES[n].make(), n, one, dt) for n in names for dt in dts])
+
+
+@pytest.fixture(scope="module")
+def comparisons() -> list[Comparison]:
+    """Four scenes of four situations."""
+    return [played(name) for name in SCENES]
+
+
+@pytest.fixture(scope="module")
+def summary(comparisons: list[Comparison]) -> Summary:
+    """Of these four, without times."""
+    return summarize(comparisons)
+
+
+@pytest.mark.parametrize("name", WHERE)
+def test_a_scene_belongs_where_its_answer_says(name: str):
+    """By what collides with what in the exact answer, weight, and what turns."""
+    scene = scenario(name)
+    assert scene.truth is not None
+    kinds = situations_of(scene, scene.truth(scene.times))
+
+    assert kinds[0] == WHERE[name][0]
+    assert (SPIN in kinds) == bool(scene.scene.angular_velocity.any() and kinds[0] != FRICTION)
+
+
+def test_without_an_answer_all_disks_may_meet():
+    """Twenty disks are then a crowd, two are not."""
+    assert situations_of(scenario("gas_of_100"), None)[0] == CROWDS
+    assert situations_of(scenario("head_on_equal_e1"), None)[0] == SINGLE
+
+
+def test_an_engine_stands_in_one_group_whatever_was_played():
+    """That it orders collisions is said in its row, and not read off errors."""
+    names = ["pymunk:matched", "reference:exercise", "reference:ordered", "event_driven:float64"]
+
+    assert grouped(names) == {ENGINE: names[:1], OWN: names[1:2], EXACT: names[2:]}
+
+
+def test_a_library_has_one_profile_the_nearer_in_more_scenes(summary: Summary):
+    """In slow_collision Box2D as shipped does not bounce; where the others are nearer by more than
+    a factor of two, the cell says so."""
+    assert summary.chosen["box2d"][0] == "box2d:matched"
+    assert summary.libraries == ["pymunk:matched", "box2d:matched"]
+    only = summarize([s.comparison for s in summary.scenes if s.name == "slow_collision"])
+    shipped, matched = (only.error(f"box2d:{p}", SINGLE) for p in ("shipped", "matched"))
+    assert matched < shipped / 2
+
+
+def test_within_a_factor_of_two_is_a_tie_and_ours_are_never_nearest(summary: Summary):
+    """In free fall all err alike."""
+    assert all(summary.is_near(name, FLIGHT) for name in summary.libraries)
+    assert not summary.is_near("reference:exercise", FLIGHT)
+    assert summary.cell("reference:ordered", FLIGHT).text == "exact"
+
+
+def test_an_error_that_doubles_and_a_bit_ends_the_tie(comparisons: list[Comparison]):
+    """The control of the tie."""
+    table = comparisons[0].table.copy()
+    worse = (table.engine == "box2d") & (table.metric == "position_max_radii")
+    table.loc[worse, "value"] *= 2.1
+    changed = summarize([replace(comparisons[0], table=table), *comparisons[1:]])
+
+    assert not changed.is_near("box2d:matched", FLIGHT)
+    assert changed.is_near("pymunk:matched", FLIGHT)
+
+
+def test_failing_one_more_scene_never_lowers_a_median(comparisons: list[Comparison]):
+    """A run that fails a verdict is infinitely far off."""
+    table = comparisons[1].table.copy()
+    mine = (table.engine == "pymunk") & (table.metric == "momentum")
+    assert mine.any()
+    table.loc[mine, "value"] = 1.0
+    before, after = summarize(comparisons), None
+    after = summarize([comparisons[0], replace(comparisons[1], table=table), *comparisons[2:]])
+
+    assert after.error("pymunk:matched", WITHOUT) >= before.error("pymunk:matched", WITHOUT)
+    cell = after.cell("pymunk:matched", SINGLE)
+    assert cell.notes[0].text == "momentum off by 100 %"
+    assert cell.notes[0].link == "#oblique_e09"
+
+
+def test_scenes_with_friction_count_in_their_own_row_only(summary: Summary):
+    """There the reference that has friction stands for the exercise, which refuses them."""
+    assert [scene.name for scene in summary.situations[FRICTION]] == [SCENES[-1]]
+    assert SCENES[-1] not in [scene.name for scene in summary.situations[WITHOUT]]
+    assert np.isfinite(summary.error("reference:exercise", FRICTION))
+    assert np.isinf(summary.scenes[-1].error("reference:exercise"))
+
+
+def test_spin_is_judged_by_the_angle(summary: Summary):
+    """Of the same scenes, which also count above."""
+    scene = summary.situations[SPIN][0]
+    errors = [s.error("pymunk:matched", metric=ANGLE) for s in summary.situations[SPIN]]
+
+    assert scene.situations[0] in (FLIGHT, SINGLE)
+    assert summary.error("pymunk:matched", SPIN) == np.median(errors)
+
+
+def test_three_sentences_say_what_the_table_says(summary: Summary):
+    """Names, counts and the link to the settings are computed."""
+    first, *rest = (str(sentence) for sentence in summary.sentences())
+    near = summary.nearest(WITHOUT)
+
+    assert all(f"<b>{name}</b>" in first for name in near)
+    assert ("a tie" in first) == (len(near) > 1 or len(summary.nearest(FRICTION)) > 1)
+    assert "href='#settings'" in rest[0]
+    assert "is exact in 3 of 3" in rest[-1]
+
+
+def test_who_breaks_the_protocol_is_not_ranked(comparisons: list[Comparison]):
+    """It has no column; in the map it stays."""
+    summary = summarize(comparisons, {"pymunk:shipped", "pymunk:matched"})
+    [table] = map_section(summary).parts
+
+    assert summary.libraries == ["box2d:matched"]
+    assert "pymunk:matched" not in summary.columns
+    assert any(head.title == "pymunk matched" for head in table.heads)  # type: ignore[union-attr]
+
+
+def times(comparisons: list[Comparison], pairs: list[float]) -> RunTimes:
+    """Made-up times: each engine needs as many µs for a second as there are steps in it."""
+    rows = [
+        {
+            "scenario": run.scenario,
+            "engine": run.engine,
+            "profile": run.profile,
+            "dt_s": float(f"{run.dt:.6g}"),  # as timings.csv has it
+            "cost_us_per_s": 1 / run.dt,
+        }
+        for comparison in comparisons
+        for run in comparison.runs
+        if run.status == "ok"
+    ]
+    return RunTimes(pd.DataFrame(rows), noise_of(pairs), 1.0)
+
+
+def test_a_cost_is_that_of_a_step_and_stands_only_where_times_can_be_trusted(
+    comparisons: list[Comparison],
+):
+    """A busy machine is named in its place, and the chart then counts steps."""
+    quiet = summarize(comparisons, clock=times(comparisons, [1.0, 1.01]))
+    busy = summarize(comparisons, clock=times(comparisons, [1.0, 9.0]))
+
+    assert quiet.cost("pymunk:matched", FLIGHT) == pytest.approx(1.0, rel=1e-4)
+    assert quiet.cell("pymunk:matched", FLIGHT).side == "1 µs"
+    assert busy.cell("pymunk:matched", FLIGHT).side.strip() == ""
+    assert "The machine was busy" in str(busy.section().says)
+    charts = [error_against_cost(each) for each in (quiet, busy)]
+    assert [c is not None and "busy" in str(c.says) for c in charts] == [False, True]
+    assert "engine time" in charts[0].parts[0].svg  # type: ignore[union-attr]
+    assert "steps in a second" in charts[1].parts[0].svg  # type: ignore[union-attr]
+
+
+def test_limits_are_the_kept_ones_and_equal_cells_are_one(summary: Summary):
+    """Of pymunk a column of four stands; far apart settings are named."""
+    section = limits(summary)
+    assert section is not None
+    [table] = section.parts
+    rows = {str(label.text).partition(" <")[0]: cells for _, label, cells in table.rows}  # type: ignore[union-attr]
+
+    assert [cell.text for cell in rows["A column stands"]][:2] == ["4", "9"]
+    assert rows["Slow disks bounce"][1].notes[0].text == "shipped 1"
+    assert rows["A ball keeps its height"][0].css == "best"
+
+
+def test_the_chart_of_sizes_has_every_kept_engine_of_the_table(summary: Summary):
+    """By its label."""
+    section = cost_against_size(summary)
+    assert section is not None
+
+    for label in ("pymunk", "Box2D 2.3", "reference", "ordered"):
+        assert f">{label}<" in section.parts[0].svg  # type: ignore[union-attr]
+
+
+def test_every_situation_has_a_scene_in_the_catalogue():
+    """So that the table of a whole run has every row."""
+    kinds = {
+        kind
+        for one in map(scenario, SCENARIOS)
+        for kind in situations_of(one, one.truth(one.times) if one.truth else None)
+    }
+
+    assert {FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION} == kinds
+
+
+def test_the_farthest_engine_that_is_ticked_can_be_seen(summary: Summary):
+    """In the packed facts of a scene: at most three, ours first, the nearest library named."""
+    [scene] = [s for s in scenes_of([summary.scenes[2].comparison])]
+    from crosscheck2d.reports.page.scene_map import to_tick
+
+    names = [run.name for run in scene.comparison.middle_runs if run.trajectory is not None]
+    ticked, notes = to_tick(scene, summary, names)
+
+    assert ticked[0] == "reference:exercise"
+    assert len(ticked) <= 3
+    assert sorted(notes.values()) == ["farthest", "nearest library"]
+    assert scene.raw_error(ticked[-1]) > scene.raw_error(ticked[1])
