@@ -170,8 +170,8 @@ def advise(
         file = Path(folder) / f"{scenario.name}.toml"
         file.write_text(scene_text(scenario), encoding="utf-8")
         try:
-            inquiry = Inquiry(str(file), 0, purpose, os.cpu_count() or 1, progress)
-            advice = inquiry.advice(error, names)
+            inquiry = Inquiry(str(file), 0, os.cpu_count() or 1, progress)
+            advice = inquiry.advice(purpose, error, names)
         except NoAdvice as refusal:
             raise ValueError(str(refusal)) from None
     tried = [(attempt, "") for attempt in advice.keeping]

@@ -287,7 +287,8 @@ class Summary:
         if OURS[1] in self.names:
             exact = sum(scene.error(OURS[1]) < EXACT for scene in scenes)
             cost = self.cost(OURS[1], WITHOUT)
-            third = f"A solver that takes collisions in order of time is exact in {exact} of {len(scenes)}"
+            third = "A solver that takes collisions in order of time is exact in"
+            third += f" {exact} of {len(scenes)}"
             told.append(
                 Markup(
                     third
