@@ -14,7 +14,6 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.commands.diff import show_difference
-from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
 from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
@@ -42,7 +41,7 @@ def run(folder: Path, workers: int) -> Path:
     """A run of `PLAN`, with its tables."""
     with writing(folder, COMMAND) as store, Progress() as progress:
         carry_out(PLAN, Means(workers), store, progress)
-        make_report(RunResults.read(store), progress.say, LESSONS)
+        make_report(RunResults.read(store), progress.say)
     return folder
 
 
