@@ -20,49 +20,40 @@ from crosscheck2d.scenarios.model import Array, Scene, State
 SHIPPED: dict[str, Any] = {
     "velocity_iterations": 8,  # as the manual recommends; `Step` has no defaults
     "position_iterations": 3,
-    "elastic_position_iterations": 3,
     "continuous": True,
     "bullet": False,
-    "elastic_continuous": True,
-    "elastic_bullet": False,
     "sub_stepping": False,
     "warm_starting": True,
     "skin": True,
 }
 MATCHED: dict[str, Any] = {
     "time_unit": 1000.0,
-    "length_unit": 0.25,
+    "length_unit": 0.125,
     "step_unit": 2.0,
     "velocity_iterations": 8,
     "position_iterations": 3,
-    "elastic_position_iterations": 0,
     "continuous": True,
     "bullet": True,
-    "elastic_continuous": False,
-    "elastic_bullet": False,
     "sub_stepping": False,
     "warm_starting": True,
     "skin": False,
 }
-"""What the profiles choose: `time_unit` in s, `length_unit` in smallest radii, position iterations
-at e < 1 and at e = 1. `adapters/matched.csv` holds what else was tried."""
+"""What the profiles choose: `time_unit` in s, `length_unit` in smallest radii.
+`adapters/matched.csv` holds what else was tried."""
 
 SEARCHED = Searched(
     MATCHED,
     {
-        "velocity_iterations": ((8, 20, 50, 100), "passes of the impulse solver; the manual has 8"),
+        "velocity_iterations": ((4, 8, 20, 50), "passes of the impulse solver; the manual has 8"),
         "position_iterations": (
             (0, 1, 3, 8),
-            "passes of the position correction at e < 1; the manual: 3",
+            "passes of the position correction; the manual has 3",
         ),
-        "elastic_position_iterations": ((0, 3), "the same at e = 1"),
         "continuous": (
             (False, True),
             "continuous collision with walls and static disks; on by default",
         ),
         "bullet": ((False, True), "the same between disks that move, where `continuous` is on"),
-        "elastic_continuous": ((False, True), "as `continuous`, at e = 1 without gravity"),
-        "elastic_bullet": ((False, True), "as `bullet`, at e = 1 without gravity"),
         "sub_stepping": (
             (False, True),
             "one continuous collision a call, where `continuous` is on",
@@ -76,21 +67,20 @@ SEARCHED = Searched(
             ),
         ),
         "length_unit": (
-            (0.125, 0.25, 0.5, 1.0, 3.0),
+            (0.015, 0.03, 0.06, 0.125, 0.25, 0.5, 1.0),
             (
                 "smallest radii; slop 0.005, tolerance of continuous collision 0.015 and cap 2"
                 " units are compiled in"
             ),
         ),
         "step_unit": (
-            (1.0, 2.0, 4.0),
+            (0.6, 1.0, 2.0, 4.0),
             "ways of the fastest disk in a step: a unit of length at least",
         ),
     },
     (
         (("continuous", "bullet"), (False, True), (False, True)),
-        (("elastic_continuous", "elastic_bullet"), (True,), (True,)),
-        (("bullet", "length_unit"), (False, True), (0.125, 0.5, 1.0)),
+        (("length_unit", "step_unit"), (0.03, 0.06), (1.0, 4.0)),
     ),
     {
         "radius of an edge (wall skin)": f"0: {GEOMETRY}",
@@ -112,12 +102,11 @@ class Box2DEngine:
 
     `matched`: the scene in other units. Box2D treats collisions below 1 unit of length per unit of
     time as inelastic, and that 1 is compiled in; with a time unit of 1000 s it becomes 1 mm/s. The
-    length unit is a quarter of the smallest radius, which shrinks slop and the tolerance of
+    length unit is an eighth of the smallest radius, which shrinks slop and the tolerance of
     continuous collision; or twice the step displacement of the fastest disk if that is more,
     because Box2D cuts motion at 2 units per step; a scene that still reaches this cap is refused.
-    Continuous collision, also between disks, puts collisions at their own time within a step; it is
-    off without gravity at e = 1, because it creates energy in a gas. No sleep or wall skin; at e =
-    1 no position correction. The values are `MATCHED`, by `crosscheck tune`.
+    Continuous collision, also between disks, puts collisions at their own time within a step. No
+    sleep or wall skin. The values are `MATCHED`, by `crosscheck tune`.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the
     profile's), `turning` (False: no inertia, so no spin), `friction` (None: as above); `settings`
@@ -160,18 +149,14 @@ class Box2DEngine:
         gravity = scene.gravity * self.speed * self.time
         heard = {"contactListener": self.listener} if self.listening else {}
         self.world = Box2D.b2World(gravity=vector(gravity), **heard)
-        # Continuous collision creates energy where the scene conserves it.
-        elastic = "elastic_" if scene.restitution == 1 and not scene.gravity.any() else ""
-        self.continuous, self.bullet = chosen[elastic + "continuous"], chosen[elastic + "bullet"]
+        self.continuous, self.bullet = chosen["continuous"], chosen["bullet"]
         self.world.continuousPhysics = self.continuous
         self.world.subStepping = chosen["sub_stepping"]
         # `doSleep` only sets a Python attribute that the engine never sees
         self.world.SetAllowSleeping(self.sleeping)
         self.world.warmStarting = chosen["warm_starting"]
         self.velocity_iterations = chosen["velocity_iterations"]
-        self.position_iterations = chosen[
-            "elastic_position_iterations" if scene.restitution == 1 else "position_iterations"
-        ]
+        self.position_iterations = chosen["position_iterations"]
         self.bodies = [self._disk(i) for i in range(scene.n)]
         self.walls = [self._wall(w) for w in range(len(scene.walls))]
 

@@ -30,13 +30,13 @@ SHIPPED: dict[str, Any] = {
     "bullet": False,
 }
 MATCHED: dict[str, Any] = {
-    "length_unit": 0.5,
+    "length_unit": 0.3,
     "substeps": 4,
-    "hertz": 1e6,
-    "damping_ratio": 10.0,
+    "hertz": 120.0,
+    "damping_ratio": 1.0,
     "push_speed": 3.0,
     "restitution_threshold": 0.0,
-    "continuous": False,
+    "continuous": True,
     "bullet": False,
 }
 """What the profiles choose: `length_unit` in smallest radii; `hertz`, `damping_ratio` and
@@ -57,7 +57,7 @@ SEARCHED = Searched(
             (10.0, 30.0, 120.0, 1e6),
             "stiffness of a contact; 30 by default; cut at an eighth of the substeps a second",
         ),
-        "damping_ratio": ((1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
+        "damping_ratio": ((0.1, 0.3, 1.0, 3.0, 10.0, 30.0), "of a contact; 10 by default"),
         "push_speed": (
             (0.0, 0.3, 3.0, 30.0),
             "m/s, at most, of a position correction; 3 by default",
@@ -72,7 +72,6 @@ SEARCHED = Searched(
         (("length_unit", "hertz"), (0.02, 0.3, 0.5), (30.0, 1e6)),
         (("substeps", "hertz"), (2, 8), (30.0, 1e6)),
         (("hertz", "damping_ratio"), (30.0, 1e6), (1.0, 3.0)),
-        (("continuous", "bullet"), (True,), (True,)),
     ),
     {
         "restitution_threshold": "0: as the scene states",
@@ -112,11 +111,10 @@ class Box2DV3:
     """`shipped`: restitution, friction, mass and inertia are set, all else is the engine's default,
     including the friction of a scene that states none.
 
-    `matched`: no sleep, continuous collision, restitution threshold or speed cap. The
-    length unit is half of the smallest radius: slop and speculative margin are fractions of it. A
-    larger margin predicts more collisions, but this is the largest without a spurious collision if
-    two disks pass at 1 % of a radius. Contacts have the largest stiffness that the engine allows,
-    an eighth of the substep rate. The values are `MATCHED`, by `crosscheck tune`. A scene that
+    `matched`: no sleep, restitution threshold or speed cap. The length unit is 0.3 of the smallest
+    radius: slop and speculative margin are fractions of it; a larger margin predicts more
+    collisions, and makes spurious ones of disks that pass each other. Contacts are stiffer, and
+    damped less, than by default. The values are `MATCHED`, by `crosscheck tune`. A scene that
     reaches the cap on spins, which pyb2d3 cannot lift, is refused.
 
     Changed one at a time by `options.py`, `table.py` and `crosscheck tune`: `sleeping` (None: the

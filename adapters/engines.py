@@ -181,9 +181,7 @@ ENGINES: dict[str, EngineRow] = {
         },
         variants={
             "fifty_iterations": Variant({"iterations": 50}, "50 iterations instead of 10"),
-            "position_correction": Variant(
-                {"collision_bias": (1 - 0.1) ** 60}, "position correction as shipped"
-            ),
+            "no_correction": Variant({"collision_bias": 1.0}, "no position correction"),
         },
     ),
     "box2d:shipped": _Box2D(
@@ -203,16 +201,11 @@ ENGINES: dict[str, EngineRow] = {
             "30 iterations, not 8": {"velocity_iterations": 30},
             "no position correction": {"position_iterations": 0},
             "no CCD": {"continuous": False, "bullet": False},
-            "CCD at e = 1, too": {"elastic_continuous": True, "elastic_bullet": True},
             "sleeping": {"sleeping": True},
             "no warm start": {"warm_starting": False},
             "no rotation": {"turning": False},
         },
-        variants={
-            "bullets": Variant(
-                {"elastic_continuous": True, "continuous": True}, _BULLETS, _what_moves_is_a_bullet
-            )
-        },
+        variants={"bullets": Variant({"continuous": True}, _BULLETS, _what_moves_is_a_bullet)},
     ),
     "box2d_v3:shipped": _Box2DV3(
         partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3", "shipped"),
@@ -223,14 +216,14 @@ ENGINES: dict[str, EngineRow] = {
     ),
     "box2d_v3:matched": _Box2DV3(
         partial(_made, "crosscheck2d.adapters.box2d_v3.Box2DV3", "matched"),
-        "Box2D 3.1, matched: no thresholds, length unit r / 2, stiff contacts, friction as stated",
+        "Box2D 3.1, matched: no thresholds, length unit 0.3 r, stiffer contacts; CCD",
         0.625,
         FLOAT32,
         options={
             "1 substep, not 4": {"substeps": 1},
             "16 substeps, not 4": {"substeps": 16},
-            "CCD": {"continuous": True},
-            "CCD, all bullets": {"continuous": True, "bullet": True},
+            "no CCD": {"continuous": False},
+            "all bullets": {"bullet": True},
             "sleeping": {"sleeping": True},
             "no rotation": {"turning": False},
         },
@@ -268,7 +261,7 @@ FETCHED: dict[str, EngineRow] = {
     ),
     "planck:matched": _Planck(
         partial(_javascript, "planck", "matched"),
-        "planck, matched: what box2d:matched chooses, without its float32",
+        "planck, matched: CCD, also between disks, to 1e-7 of a radius; no thresholds, no sleep",
         1.0,
         FLOAT64,
     ),

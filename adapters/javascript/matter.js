@@ -16,6 +16,7 @@
   // As many pixels in the smallest radius as lift its thresholds, all lengths of its own; and many sides.
   const matched = {
     ...common, matched: true, pixels_in_radius: 1e5, friction_air: 0, friction_static: null, sides: 200,
+    position_iterations: 12, velocity_iterations: 8,
   };
 
   function world(scene, chosen, hear) {

@@ -1,18 +1,16 @@
 "use strict";
 // planck 1.5, Box2D 2.3 in float64: collide at the old position, then one velocity solve, then position correction.
-// Box2D's compiled-in lengths and speeds can be set here. `matched` has what adapters/box2d.py reaches by its units of
-// length and time, so that the two differ by the rounding alone: `unit` is its unit of length in m.
+// Box2D's compiled-in lengths and speeds can be set here: lengths are shares of `unit` m, so that in the units of
+// adapters/box2d.py (`step_unit`, `time_unit`) the two differ by the rounding alone.
 {
   const planck = module.exports;
   const common = { velocity_iterations: 8, position_iterations: 3, warm_starting: true, turning: true, baumgarte: 0.2 };
   const shipped = {
-    ...common, elastic_position_iterations: 3, continuous: true, bullet: false, elastic_continuous: true,
-    elastic_bullet: false, sleeping: true, friction: null, skin: true, matched: false,
+    ...common, continuous: true, bullet: false, sleeping: true, friction: null, skin: true, matched: false,
   };
   const matched = {
-    ...common, elastic_position_iterations: 0, continuous: true, bullet: true, elastic_continuous: false,
-    elastic_bullet: false, sleeping: false, friction: null, skin: false, matched: true,
-    length_unit: 0.25, step_unit: 2, time_unit: 1000,
+    ...common, continuous: true, bullet: true, sleeping: false, friction: null, skin: false, matched: true,
+    length_unit: 1e-5, step_unit: 0, time_unit: 1000,
   };
   const DEFAULTS = {
     linearSlop: 0.005, maxLinearCorrection: 0.2, maxTranslation: 2, maxRotation: Math.PI / 2, aabbExtension: 0.1,
@@ -43,9 +41,7 @@
   function world(scene, chosen, hear) {
     set(scene, chosen);
     const { dt, restitution } = scene;
-    const elastic = restitution === 1 && !scene.gravity.some((g) => g) ? "elastic_" : "";
-    const continuous = chosen[elastic + "continuous"], bullet = chosen[elastic + "bullet"];
-    const iterations = restitution === 1 ? chosen.elastic_position_iterations : chosen.position_iterations;
+    const { continuous, bullet, position_iterations: iterations } = chosen;
     const space = new planck.World({
       gravity: vector(scene.gravity), allowSleep: chosen.sleeping, continuousPhysics: continuous,
       warmStarting: chosen.warm_starting,

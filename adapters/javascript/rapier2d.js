@@ -5,12 +5,12 @@
   // Walls stop fast disks unless continuous_steps is 0; `continuous` is for pairs of disks.
   const shipped = {
     matched: false, friction: null, turning: true, sleeping: true, iterations: null, continuous: false,
-    continuous_steps: null, pgs_iterations: null, hertz: null, prediction: null,
+    continuous_steps: null, pgs_iterations: null, soft_ccd: 0, hertz: null, prediction: null,
   };
   // The length unit is that of Box2D 3.1, matched, whose slop and margin are the same shares of theirs.
   const matched = {
     matched: true, friction: null, turning: true, sleeping: false, iterations: 4, continuous: false, length_unit: 0.5,
-    continuous_steps: 1, pgs_iterations: 1, hertz: 30, prediction: 0.02,
+    continuous_steps: 1, pgs_iterations: 1, soft_ccd: 0, hertz: 120, prediction: 0.02,
   };
 
   function world(scene, chosen, hear) {
@@ -37,7 +37,8 @@
     };
     const bodies = scene.position.map(([x, y], i) => {
       const kind = scene.fixed[i] ? RAPIER.RigidBodyDesc.fixed() : RAPIER.RigidBodyDesc.dynamic();
-      kind.setTranslation(x, y).setRotation(scene.angle[i]).setCanSleep(chosen.sleeping).setCcdEnabled(chosen.continuous);
+      kind.setTranslation(x, y).setRotation(scene.angle[i]).setCanSleep(chosen.sleeping).setCcdEnabled(chosen.continuous)
+        .setSoftCcdPrediction(chosen.soft_ccd * Math.min(...scene.radius));
       if (!scene.fixed[i]) {
         kind.setLinvel(...scene.velocity[i]).setAngvel(scene.spin[i]);
         kind.setAdditionalMassProperties(scene.mass[i], { x: 0, y: 0 }, chosen.turning ? scene.inertia[i] : 0);

@@ -13,24 +13,29 @@ SEARCHED = {
             "velocity_iterations": 8,
             "position_iterations": 3,
             "baumgarte": 0.2,
-            "length_unit": 0.25,
+            "length_unit": 1e-5,
+            "step_unit": 0.0,
             "continuous": True,
             "bullet": True,
             "warm_starting": True,
         },
         {
-            "velocity_iterations": ((8, 20), "passes of the impulse solver; the manual has 8"),
+            "velocity_iterations": ((4, 8, 20), "passes of the impulse solver; the manual has 8"),
             "position_iterations": (
                 (0, 3, 8),
-                "passes of the position correction at e < 1; the manual: 3",
+                "passes of the position correction; the manual has 3",
             ),
             "baumgarte": (
                 (0.1, 0.2, 0.8),
                 "share of an overlap a pass undoes; 0.2 by default",
             ),
             "length_unit": (
-                (0.05, 0.25, 1.0),
+                (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.25),
                 "smallest radii; sets slop (0.005 units) and the least speed that bounces",
+            ),
+            "step_unit": (
+                (0.0, 2.0),
+                "ways of the fastest disk in a step: a unit of length at least; 0: whatever it is",
             ),
             "continuous": (
                 (False, True),
@@ -42,12 +47,10 @@ SEARCHED = {
                 "begin with the impulses of the last step; on by default",
             ),
         },
-        (),
+        ((("length_unit", "step_unit"), (1e-4, 0.01), (2.0,)),),
         {
-            "elastic_position_iterations, elastic_continuous, elastic_bullet": (
-                "as of box2d:matched, which is searched"
-            ),
-            "time_unit, step_unit": "as of box2d:matched: velocityThreshold, maxTranslation",
+            "time_unit": "as of box2d:matched: velocityThreshold",
+            "maxTranslation, maxRotation": "1e9: no speed or spin is cut",
             "radius of an edge (wall skin)": f"0: {GEOMETRY}",
             "friction, restitution, sleeping": STATED,
         },
@@ -56,17 +59,20 @@ SEARCHED = {
         {
             "pixels_in_radius": 1e5,
             "sides": 200,
-            "position_iterations": 6,
-            "velocity_iterations": 4,
+            "position_iterations": 12,
+            "velocity_iterations": 8,
         },
         {
             "pixels_in_radius": (
                 (1e3, 1e5, 1e7),
                 "of the smallest disk; all thresholds are in pixels",
             ),
-            "sides": ((50, 200), "of the polygon of a disk; 26 at most by default"),
-            "position_iterations": ((2, 6, 12), "passes of the position correction; 6 by default"),
-            "velocity_iterations": ((4, 8), "passes of the impulse solver; 4 by default"),
+            "sides": ((26, 50, 100, 200, 400), "of the polygon of a disk; 26 at most by default"),
+            "position_iterations": (
+                (2, 6, 12, 24),
+                "passes of the position correction; 6 by default",
+            ),
+            "velocity_iterations": ((2, 4, 8, 16), "passes of the impulse solver; 4 by default"),
         },
         (),
         {
@@ -80,13 +86,15 @@ SEARCHED = {
             "length_unit": 0.5,
             "iterations": 4,
             "pgs_iterations": 1,
-            "hertz": 30,
+            "hertz": 120,
             "prediction": 0.02,
             "continuous_steps": 1,
+            "continuous": False,
+            "soft_ccd": 0.0,
         },
         {
             "length_unit": (
-                (0.1, 0.5, 1.0),
+                (0.1, 0.25, 0.5, 1.0),
                 (
                     "smallest radii; sets the margin in which contacts are foreseen and how far a"
                     " pair moves until it is looked at again (0.05 units)"
@@ -95,7 +103,7 @@ SEARCHED = {
             "iterations": ((2, 4, 8), "substeps of a step; 4 by default"),
             "pgs_iterations": ((1, 2), "passes of a substep; 1 by default"),
             "hertz": (
-                (10, 30, 1000),
+                (10, 30, 120, 1000, 1e5),
                 "natural frequency of a contact of disks that move; 30 by default",
             ),
             "prediction": (
@@ -103,11 +111,19 @@ SEARCHED = {
                 "length units, of the margin in which contacts are foreseen; 0.02 by default",
             ),
             "continuous_steps": (
-                (0, 1),
+                (0, 1, 4),
                 "steps of continuous collision of fast disks with walls; 1 by default, 0: none",
             ),
+            "continuous": ((False, True), "the same between disks; off by default"),
+            "soft_ccd": (
+                (0.0, 0.1, 1.0),
+                "smallest radii, setSoftCcdPrediction: contacts foreseen farther; 0 by default",
+            ),
         },
-        (),
+        (
+            (("iterations", "hertz"), (2, 8), (1000,)),
+            (("length_unit", "hertz"), (1.0,), (1000,)),
+        ),
         {
             "normalizedAllowedLinearError": (
                 "of continuous collision alone; see adapters/mechanisms/table.py"

@@ -103,6 +103,7 @@ class Parameters(NamedTuple):
     hertz: float = 30.0  # of `soften`: the stiffness of a contact
     damping: float = 10.0  # its damping ratio
     correction_speed: float = 0.0  # m/s, cap of the position correction
+    share_capped: bool = False  # whether it caps the share of `soften`, not the whole
 
 
 @compiled
@@ -407,7 +408,8 @@ def soften(
             stiff = 2.0 * on.damping + h * omega
             memory = 1.0 / (1.0 + h * omega * stiff)
             share = 1.0 - memory
-            target = min(-omega / stiff * gap, on.correction_speed)
+            part = share if on.share_capped else 1.0
+            target = min(-part * omega / stiff * gap, on.correction_speed) / part
         drive_to_target(disks, contact, target, share, memory)
         if on.rub_biased or not biased:
             rub(disks, contact, world.friction, on.lever)

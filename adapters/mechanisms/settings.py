@@ -159,15 +159,15 @@ def _as_box2d(scene: Scene, sleep: str, edge: str, skin: str) -> list[Setting]:
         *_unstated(0.2, scene),
         one(sleep, True, False, "sleeping"),
         one(edge, skin, 0, "skin"),
-        tweak("continuousPhysics", True, False, "continuous", "elastic_continuous"),
-        tweak("bullet", False, True, "bullet", "elastic_bullet"),
-        tweak("positionIterations", 3, 0, "position_iterations", "elastic_position_iterations"),
+        tweak("continuousPhysics", True, False, "continuous"),
+        tweak("bullet", False, True, "bullet"),
+        tweak("positionIterations", 3, 0, "position_iterations"),
     ]
 
 
 def _box2d(scene: Scene, dt: float) -> list[Setting]:
     """What is compiled in is moved by the units in which the scene is given."""
-    from crosscheck2d.adapters.box2d import fastest
+    from crosscheck2d.adapters.box2d import MATCHED, fastest
 
     threshold = "1 unit of length a unit of time, compiled in", "give times in units of 1000 s"
     settings = [
@@ -176,9 +176,10 @@ def _box2d(scene: Scene, dt: float) -> list[Setting]:
         *_spin_cap("b2_maxRotation", pi / 2, scene, dt),
     ]
     radius, step = float(scene.radius.min()), 2 * fastest(scene) * dt
-    slop = "b2_linearSlop", "0.005 units of length, compiled in", 0.25 * radius
+    own = MATCHED["length_unit"] * radius
+    slop = "b2_linearSlop", "0.005 units of length, compiled in", own
     cap = "b2_maxTranslation", "2 units of length a step, compiled in", step
-    for name, value, unit in [slop] * (0.25 * radius < 1.0) + [cap] * (step > 1.0):
+    for name, value, unit in [slop] * (own < 1.0) + [cap] * (step > 1.0):
         units = f"give lengths in units of {plain(unit)} m and times in units of {plain(unit)} s"
         in_units = {"length_unit": unit / radius, "time_unit": unit}
         settings.append(Setting(name, value, units, in_units))
@@ -194,7 +195,7 @@ def _spin_cap(name: str, most: float, scene: Scene, dt: float) -> list[Setting]:
 
 
 def _planck(scene: Scene, _dt: float) -> list[Setting]:
-    slop = 0.005 * 0.25 * float(scene.radius.min())
+    slop = 0.005 * 1e-5 * float(scene.radius.min())
     return [
         *_as_box2d(scene, "allowSleep", "Edge.m_radius", "twice the slop"),
         one("Settings.velocityThreshold", 1.0, 0.0, "velocityThreshold"),
@@ -206,20 +207,21 @@ def _planck(scene: Scene, _dt: float) -> list[Setting]:
 
 def _box2d_v3(scene: Scene, dt: float) -> list[Setting]:
     from crosscheck2d.adapters.box2d import fastest
+    from crosscheck2d.adapters.box2d_v3 import MATCHED
 
     # contacts are foreseen within 0.02 units: fast disks need more
     radius, wide = float(scene.radius.min()), fastest(scene) * dt / 0.02
-    unit, name = 0.5 * radius, "length_units_per_meter"
+    unit, name = MATCHED["length_unit"] * radius, "length_units_per_meter"
     foreseen = Setting(name, 1.0, wide, {"length_unit": wide / radius}, matched=False)
     return [
         *_unstated(0.6, scene),
         one("enable_sleep", True, False, "sleeping"),
         one("restitution_threshold", 1.0, 0.0),
         one("maximum_linear_speed", 400.0, NO_LIMIT),
-        Setting(name, 1.0, unit, {"length_unit": 0.5}),
+        Setting(name, 1.0, unit, {"length_unit": MATCHED["length_unit"]}),
         *([foreseen] if wide > 1.0 else []),
-        one("set_contact_tuning: hertz", 30.0, NO_LIMIT, "hertz"),
-        one("continuous_enabled", True, False, "continuous"),
+        one("set_contact_tuning: hertz", 30.0, MATCHED["hertz"], "hertz"),
+        tweak("continuous_enabled", True, False, "continuous"),
         tweak("is_bullet", False, True, "bullet"),
         *_spin_cap("B2_MAX_ROTATION", pi / 4, scene, dt),
     ]

@@ -209,9 +209,8 @@ def _as_box2d(
         "slop": slop,
         "correction_most": most,
     }
-    uncorrected = without(position_iterations=0, elastic_position_iterations=0)
+    uncorrected = without(position_iterations=0)
     unswept = {"continuous": False, "bullet": False}
-    unswept |= {f"elastic_{option}": value for option, value in unswept.items()}
     found = [
         Mechanism(RESTITUTION, {"threshold": threshold}),
         Mechanism(IMPULSE, impulse),
@@ -252,13 +251,16 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
         "hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }
+    correction = {"correction_speed": chosen["push_speed"], "share_capped": True}
     found = [
         Mechanism(IMPULSE, impulse),
-        Mechanism(POSITION_CORRECTION, {"correction_speed": chosen["push_speed"]}, (IMPULSE,)),
+        Mechanism(POSITION_CORRECTION, correction, (IMPULSE,)),
         # What the sweep for restitution adds to the normal impulse allows no more friction
         # (b2ApplyRestitutionTask).
         *_friction(name, reported, scene, rub_restituted=False),
     ]
+    awake = {"sleeping": False} if name.endswith(":shipped") else {}
+    found.append(Mechanism(SWEPT, without=_without(name, continuous=False, **awake)))
     if name.endswith(":matched"):
         return found
     # At the threshold itself it bounces, where Box2D 2.3 does not.
@@ -269,7 +271,6 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
     return [
         Mechanism(RESTITUTION, {"threshold": threshold}, without=bouncing),
         *found,
-        Mechanism(SWEPT, without=_without(name, continuous=False, sleeping=False)),
     ]
 
 
@@ -288,7 +289,7 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) ->
         "margin": reported["prediction distance in m"],
         "carried": True,
         "rub_biased": False,
-        "hertz": 30.0,
+        "hertz": 30.0 if name.endswith(":shipped") else 120.0,
         "damping": 10.0,
     }
     # normalized_contact_recycle_distance, BroadPhaseBvh::CHANGE_DETECTION_FACTOR

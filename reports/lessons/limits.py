@@ -262,8 +262,8 @@ LIMITS = Lesson(
     <b>Continuous collision detection</b> (CCD) looks for a contact along the whole path of a disk
     in a step, not only at its end: the disk is <b>swept</b>. Box2D sweeps a disk against walls and
     static disks, and against moving disks only if it is marked as a <b>bullet</b>. As matched,
-    Box2D 3.1 plays without CCD, as does Box2D 2.3 where e = 1 and there is no gravity. A name with
-    a + is an engine with one change: {"; ".join(CHANGES)}.
+    Box2D 2.3 has bullets only, and Box2D 3.1 none. A name with a + is an engine with one change:
+    {"; ".join(CHANGES)}.
     """,
     sliders=(
         Slider("case", "Case", tuple(SEEN)),

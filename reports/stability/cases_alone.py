@@ -144,7 +144,7 @@ ALONE = (
         FALL_STEPS,
         BOUNCES_OFF,
         runs=16,
-        also=(*SUBSTEPS, *with_variant("position_correction")),
+        also=(*SUBSTEPS, *with_variant("no_correction")),
     ),
     *(
         Case(f"scale_{way}", scaled, "scale", values, SCALED_DEVIATION, asks)

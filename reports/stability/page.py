@@ -139,10 +139,10 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
         case, of_engine = case_named(name), {limit.engine: limit for limit in members}
         label = name if name in FAMILY_OF else Path(name).name
         kept = ", ".join(f"{symbol} {value}" for symbol, value in held(case).items())
-        notes = [
-            TableCell(text, css="soft") for text in (case.with_unit(case.parameter), kept) if text
-        ]
-        index.append(TableCell(label, title=case.question, notes=tuple(notes)))
+        note = TableCell(
+            "; ".join(filter(None, [case.with_unit(case.parameter), kept])), css="soft"
+        )
+        index.append(TableCell(label, title=case.question, notes=(note,)))
         rows.append([cell_of(case, of_engine.get(engine)) for engine in engines])
         groups.append(FAMILY_OF.get(name, "A scene of your own"))
         opens[label] = case_parts(case, members)
@@ -168,13 +168,13 @@ def cell_of(case: Case, limit: Limit | None) -> TableCell:
     if limit is None:
         return TableCell("")
     if limit.verdict == NEVER_FAILS:
-        return TableCell(in_words(limit), f"does not fail up to {number(limit.works_at)}", css="h0")
+        return TableCell(in_words(limit), f"does not fail up to {number(limit.works_at)}", css="g0")
     title = f"{limit.verdict}. {why(limit)}"
     if limit.verdict == NEVER_WORKS or limit.status != "ok":
         return TableCell(in_words(limit), title, css="bad")
     gentler = sum(case.harsher * value < case.harsher * limit.fails_at for value in case.values)
     depth = round(4 * (1 - gentler / len(case.values)))
-    return TableCell(in_words(limit), title, css=f"h{max(1, min(4, depth))}")
+    return TableCell(in_words(limit), title, css=f"g{max(1, min(4, depth))}")
 
 
 def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
@@ -363,7 +363,7 @@ def map_cell(value: float, failed: bool, kind: str, event: str, bound: float) ->
         return TableCell("r" if kind == REFUSED else "!", happens, css="bad")
     depth = sum(value / bound > share for share in SHARES)
     title = "; ".join(filter(None, [number(value), happens]))
-    return TableCell("×" if failed else "", title, css=f"h{depth}")
+    return TableCell("×" if failed else "", title, css=f"g{depth}")
 
 
 def law_section(laws: Sequence[LawOf]) -> Section:
@@ -398,7 +398,7 @@ def law_cell(at: AtGap) -> TableCell:
     if at.law == PAIRS:
         return TableCell("pairs", title)
     return (
-        TableCell("at once", title, css="h1")
+        TableCell("at once", title, css="g1")
         if at.law == AT_ONCE
-        else TableCell(f"energy {at.energy:.2f}", title, css="h3")
+        else TableCell(f"energy {at.energy:.2f}", title, css="g3")
     )

@@ -254,7 +254,7 @@ def growth_limit(share: float) -> float:
     return sqrt((2 ** (1 / 300) - 1) / share)
 
 
-DETECTING = "reference:* pymunk:* box2d:matched"
+DETECTING = "reference:* pymunk:*"
 SWEEPING = f"{DETECTING} box2d_v3:matched"
 UNFOUND = "reference:exercise reference:lesson"
 ROUGH = (
@@ -279,12 +279,12 @@ REASONS = (
     # One disk, or two.
     Reason(
         "bounce_drift",
-        "pymunk:matched+position_correction",
+        "pymunk:matched",
         "floor_corrected",
         None,
-        "pymunk:matched",
+        "pymunk:matched+no_correction",
     ),
-    Reason("bounce_drift", "pymunk:matched", "floor_missed"),
+    Reason("bounce_drift", "pymunk:matched+no_correction", "floor_missed"),
     Reason("bounce_drift", "box2d:* reference:lesson", "gravity_reflected", 0.005),
     Reason("bounce_drift", "reference:exercise", "gravity_until_found", 0.005),
     Reason("bounce_drift", "box2d_v3:shipped", "soft", None, "box2d_v3:matched"),

@@ -135,7 +135,8 @@ def case_named(name: str) -> Case:
 def expected(tasks: Collection[Task], workers: int) -> str:
     """What these tasks are, and about how long they take, as a sentence."""
     searches = [task for task in tasks if task.kind == "limit"]
-    cases, engines = ({getattr(task, name) for task in searches} for name in ("name", "engine"))
+    cases = {task.name for task in searches}
+    engines = {task.engine.partition("+")[0] for task in searches}
     seconds = sum(SECONDS.get(task.name, OTHERS) for task in tasks) / workers
     parts = [
         f"{counted(len(searches), 'search', 'searches')} ({counted(len(cases), 'case')},"

@@ -64,7 +64,7 @@ def searched(engine: str, store: Store, bar: Progress) -> bytes:
     if row is None:
         bar.say(f"{engine}: the exact answers, and the present settings")
         search = SettingsSearch(engine, say=bar.note)
-        bar.say(f"{engine}: setting by setting")
+        bar.say(f"{engine}: pairs of settings, and setting by setting")
         row = store.put("search", key, None, search.run().to_csv(index=False).encode())
     return row.blob
 
@@ -87,9 +87,9 @@ def show(table: pd.DataFrame) -> None:
     for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
         numbers = [
             "" if pd.isna(row[name]) else f"{row[name]:.3g}"
-            for name in ("equal_cost", "again", "cost")
+            for name in ("equal_cost", "cost", "harmed")
         ]
         rows.append([f"{row.engine}, {row.setting}: {row.value}", *numbers, row.verdict])
-    headings = ["setting", "error", "on other\nseeds", "cost\nof a step", "verdict"]
+    headings = ["setting", "error", "cost\nof a step", "runs\nworse", "verdict"]
     title = "Errors at equal cost, and costs, as factors of those of the chosen settings"
     print_table(Console(), headings, rows, title, left=headings[-1:])

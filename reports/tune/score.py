@@ -1,5 +1,18 @@
 """How well an engine plays the tuning scenes with some settings, and at what cost, against others
-of its settings."""
+of its settings.
+
+The bounds are the same for every engine, and absolute. A run gets worse where
+
+- it fails or is refused, and was played before;
+- a verdict (`reports/compare/verdicts.py`) fails that did not, or is above its bound by one bound
+  more than before;
+- a collision is missed where none was, or spurious, or more than one more than before.
+
+What a setting breaks, it breaks for every seed, at the coarsest step at least: in a third of the
+runs of a family. What is less comes and goes with the phase of a collision within its step, and so
+does as much in all families together. Runs that get better are set against those that get worse.
+But a run that is refused, or fails, is no matter of phase: there may be none.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +23,28 @@ from time import thread_time
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crosscheck2d.adapters.advance import advance
 from crosscheck2d.adapters.engine import Engine
+from crosscheck2d.adapters.engine_row import FLOAT32
 from crosscheck2d.adapters.javascript.engine import JavaScriptEngine
 from crosscheck2d.adapters.play import play_once
-from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.collisions import match
+from crosscheck2d.reports.compare.verdicts import VERDICTS, verdicts
 from crosscheck2d.scenarios.families.tuning import FAMILIES, LADDER, one_of
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 FLOOR = 1e-6  # radii: below the finest accuracy that any page asks for, an error is as good as none
-# times as much energy as before, and so much of that at hand, may be wrong
-MORE_ENERGY, SOME_ENERGY = 1.1, 0.01
+MOST_OF_A_FAMILY = 1 / 3  # of its runs, fewer than which may get worse
+MOST_OF_ALL = 1 / 50  # of all runs: of 20 families with 12 runs as many as in one of them
+# dt: after three bounces a step is up to so much early or late; so near the start or the end of the
+# scene the partner of a collision may lie outside
+EDGE = 6
 TIMED_SUBSTEPS, ROUNDS = 4, 7
+BEYOND = 1e6  # times its bound: an infinite value
+FAILED, MISSED, SPURIOUS = "failed", "missed", "spurious"
+HARMS = (FAILED, *VERDICTS, MISSED, SPURIOUS)
 Make = Callable[[], Engine]
 Asked = tuple[Scenario, Trajectory | None]
 
@@ -35,15 +56,12 @@ class TrialScores(NamedTuple):
         error: (s, k) root mean square distance from the exact answer over disks and samples, in
             radii, at least `FLOOR`; inf where a scene was refused or failed, nan where there is no
             exact answer.
-        gained: (s, k) energy over the energy at hand: at e = 1 the largest change, else the largest
-            rise.
-        missed, spurious: (s, k) collisions.
+        harm: (s, k, h) what is wrong, `HARMS`: a failed verdict in multiples of its bound, or as it
+            is where that is 0; numbers of collisions; 1 for a run that failed. 0: nothing.
     """
 
     error: Array
-    gained: Array
-    missed: Array
-    spurious: Array
+    harm: Array
 
 
 class Against(NamedTuple):
@@ -55,7 +73,9 @@ class Against(NamedTuple):
         better, worse: how many of the scenes and steps have an error at equal cost smaller or
             larger by 20 %.
         of: how many there are.
-        faults: what they break, each in a few words.
+        harmed: runs that get worse, less those that get better.
+        runs: how many there are.
+        faults: what breaks the bounds: the number of runs, and of the worst its scene and number.
     """
 
     same_dt: float
@@ -63,7 +83,14 @@ class Against(NamedTuple):
     better: int
     worse: int
     of: int
+    harmed: int
+    runs: int
     faults: list[str]
+
+    @property
+    def mends(self) -> bool:
+        """Whether more runs get better than come and go."""
+        return self.harmed < -MOST_OF_ALL * self.runs
 
 
 @cache
@@ -78,42 +105,49 @@ def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...
 
 def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
     """Play every scene at every step size."""
-    rows = [[of_run(make, scene, truth, k) for k in LADDER] for scene, truth in scenes]
-    return TrialScores(*np.moveaxis(np.array(rows, float), -1, 0))
+    runs = [[of_run(make, scene, truth, k) for k in LADDER] for scene, truth in scenes]
+    error = [[error for error, _ in row] for row in runs]
+    return TrialScores(np.array(error), np.array([[harm for _, harm in row] for row in runs]))
 
 
 def of_run(
     make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int
-) -> tuple[float, float, int, int]:
-    """Error, energy gained, missed and spurious collisions; see `TrialScores`."""
+) -> tuple[float, list[float]]:
+    """Error, and harms; see `TrialScores`."""
     dt, scene = scenario.dt(substeps), scenario.scene
     run = play_once(make, "tuned:engine", scenario, dt)
+    harm = dict.fromkeys(HARMS, 0.0)
     if run.status != "ok" or run.trajectory is None:
-        return np.inf, 0.0, 0, 0
+        return np.inf, [*(harm | {FAILED: 1.0}).values()]
     played, moving = run.trajectory, ~scene.static
-    energy = laws.energy(played, scene)
-    # Where the scene keeps its energy, both ways; else only a rise is certainly wrong.
-    keeps = scene.restitution == 1 and not scene.friction
-    least = energy[0] if keeps else np.minimum.accumulate(energy)
-    rise = float(np.max(np.abs(energy - least))) / (scales.energy(scenario) or 1.0)
+    for verdict in verdicts(scenario, played, dt, FLOAT32, truth):  # the same bounds for all
+        if verdict.failed:
+            harm[verdict.id] = min(verdict.value / (verdict.bound or 1.0), BEYOND)
     if truth is None:
-        return np.nan, rise, 0, 0
+        return np.nan, [*harm.values()]
+    end = float(truth.t[-1])
     off = (played.position[: len(truth)] - truth.position)[:, moving] / scene.radius[moving, None]
-    found = match(played.collisions, truth.collisions, float(truth.t[-1]), dt)
+    matched = match(played.collisions, truth.collisions, end, dt)
+    for what, collisions in ((MISSED, matched.missed), (SPURIOUS, matched.spurious)):
+        harm[what] = sum(EDGE * dt < t < end - EDGE * dt for t, _, _ in collisions)
     error = float(np.sqrt((off**2).sum(axis=2).mean()))
-    return max(error, FLOOR), rise, len(found.missed), len(found.spurious)
+    return max(error, FLOOR), [*harm.values()]
 
 
 def against(now: TrialScores, before: TrialScores, cost: float, scenes: Sequence[Asked]) -> Against:
     """Set `now` against `before`, if its steps cost `cost` times as much."""
-    both = np.isfinite(now.error) & np.isfinite(before.error)
+    at_its_cost = at_cost(now.error, cost)
+    both = np.isfinite(now.error) & np.isfinite(at_its_cost) & np.isfinite(before.error)
     had = np.log(before.error[both])
-    same, equal = np.log(now.error[both]) - had, np.log(at_cost(now.error, cost)[both]) - had
+    same, equal = np.log(now.error[both]) - had, np.log(at_its_cost[both]) - had
     counts = int((equal < np.log(0.8)).sum()), int((equal > np.log(1.25)).sum()), int(both.sum())
+    change = changes(now, before)
     return Against(
         float(np.exp(same.mean())),
         float(np.exp(equal.mean())),
         *counts,
+        int(change.sum()),
+        change.size,
         faults_of(now, before, scenes),
     )
 
@@ -135,41 +169,57 @@ def at_cost(error: Array, cost: float) -> Array:
     return points
 
 
-def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:
-    """What `now` breaks that `before` kept, family by family.
+def increases(now: Array, before: Array) -> NDArray[np.int64]:
+    """1 where there is a harm that was not, or by more than 1 more than before; 0 elsewhere."""
+    return np.where(before == 0, now > 0, now > before + 1).astype(np.int64)
 
-    A scene refused or failed; missed or spurious collisions, more of them than by counting noise (n
-    + sqrt(n): where there was none, none may come); an energy that is wrong by more than
-    `MORE_ENERGY` and `SOME_ENERGY`.
-    """
+
+def changes(now: TrialScores, before: TrialScores) -> NDArray[np.int64]:
+    """(s, k) 1 where a run gets worse, -1 where it gets better, 0 where neither or both."""
+    worse = increases(now.harm, before.harm) - increases(before.harm, now.harm)
+    change: NDArray[np.int64] = np.clip(worse.sum(axis=2), -1, 1)
+    return change
+
+
+def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) -> list[str]:
+    """The families that get worse beyond the bounds; [] if no bound is broken."""
     family = np.array([scene.name.rsplit("-", 1)[0] for scene, _ in scenes])
-    faults = []
+    change, faults = changes(now, before), []
+    lost = increases(now.harm, before.harm)[:, :, HARMS.index(FAILED)]
+    many = change.sum() > MOST_OF_ALL * change.size
     for name in dict.fromkeys(family.tolist()):
-        its = family == name
-        if (lost := int((np.isinf(now.error[its]) & ~np.isinf(before.error[its])).sum())) > 0:
-            faults.append(f"{name}: {lost} runs failed")
-        for what in ("missed", "spurious"):
-            n, had = (int(getattr(played, what)[its].sum()) for played in (now, before))
-            if n > had + np.sqrt(had):
-                faults.append(f"{name}: {n} {what} collisions, not {had}")
-        rise, risen = (float(played.gained[its].max()) for played in (now, before))
-        if rise > MORE_ENERGY * risen + SOME_ENERGY:
-            faults.append(f"{name}: energy wrong by {rise:.2g}, not {risen:.2g}")
+        its = np.flatnonzero(family == name)
+        worse, runs = int(change[its].sum()), change[its].size
+        if lost[its].any() or worse >= MOST_OF_A_FAMILY * runs or (many and worse > 0):
+            text = worst(now, before, scenes, its)
+            faults.append(f"{name}: {worse} of {runs} runs worse, {text}")
     return faults
+
+
+def worst(
+    now: TrialScores, before: TrialScores, scenes: Sequence[Asked], its: NDArray[np.int64]
+) -> str:
+    """Of the harms that increase in these scenes the one that does most: scene, dt, number."""
+    more = np.where(increases(now.harm, before.harm)[its], now.harm[its] - before.harm[its], 0.0)
+    s, k, h = np.unravel_index(int(np.argmax(more)), more.shape)
+    scene, _ = scenes[its[s]]
+    unit = "times its bound" if HARMS[h] in VERDICTS else "in the run"
+    has, had = (f"{scores.harm[its[s], k, h]:.2g}" for scores in (now, before))
+    return f"{scene.name} at {1e3 * scene.dt(LADDER[k]):.3g} ms: {HARMS[h]} {has} {unit}, not {had}"
 
 
 def cost_of(make: Make, than: Make, scenes: Sequence[Asked]) -> float:
     """What a step costs over what it costs with the other settings: geometric mean over scenes.
 
-    Both are timed in turns, `ROUNDS` times a scene, of which the shortest counts; see
+    Both are timed in turns, `ROUNDS` times a scene, of whose ratios the median counts; see
     `Engine.listening` for why no collision is logged. Time of this thread, so that what else the
     machine does is not in it; of an engine in V8 the time in V8.
     """
     times = [
         [(spent(make, scene), spent(than, scene)) for _ in range(ROUNDS)] for scene, _ in scenes
     ]
-    mine, theirs = np.min(times, axis=1).T
-    return float(np.exp(np.log(mine / theirs).mean()))
+    ratio = np.log(times)[:, :, 0] - np.log(times)[:, :, 1]
+    return float(np.exp(np.median(ratio, axis=1).mean()))
 
 
 def spent(make: Make, scenario: Scenario) -> float:

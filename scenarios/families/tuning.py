@@ -159,6 +159,24 @@ def onto_wall(rng: np.random.Generator, r: float, v: float) -> Scenario:
     return posed("How far off is a disk after a wall?", scene, 1.0)
 
 
+def thin_wall(rng: np.random.Generator, r: float, _v: float) -> Scenario:
+    """Disks that move one to three radii in the coarsest step onto a wall, judged by verdicts only:
+    one that tunnels is so far off that it would outweigh all other errors."""
+    speed = rng.uniform(1, 3, PASSING) * r / SAMPLE_INTERVAL
+    scene = lay_out(
+        position=np.column_stack(
+            [-r - rng.uniform(0.2, 0.3, PASSING) * speed, LANE * r * np.arange(PASSING)]
+        ),
+        velocity=np.column_stack([speed, 0 * speed]),
+        radius=np.full(PASSING, r),
+        mass=np.ones(PASSING),
+        walls=[[[0, -FAR * r], [0, FAR * r]]],
+        restitution=one_restitution(rng),
+    )
+    asked = posed("Does a fast disk pass through a thin wall?", scene, 0.5)
+    return replace(asked, truth=None, without_truth="asked is only whether it passes")
+
+
 def onto_static(rng: np.random.Generator, r: float, v: float) -> Scenario:
     """One disk against a larger static one."""
     y = rng.uniform(0, 2)
@@ -349,6 +367,7 @@ FAMILIES: tuple[Sampled, ...] = (
     grazing,
     near_miss,
     onto_wall,
+    thin_wall,
     onto_static,
     wall_to_wall,
     bouncing_elastic,

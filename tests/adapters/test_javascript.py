@@ -40,6 +40,7 @@ from crosscheck2d.adapters.own_solver import gl_matrix
 from crosscheck2d.adapters.own_solver.file import read_solver
 from crosscheck2d.adapters.own_solver.process import SolverProcess
 from crosscheck2d.adapters.play import play_once
+from crosscheck2d.reports.lessons.mechanisms.planck import played, whole
 from crosscheck2d.reports.run import arguments
 from crosscheck2d.reports.speed.budget import RESIDUAL, TOTAL, budget_of
 from crosscheck2d.reports.speed.plan import middle
@@ -183,12 +184,9 @@ def test_what_the_row_says_an_engine_misses_of_the_protocol_it_does_miss():
 
 @fetched
 def test_planck_differs_from_box2d_by_float32_alone():
-    """Both matched profiles choose the same, planck by settings and Box2D by units."""
+    """In the same units, planck by settings."""
     one = scenario("head_on_equal_e09")
-    runs = [
-        play_once(rows[name].make, name, one, one.dt(4)).trajectory
-        for rows, name in ((FETCHED, "planck:matched"), (ENGINES, "box2d:matched"))
-    ]
+    runs = [whole(played(engine, "matched", one.name, 4)) for engine in ("planck", "box2d")]
     apart = np.abs(runs[0].position - runs[1].position).max()
     steps = 4 * one.intervals
     # a position of up to 8 m and a velocity round once a step
@@ -613,8 +611,8 @@ def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
     """The second finds the place taken, and puts its own there whole."""
 
     def npm(_words, cwd, **_settings):
-        for package, played in pinned()["played"].items():
-            file = cwd / "node_modules" / package / played["file"]
+        for package, entry in pinned()["played"].items():
+            file = cwd / "node_modules" / package / entry["file"]
             file.parent.mkdir(parents=True)
             file.write_bytes(b"")
         shutil.copytree(cwd, packages.place(), dirs_exist_ok=True)

@@ -17,6 +17,7 @@ from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
 ABLATED, PLAIN, NO_CCD = "reference:ablated", "reference:exercise", "box2d:matched+no_ccd"
+NO_CORRECTION = "pymunk:matched+no_correction"
 ROUNDING = 1e-13  # of float64, in any unit of these pages
 FLOAT32 = 2.0**-24  # half of the distance of two neighbours, relative
 
@@ -36,6 +37,11 @@ def unswept(**parameters: Any) -> Makes:
     """How Box2D as matched is made without CCD."""
     off = {"continuous": False, "bullet": False}
     return {NO_CCD: partial(changed, "box2d:matched", **off, **parameters)}
+
+
+def uncorrected() -> Makes:
+    """How pymunk as matched is made without position correction."""
+    return {NO_CORRECTION: partial(changed, "pymunk:matched", collision_bias=1.0)}
 
 
 def ablated_as(run: Run, scenario: Scenario, change: Mechanism) -> Run:

@@ -195,7 +195,8 @@ SINGLE = Lesson(
     asks="How much of an error is the rounding of float32?",
     text="""
     Box2D 2.3 computes in float32. <code>planck</code> is Box2D 2.3 in JavaScript, which
-    computes in float64. Both have the same settings here, so they differ only by rounding. The
+    computes in float64. Both have the same settings here, as matched those of
+    <code>box2d:matched</code>, so they differ only by rounding. The
     error of Box2D minus that of planck is the <b>share of float32</b>. A share below 0 means
     that float32 makes the error smaller.
 

@@ -7,11 +7,13 @@ planck.csv, which the lesson shows: planck is an npm package that need not be in
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import pandas as pd
 
+from crosscheck2d.adapters.box2d import MATCHED
+from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.laws import deviation
 from crosscheck2d.reports.lessons.lesson import run_of
@@ -35,6 +37,8 @@ COLUMNS = [
     "box2d_radii",
     "deviation_radii",
 ]
+UNITS = {name: MATCHED[name] for name in ("length_unit", "step_unit", "time_unit")}
+"""With these planck:matched is box2d:matched in float64."""
 
 
 @cache
@@ -44,8 +48,10 @@ def known(name: str) -> tuple[Scenario, Trajectory | None]:
 
 
 def played(engine: str, profile: str, name: str, substeps: int) -> Run:
-    """One engine in a scene of the catalogue."""
-    return run_of(f"{engine}:{profile}", known(name)[0], substeps)
+    """One engine in a scene of the catalogue, planck as matched in the units of Box2D."""
+    row = f"{engine}:{profile}"
+    units = UNITS if row == f"{PLANCK}:matched" else {}
+    return run_of(row, known(name)[0], substeps, partial(row_of(row).make, **units))
 
 
 def whole(run: Run) -> Trajectory | None:

@@ -174,7 +174,10 @@ NO_CLAIM = {
         "Two disks with different": "says why there is no exact answer",
     },
     "order": {"With the same gravity": "says what the scene is"},
-    "gravity": {"Box2D plays twice": "says who plays; a claim says at which dt it is needed"},
+    "gravity": {
+        "Box2D plays twice": "says who plays; a claim says at which dt it is needed",
+        "Pymunk plays without": "says who plays; a claim has its height",
+    },
     "correction": {
         "Box2D removes a share": "defines the slop; the second claim has its numbers",
         "Here a disk starts": "says what the scene is",
@@ -205,7 +208,7 @@ NO_CLAIM = {
         "Then it halves": "test_a_limit_is_bracketed_as_closely_as_the_text_says",
         "A reason counts": "defines what tested means",
         "The command": "names a command",
-        "As matched, Box2D": "test_ccd_is_on_where_the_text_says",
+        "As matched, Box2D": "test_bullets_are_where_the_text_says",
         "Box2D sweeps": "test_box2d_sweeps_disks_against_walls_and_only_bullets_against_disks",
         "+16_substeps": "names what is changed",
     },

