@@ -30,7 +30,7 @@ from crosscheck2d.reports.tune.search import (
 
 NAME, TUNE = "matched.csv", "crosscheck tune"
 SOURCE = ("reports/tune/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
-NUMBERS = ("same_dt", "cost", "equal_cost", "again")  # columns in which an empty field is NaN
+NUMBERS = ("same_dt", "cost", "equal_cost")  # columns in which an empty field is NaN
 
 
 def tune(engines: Sequence[str], fresh: bool, out: Path) -> NoReturn:
