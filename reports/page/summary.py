@@ -287,8 +287,8 @@ class Summary:
         if OURS[1] in self.names:
             exact = sum(scene.error(OURS[1]) < EXACT for scene in scenes)
             cost = self.cost(OURS[1], WITHOUT)
-            third = f"A solver that takes collisions in order of time is exact in {exact} of"
-            third += f" {len(scenes)}"
+            of = f"{exact} of {len(scenes)}"
+            third = f"A solver that takes collisions in order of time is exact in {of}"
             told.append(
                 Markup(
                     third

@@ -55,11 +55,11 @@ def test_of_a_failed_cell_every_error_and_every_median_is_infinite():
 def test_no_solver_whose_disk_is_through_the_floor_is_nearest(name: str):
     summary = summarize([compared(name)])
     first = nearest(summary)
-    assert "box2d_v3:matched" in first
+    assert "pymunk:matched" in first
     assert "reference:exercise" not in first
     assert any("reference:exercise tunnels" in said for said in findings(summary))
     kind = summary.scenes[0].situations[0]
-    assert summary.best(kind) == summary.error("box2d_v3:matched", kind)
+    assert summary.best(kind) == summary.error("pymunk:matched", kind)
     cell = summary.cell("reference:exercise", kind)
     assert cell.text == "fails"
     assert cell.notes[0].text == "tunnels"
