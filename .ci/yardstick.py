@@ -83,6 +83,12 @@ def crosscheck(*words: object, codes: tuple[int, ...] = (0, 1)) -> int:
     return status
 
 
+def says(command: str, word: str) -> bool:
+    """Whether the help of a command of the measured code has a word, as not all code has."""
+    words = [Path(sys.executable).parent / "crosscheck", command, "--help"]
+    return word in subprocess.run(words, check=False, capture_output=True).stdout.decode()
+
+
 def digest(*arrays: Any) -> str:
     """A hash of arrays, to the last bit."""
     import numpy as np
@@ -107,7 +113,8 @@ def suite(folder: Path) -> Numbers:
     import numpy as np
 
     out, cells = folder / "out", {}
-    crosscheck("run", *PLAYED, "--timings", 0, "--workers", 1, "--out", out)
+    words = ["--trajectories"] * says("run", "--trajectories")
+    crosscheck("run", *PLAYED, "--timings", 0, "--workers", 1, "--out", out, *words)
     for row in rows_of(out / "runs.csv"):
         key = tuple(row[name] for name in CELL)
         cells[key] = cell = "/".join((*key, row["seed"]))

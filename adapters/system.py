@@ -6,7 +6,6 @@ says which. CROSSCHECK_SYSTEM=portable selects the second way on Linux, too, for
 
 from __future__ import annotations
 
-import _thread
 import ctypes
 import os
 import queue
@@ -14,13 +13,12 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from time import process_time, sleep
 from typing import IO, Any
 
 KERNEL = sys.platform == "linux" and os.environ.get("CROSSCHECK_SYSTEM") != "portable"
-ALARMS = hasattr(signal, "setitimer")  # not on Windows
 LIMITED_BY = "the kernel" if KERNEL else "a thread that watches the process"
 KILLED, ABORTED, TRAPPED, TERMINATED = (
     -getattr(signal, name, 0) or None for name in ("SIGKILL", "SIGABRT", "SIGTRAP", "SIGTERM")
@@ -31,12 +29,8 @@ PIECE = 1 << 20  # bytes
 BINARY: int = getattr(os, "O_BINARY", 0)  # without it Windows writes \r\n for \n
 LOOK = 0.1  # s between two checks of a watching thread
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
-# repeated until a command has ended; on Windows, which has no alarm, sent as Ctrl-C
-REPEATED = signal.SIGALRM if ALARMS else signal.SIGINT
 # the byte that Windows locks: beyond the end of the file, so that others may read
 LOCKED = 2**40
-
-_repeating = threading.Event()
 
 if KERNEL:
     import resource
@@ -220,49 +214,6 @@ def stopped_after(
         raise stop() from None
     finally:
         over.set()
-
-
-def every(seconds: float) -> None:
-    """Send the signal `REPEATED` to the main thread every `seconds`; 0 stops it."""
-    if ALARMS:
-        signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
-        return
-    global _repeating
-    _repeating.set()
-    if seconds:
-        _repeating = threading.Event()
-        threading.Thread(target=_repeat, args=(seconds, _repeating), daemon=True).start()
-
-
-def _repeat(seconds: float, over: threading.Event) -> None:
-    """The thread of `every`."""
-    while not over.wait(seconds):
-        _thread.interrupt_main(REPEATED)
-
-
-@contextmanager
-def signals_wait(numbers: Collection[signal.Signals]) -> Iterator[None]:
-    """Context in which the main thread does not handle these signals; one that arrives is handled
-    after it."""
-    if ALARMS:
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
-        try:
-            yield
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        return
-    received: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield  # no signal is handled in a thread
-        return
-    handlers = {n: signal.signal(n, lambda number, _: received.append(number)) for n in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        if received:
-            signal.raise_signal(received[0])
 
 
 class TimeIsUp(BaseException):

@@ -24,7 +24,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 DEFAULT_OUT = Path("reports/out/latest")
-DEFAULT_TIMINGS = 12.0
 VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
 Scenes = Annotated[
@@ -56,17 +55,17 @@ Out = Annotated[
     Path,
     typer.Option(
         metavar="DIR",
-        help="Folder for the results. An earlier run there is replaced when this one is complete.",
+        help="Folder for the results. What was played there before is not played again.",
     ),
 ]
 Results = Annotated[
     Path,
     typer.Option(
         metavar="DIR",
-        help="Folder for the results. Earlier results there are replaced when these are complete.",
+        help="Folder for the results. What was measured there before is not measured again.",
     ),
 ]
-GoOn = Annotated[bool, typer.Option("--resume", help="Continue an interrupted run into --out.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Ignore the results that --out has.")]
 OneScene = Annotated[
     str,
     typer.Argument(
@@ -110,12 +109,6 @@ Timings = Annotated[
         " 0: no timing pass.",
     ),
 ]
-Resume = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="OUT", help="Continue the run in OUT: play what is missing or has changed."
-    ),
-]
 Port = Annotated[
     int,
     typer.Option(
@@ -156,12 +149,16 @@ def run(
     full: Full = False,
     seed: Seed = 0,
     out: Out = DEFAULT_OUT,
-    timings: Timings = DEFAULT_TIMINGS,
+    timings: Timings = 12.0,
     workers: Workers = 0,
     timeout: Timeout = 60.0,
     memory: Memory = 0,
     scheduler: Scheduler = "",
-    resume: Resume = None,
+    fresh: Fresh = False,
+    trajectories: Annotated[
+        bool,
+        typer.Option("--trajectories", help="Write the trajectory of each cell as an .npz, too."),
+    ] = False,
     bits: Annotated[
         bool,
         typer.Option(
@@ -172,18 +169,11 @@ def run(
     ] = False,
 ) -> None:
     """Play scenes through engines, and write the report."""
-    from crosscheck2d.reports.commands import run as run_command
+    from crosscheck2d.reports.commands.run import RunRequest, means_of, run_plan
 
-    means = run_command.means_of(workers, timeout, memory, scheduler)
+    means = means_of(workers, timeout, memory, scheduler)
     what = scenes or [], engine or [], dt or [], full, seed
-    if resume is not None:
-        run_command.resume(
-            resume,
-            means,
-            bits,
-            alone=not any(what) and (timings, out) == (DEFAULT_TIMINGS, DEFAULT_OUT),
-        )
-    run_command.run_plan(run_command.RunRequest(*what, timings, out), means, as_typed(), bits)
+    run_plan(RunRequest(*what, timings, out, fresh, trajectories, bits), means, as_typed())
 
 
 @app.command()
@@ -191,14 +181,21 @@ def report(
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help="The folder of a run, finished or not.")
     ],
+    timings: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1, max=3600, metavar="SECONDS", help="Time the engines again, in so many seconds."
+        ),
+    ] = None,
 ) -> None:
     """Write the tables and the page of a run again.
 
-    They are made from the journal and the trajectories of the run; no engine plays again.
+    They are made from what was played; no scene is played again. With --timings the engines are
+    timed again.
     """
     from crosscheck2d.reports.commands.report import report_again
 
-    report_again(out)
+    report_again(out, timings)
 
 
 @app.command()
@@ -444,7 +441,7 @@ def speed(
             "--full", help="Measure all scenarios, finer steps, more rounds, up to 100 000 disks."
         ),
     ] = False,
-    resume: GoOn = False,
+    fresh: Fresh = False,
     seed: Seed = 0,
     out: Results = Path("reports/out/speed"),
 ) -> None:
@@ -454,7 +451,7 @@ def speed(
     """
     from crosscheck2d.reports.speed.command import run_speed
 
-    run_speed(scenes or [], engine or [], full, resume, seed, out, as_typed())
+    run_speed(scenes or [], engine or [], full, fresh, seed, out, as_typed())
 
 
 @app.command()
@@ -507,7 +504,7 @@ def stability(
             "--full", help="Play all runs at more values, to brackets of 1 % instead of 5 %."
         ),
     ] = False,
-    resume: GoOn = False,
+    fresh: Fresh = False,
     out: Results = Path("reports/out/stability"),
     workers: Workers = 0,
 ) -> None:
@@ -518,7 +515,7 @@ def stability(
     """
     from crosscheck2d.reports.stability.command import find_limits
 
-    find_limits(cases or [], vary or [], engine or [], full, resume, out, workers, as_typed())
+    find_limits(cases or [], vary or [], engine or [], full, fresh, out, workers, as_typed())
 
 
 @app.command()
@@ -530,9 +527,8 @@ def tune(
             help="Engines to search. Default: all with settings to search that need no --extra.",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for matched.csv.")] = Path(
-        "reports/out/tune"
-    ),
+    fresh: Fresh = False,
+    out: Results = Path("reports/out/tune"),
 ) -> None:
     """Search the public settings of engines.
 
@@ -540,7 +536,7 @@ def tune(
     """
     from crosscheck2d.reports.tune.command import tune as search_settings
 
-    search_settings(engine or [], out)
+    search_settings(engine or [], fresh, out)
 
 
 @app.command(name="new-engine")
@@ -582,10 +578,12 @@ def new_solver(
 def list_(
     what: Annotated[
         str,
-        typer.Argument(metavar="engines|scenarios|metrics|verdicts", help="Default: all."),
+        typer.Argument(
+            metavar="engines|scenarios|metrics|verdicts|cases|lessons", help="Default: all."
+        ),
     ] = "",
 ) -> None:
-    """List engines, scenarios, metrics and verdicts, and say what each is."""
+    """List engines, scenarios, metrics, verdicts, cases and lessons, and say what each is."""
     from crosscheck2d.reports.commands.listing import explain
 
     explain(what)

@@ -27,9 +27,8 @@ from crosscheck2d.reports.page.replay import pack_layers, played, ratio_of
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, of_main_job
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_cell
-from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
-from crosscheck2d.reports.run.worker_process import Failure
 from crosscheck2d.reports.speed.advice import Inquiry, NoAdvice
 from crosscheck2d.reports.speed.purposes import PURPOSES
 from crosscheck2d.reports.terminal.progress import Progress

@@ -14,9 +14,9 @@ from numba.core.dispatcher import Dispatcher
 from playwright.sync_api import Browser
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.run import timing_pass, worker
+from crosscheck2d.reports.run import pool, timing_pass
 from tests.compiling import LOCKS, compiling_alone
-from tests.forks import FRESH, Forked
+from tests.forks import start_worker
 from tests.reports.page.browsing import chromium
 
 # Images of containers forbid Python to keep what it has compiled. Each process of the tests would
@@ -35,6 +35,7 @@ settings.load_profile("few")
 # the time of collecting them, and in each process that is forked a copy of all they hold.
 gc.disable()
 
+START_PROCESS = pool.start_process
 COLLECTED = pytest.StashKey[list[pytest.Item]]()
 
 
@@ -83,7 +84,7 @@ def forked_workers() -> Iterator[None]:
     """A run that is played in the process of the tests forks its workers: each start anew would
     take seconds."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(worker, "start", Forked)
+        patch.setattr(pool, "start_process", start_worker)
         patch.setattr(timing_pass, "ROUNDS", 1)  # of many runs no test looks at the times
         yield
 
@@ -101,9 +102,8 @@ def same_engines() -> Iterator[None]:
 
 @pytest.fixture
 def fresh_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For what is said of the workers themselves: each an interpreter of its own, as users have
-    it."""
-    monkeypatch.setattr(worker, "start", FRESH)
+    """For what is said of the workers themselves: each as users have it."""
+    monkeypatch.setattr(pool, "start_process", START_PROCESS)
 
 
 @pytest.fixture(scope="session")

@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from unittest import mock
 
-from crosscheck2d.reports.run import worker
+from crosscheck2d.reports.run import pool
 
-FRESH = worker.start  # as users have it, an interpreter of its own
 ROOT = Path(__file__).parent.parent
 LOADED = [
     "tests.loaded",
@@ -81,47 +79,14 @@ def crosscheck_in(
     sys.exit(main())
 
 
-class Forked:
-    """A worker process as `subprocess.Popen` would show it, of which it has what `Worker` asks
-    for."""
-
-    def __init__(self, theirs: Connection, trail: int, printing: int, memory: int) -> None:
-        """Serve `theirs` in a fork; in place of `crosscheck2d.reports.run.worker.start`."""
-        lines = [Connection(os.dup(line)) for line in (theirs.fileno(), trail, printing)]
-        self.process = start(serve, lines, memory, dict(os.environ))
-
-    def poll(self) -> int | None:
-        """How it has ended: exit code or -signal; None if it has not."""
-        with LOCK:
-            return self.process.exitcode
-
-    def wait(self) -> int:
-        """How it has ended, once it has."""
-        wait([self.process.sentinel])
-        code = self.poll()
-        assert code is not None
-        return code
-
-    def send_signal(self, number: int) -> None:
-        """Unless it has ended."""
-        if self.poll() is None and self.process.pid is not None:
-            os.kill(self.process.pid, number)
-
-    def kill(self) -> None:
-        """End it, unless it has."""
-        self.send_signal(signal.SIGKILL)
+def start_worker(connection: Connection, folder: str, memory: int) -> BaseProcess:
+    """A worker in a fork, in place of `pool.start_process`."""
+    line = Connection(os.dup(connection.fileno()))
+    return start(serve, line, folder, memory, dict(os.environ))
 
 
-def serve(lines: list[Connection], memory: int, environment: Mapping[str, str]) -> None:
-    """In the fork: what `python -m crosscheck2d.reports.run.worker_process` does."""
-    from crosscheck2d.reports.run import worker_process
-
+def serve(connection: Connection, folder: str, memory: int, environment: Mapping[str, str]) -> None:
+    """In the fork: the worker, with the variables of the test."""
     os.environ.clear()
     os.environ |= environment
-    connection, trail, printing = lines
-    with open(os.devnull) as nothing:
-        os.dup2(nothing.fileno(), 0)
-    for number in (1, 2):
-        os.dup2(printing.fileno(), number)
-    printing.close()
-    worker_process.main([os.dup(connection.fileno()), os.dup(trail.fileno()), memory])
+    pool.serve(connection, folder, memory, False)

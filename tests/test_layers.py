@@ -24,7 +24,15 @@ MAY_IMPORT = {
 # From the bottom up; what stands in one line does not import each other. A folder's own files are
 # its layer "".
 LAYERS = {
-    "scenarios": ["regular faults", "model", "no_truth", "truth", "families", "files", "catalogue"],
+    "scenarios": [
+        "regular faults rows",
+        "model",
+        "no_truth",
+        "truth",
+        "families",
+        "files",
+        "catalogue",
+    ],
     "scenarios/truth": [
         "oracle",
         "closed_forms cache",

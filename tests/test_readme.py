@@ -71,10 +71,10 @@ WRITTEN = {
     "runs.csv",
     "timings.csv",
     "machine.json",
+    "results.sqlite",
     "limits.csv",
     "speed_budget.csv",
     "solver.py",
-    "made.json",
     "random.py",
     "marks.csv",
 }

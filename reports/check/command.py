@@ -38,8 +38,7 @@ from crosscheck2d.reports.check.rows import CheckRow
 from crosscheck2d.reports.check.terminal import print_scene, print_total, sentence_on
 from crosscheck2d.reports.check.verdict import FileCheck, check_file, named, nothing_in
 from crosscheck2d.reports.run.made import may_overwrite
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import BAD_INPUT, DONE, FAILED, FolderTaken, refuse, say
 from crosscheck2d.reports.terminal.foreign_text import put_text

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NoReturn
 
 from crosscheck2d.reports.run.diff import FACTOR, ROUNDING, Change, Difference, Timing, difference
-from crosscheck2d.reports.run.folders import found
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.exits import DONE, FAILED, FolderTaken, refuse, say
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, FolderTaken, Unusable, refuse, say
 from crosscheck2d.reports.terminal.tables import print_list, print_table
+from crosscheck2d.scenarios.rows import Damaged
 
 SHOWN = 12  # changes, the worst first
 HEADINGS = (
@@ -33,10 +33,10 @@ def show_difference(before: Path, after: Path) -> NoReturn:
     """Print the difference; exits 0, 1 (something got worse, or the runs share no cell) or 2 (a
     folder cannot be used)."""
     try:
-        changed = difference(found(before), found(after))
+        changed = difference(before, after)
     except OSError as fault:
         refuse([f"{fault.filename or f'{before}, {after}'}: {fault.strerror or fault}"])
-    except (FolderTaken, ValueError) as fault:
+    except (Damaged, FolderTaken, Unusable) as fault:
         refuse([str(fault)])
     if not changed.shared:
         say(

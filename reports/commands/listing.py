@@ -1,4 +1,4 @@
-"""`crosscheck list`: a line for every engine, scenario, metric and verdict."""
+"""`crosscheck list`: a line for every engine, scenario, metric, verdict, case and lesson."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.reports.compare.metrics import METRICS, SCALES, Metric
 from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
+from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run.arguments import unknown
+from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import refuse
 from crosscheck2d.reports.terminal.tables import print_texts
@@ -16,12 +18,14 @@ from crosscheck2d.scenarios.truth.exact import answered_by
 
 
 def explain(what: str) -> None:
-    """Print a line for every engine, scenario, metric and verdict, or for one of these kinds."""
+    """Print a line for everything that has a name, or for all of one kind."""
     kinds = {
         "engines": {name: _engine(row) for name, row in (ENGINES | FETCHED).items()},
         "scenarios": {name: _line(name) for name in SCENARIOS},
         "metrics": {_with_unit(name, row): row.summary for name, row in METRICS.items()},
         "verdicts": {_with_unit(name, row): row.means for name, row in VERDICTS.items()},
+        "cases": {name: case.asks for name, case in CASES.items()},
+        "lessons": {f"{row.number} {name}": row.asks for name, row in LESSONS.items()},
     }
     if what and what not in kinds:
         refuse([unknown("list", what, kinds)])

@@ -13,9 +13,8 @@ from crosscheck2d.adapters.engines import OWN
 from crosscheck2d.reports.check.evidence import lines_and_formula
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.page.own_solvers import Said, with_lines
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.tasks import Check
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.plan import Check
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.terminal.exits import say
 
 CHECKING = 10.0  # s that the game waits for the check of a file, which takes one or two

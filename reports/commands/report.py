@@ -1,4 +1,4 @@
-"""`crosscheck report OUT`, and the end of every run: tables and page from the journal, summary,
+"""`crosscheck report OUT`, and the end of every run: tables and page from the rows, summary,
 exit status."""
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.adapters.thrust_grid import off_grid_note
@@ -17,26 +17,35 @@ from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.commands.own_solvers import lines
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.fast_disks import fast_note
-from crosscheck2d.reports.page.report import Report, make_report
+from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times
 from crosscheck2d.reports.page.scenes import SceneScores
-from crosscheck2d.reports.run.arguments import of_main_job, refusing
-from crosscheck2d.reports.run.folders import found
+from crosscheck2d.reports.run.arguments import (
+    checked_engines,
+    default_engines,
+    opening,
+    started_where,
+)
+from crosscheck2d.reports.run.plan import Means
+from crosscheck2d.reports.run.results import COMMAND, RunResults
+from crosscheck2d.reports.run.suite import take_timings
+from crosscheck2d.reports.run.timing_pass import cells_to_time
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.exits import DONE, FAILED, say
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_list, print_table
 
 
-def finish(report: Report, out: Path, status: int = DONE) -> NoReturn:
+def finish(report: Report, status: int = DONE) -> NoReturn:
     """Print the summary; exit 1 if an engine or a scene is not compared completely, else
     `status`."""
-    print_summary(report, str((out / "report.html").resolve()))
-    by_name = report.archive.header["engines"] != of_main_job()
+    folder = report.results.folder
+    print_summary(report, str((folder / PAGE).resolve()))
+    by_name = report.results.header["engines"] != default_engines()
     if lost := never_played(report.comparisons, by_name):
         say(
             f"no cell of {', '.join(lost)} was played to its end: see the status column of"
-            f" {out / 'runs.csv'}"
+            f" {folder / 'runs.csv'}"
         )
     for name, why in report.unjudged.items():
         say(f"{name} is not judged: {why}")
@@ -52,12 +61,32 @@ def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
     return sorted(asked - played)
 
 
-def report_again(out: Path) -> NoReturn:
-    """Make tables and page from the journal in `out`."""
-    with refusing(str(out)), Progress() as progress:
-        folder = found(out)
-        report = make_report(folder, progress.say)
-    finish(report, folder)
+def report_again(out: Path, timings: float | None) -> NoReturn:
+    """Make tables and page of the run in `out` from its rows; with `timings` its engines are timed
+    again, in at most so many s."""
+    with opening(out, COMMAND, there=True) as store:
+        with keeping(out, lambda: "The rows are kept."), Progress() as progress:
+            results = RunResults.read(store)
+            if timings is not None:
+                results = time_again(results, timings, progress)
+            report = make_report(results, progress.say)
+        finish(report)
+
+
+def time_again(results: RunResults, seconds: float, progress: Progress) -> RunResults:
+    """The results with new times; exits 2 if the engines have changed since they were played."""
+    with started_where(results.header["folder"]):
+        rows = {name: row_of(name) for name in checked_engines(results.header["engines"])}
+    cells = cells_to_time(results, rows)
+    if not cells:
+        refuse(
+            [
+                f"{results.folder}: its engines have changed since they were played; crosscheck run"
+                " plays them again"
+            ]
+        )
+    take_timings(results.store, cells, seconds, Means(1), progress, again=True)
+    return RunResults.read(results.store)
 
 
 def print_summary(report: Report, page: str) -> None:
@@ -79,8 +108,8 @@ def print_summary(report: Report, page: str) -> None:
         console,
         [*report.findings, *own_solvers(report.said), *notes(report), statuses(report)],
     )
-    if failed := failures(report, Path(page).parent):
-        console.print(failed, highlight=False, soft_wrap=True)
+    for line in filter(None, (failures(report, Path(page).parent), times(report))):
+        console.print(line, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
 
 
@@ -116,9 +145,19 @@ def statuses(report: Report) -> str:
     counts = report.runs.status.value_counts()
     said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
     ended = counted(len(report.runs), "cell")
-    if report.archive.complete:
+    if report.results.complete:
         return f"{ended} ended: {said}."
     return f"Not finished: {ended} ended so far: {said}."
+
+
+def times(report: Report) -> str:
+    """When the times were taken before this run, and how to take them again; or ""."""
+    taken, again = report.results.timing.get("taken", ""), take_times(report.results.folder)
+    if not taken:
+        return f"No times were taken. To take them: {again}"
+    if taken >= report.results.header["started"]:
+        return ""
+    return f"The times are of {taken}. To take them again: {again}"
 
 
 def failures(report: Report, out: Path) -> str:
@@ -126,7 +165,7 @@ def failures(report: Report, out: Path) -> str:
     runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
     if runs.empty:
         return ""
-    first = next(line for line in report.archive.records if line["cell"] == runs.iloc[0].cell)
+    first = next(line for line in report.results.records if line["cell"] == runs.iloc[0].cell)
     engine = f"{first['engine']}:{first['profile']}"
     words = ["run", first["scene"], "--engine", engine.removesuffix(OWN)]
     words += ["--dt", f"{first['dt_s']:.12g}"]  # as many digits as `with_steps` asks for

@@ -7,17 +7,16 @@ import json
 import sys
 from contextlib import closing
 from functools import partial
+from math import isfinite
 from typing import Any, NoReturn
 
 import numpy as np
 
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.run.answers import no_answer, record_here
 from crosscheck2d.reports.run.arguments import checked_scenes
-from crosscheck2d.reports.run.journal import plain
-from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.comparing import compute_record, no_answer
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.run.worker_process import Failure
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
@@ -42,7 +41,7 @@ def show_truth(
     if at is not None and not 0 <= at <= scenario.duration:
         refuse([f"--at {at:g}: must be from 0 to {scenario.duration:g} s, the scene's duration"])
     # In a worker, which can always be stopped.
-    task = partial(record_here, checked, seed, timeout)
+    task = partial(compute_record, checked, seed, timeout)
     with Progress() as progress, closing(run_all({checked: task}, 1, timeout)) as results:
         progress.say(f"the exact answer to {scenario.name}")
         [(_, record)] = results
@@ -126,6 +125,15 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
         }
     )
     return written
+
+
+def plain(value: Any) -> Any:
+    """The value in a form that strict JSON can hold: numbers that are not finite as text."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return str(value) if isinstance(value, float) and not isfinite(value) else value
 
 
 def outcomes(record: TruthRecord) -> list[dict[str, Any]]:

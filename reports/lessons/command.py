@@ -16,17 +16,15 @@ from crosscheck2d.reports.lessons.conventions import table
 from crosscheck2d.reports.lessons.lesson import Lesson
 from crosscheck2d.reports.lessons.pages import ALONE, FILES, Links, answer_json, index_page, offline
 from crosscheck2d.reports.run.arguments import unknown
-from crosscheck2d.reports.run.folders import made_anew, place_of
-from crosscheck2d.reports.run.made import FolderKind, may_overwrite, sealed, writing
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.made import may_overwrite, sealed
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.store import place_of
 from crosscheck2d.reports.terminal.exits import FAILED, FolderTaken, refuse, say
 from crosscheck2d.reports.terminal.foreign_text import legible, put_text
 from crosscheck2d.reports.terminal.progress import Progress
 
 # What a page of ours begins with, and nothing else does: it may be written over.
 MARK = b'<meta name="generator" content="crosscheck lesson">'
-ALL = FolderKind("crosscheck lesson")  # the folder of all of them
 
 # s that one setting of the sliders may take: the slowest needs some 5, once its engines are
 # compiled
@@ -76,16 +74,16 @@ def write_one(name: str, path: Path) -> None:
 def write_all(folder: Path) -> None:
     """All lessons and their list, a page each, with links between them."""
     with exporting(folder):
-        folder = place_of(folder, "--export")
-        with made_anew(folder, ALL, "--export") as part:
-            pages = {part / f"{name}.html": lesson for name, lesson in LESSONS.items()}
-            settings = sum(len(lesson.grid) for lesson in LESSONS.values())
-            say(f"{len(pages)} lessons with {settings} settings of their sliders: takes minutes")
-            with writing(part, [*(path.name for path in pages), INDEX]):
-                rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[
-                    CONVENTIONS
-                ]
-                put_text(part / INDEX, index_page(FILES, rows))
+        folder = place_of(folder, "--export ")
+        pages = {folder / f"{name}.html": lesson for name, lesson in LESSONS.items()}
+        for path in (*pages, folder / INDEX):
+            if path.parent.exists():
+                may_overwrite(path, MARK, "page of a lesson", "--export")
+        folder.mkdir(parents=True, exist_ok=True)
+        settings = sum(len(lesson.grid) for lesson in LESSONS.values())
+        say(f"{len(pages)} lessons with {settings} settings of their sliders: takes minutes")
+        rows = write_pages(pages, FILES, {CONVENTIONS: partial(table, ENGINES)})[CONVENTIONS]
+        put_text(folder / INDEX, sealed(index_page(FILES, rows)))
     size = sum(path.stat().st_size for path in folder.glob("*.html"))
     print(legible(f"{folder / INDEX}: {len(pages)} lessons, {size / 1e6:.1f} MB; needs no server"))
 

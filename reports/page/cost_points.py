@@ -18,23 +18,26 @@ class RunTimes(NamedTuple):
         table: timings.csv.
         noise: the ratios of two timings of one engine.
         asked: the time limit of the timing pass, s.
+        again: the command that takes the times.
     """
 
     table: pd.DataFrame
     noise: Noise
     asked: float
+    again: str = ""
 
     @property
     def fault(self) -> str:
         """Why no time is shown, as a sentence; "" if times are shown."""
-        if not self.asked:
-            return "This run took no times (--timings 0)."
+        take = f" To take them: {self.again}" if self.again else ""
+        if self.table.empty and not self.asked:
+            return f"No times were taken.{take}"
         if self.table.empty or not self.noise.pairs:
-            return f"The engines could not be timed within {self.asked:g} s."
+            return f"The engines could not be timed within {self.asked:g} s.{take}"
         if self.noise.floor > BUSY:
             return (
                 "The machine was busy: an engine timed twice differs from itself by"
-                f" {style.number(100 * self.noise.floor, 2)} %, so no times are shown."
+                f" {style.number(100 * self.noise.floor, 2)} %, so no times are shown.{take}"
             )
         return ""
 

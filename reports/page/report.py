@@ -1,7 +1,8 @@
-"""Tables and page of a run, made from its journal; nothing is played."""
+"""Tables and page of a run, made from its rows; nothing is played."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +18,10 @@ from crosscheck2d.reports.page.own_engines import is_lawless, own_engine_sentenc
 from crosscheck2d.reports.page.own_solvers import with_lines
 from crosscheck2d.reports.page.report_page import report_page
 from crosscheck2d.reports.page.summary import Summary, summarize
-from crosscheck2d.reports.run.archive import Archive
-from crosscheck2d.reports.run.made import writing
-from crosscheck2d.reports.run.tables import TABLES, comparisons_of, make_tables
-from crosscheck2d.reports.run.timing_pass import noise_floor
+from crosscheck2d.reports.run.results import RunResults
+from crosscheck2d.reports.run.tables import comparisons_of, make_tables
+from crosscheck2d.reports.run.timing_pass import TIMINGS, noise_floor
 from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.foreign_text import put_text
 
 PAGE = "report.html"
 
@@ -32,7 +31,7 @@ class Report:
     """The results of a run.
 
     Attributes:
-        archive: what it was made from.
+        results: what it was made from.
         comparisons: one for each scenario, in reading order.
         runs: runs.csv.
         summary: what the first table says of them.
@@ -44,7 +43,7 @@ class Report:
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
     """
 
-    archive: Archive
+    results: RunResults
     comparisons: list[Comparison]
     runs: pd.DataFrame
     summary: Summary
@@ -54,31 +53,24 @@ class Report:
     said: Mapping[str, list[str]]
 
 
-def make_report(folder: Path, say: Callable[[str], None]) -> Report:
-    """From the journal of `folder` write deviations.csv, runs.csv, timings.csv and report.html;
-    `say` is called with what is being done.
+def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
+    """From the rows of a run write deviations.csv, runs.csv, timings.csv and report.html; `say` is
+    called with what is being done.
 
     Raises:
         FolderTaken: one of these exists and is not this program's.
-        ValueError: the journal cannot be used, or a scene is not the one that was played.
+        ValueError: no cell has ended, or a scene is not the one that was played.
     """
-    with writing(folder, (*TABLES, PAGE)):
-        return made_report(folder, say)
-
-
-def made_report(folder: Path, say: Callable[[str], None]) -> Report:
-    """As `make_report`, but overwrites existing files."""
-    archive = Archive.read(folder)
-    header = archive.header
-    tables = make_tables(archive, say)
+    header = results.header
+    tables = make_tables(results, say)
     say("writing the page")
-    comparisons = comparisons_of(archive, tables)
+    comparisons = comparisons_of(results, tables)
     # an interrupt may come first
     began = {run.name for comparison in comparisons for run in comparison.runs}
-    engines = [name for name in header["engines"] if name in began and name in archive.conformance]
-    asked = [archive.conformance[name]["conformance"] for name in engines]
+    engines = [name for name in header["engines"] if name in began and name in results.conformance]
+    asked = [results.conformance[name] for name in engines]
     known = sorted(
-        (line["known_answer"] for line in archive.known_answers),
+        results.known_answers,
         key=lambda row: (row["column"], row["dt_s"], row["made_by"]),
         reverse=True,
     )
@@ -93,36 +85,37 @@ def made_report(folder: Path, say: Callable[[str], None]) -> Report:
     own = [sentence for rows in asked for sentence in own_engine_sentences(rows)]
     theirs = {name: how for name, how in broken.items() if name.endswith(OWN)}
     others = {name: how for name, how in broken.items() if name not in theirs}
-    clock = RunTimes(tables.timed, noise_floor(archive), header["timings"])
-    summary = summarize(comparisons, untrusted, clock)
+    times = tables.timed, noise_floor(results), header["timings"], take_times(results.folder)
+    summary = summarize(comparisons, untrusted, RunTimes(*times))
     first, last = [*own, *not_counted(theirs)], not_counted(others)
-    checks = {
-        name: archive.checked[name]["checked"]
-        for name in header["engines"]
-        if name in archive.checked
-    }
+    checks = results.checked
     page = report_page(
-        folder / PAGE,
+        results.folder / PAGE,
         summary,
         first=[*first, *last],
         conformance=pd.DataFrame([row for rows in asked for row in rows]),
         known_answers=pd.DataFrame(known),
-        about=header | {"unfinished": unfinished(archive)},
+        about=header | {"unfinished": unfinished(results)},
         said={name: with_lines(one["says"], one["shown"]) for name, one in checks.items()},
     )
-    put_text(folder / PAGE, page)
+    results.store.export(PAGE, page)
     says = {name: one["says"] for name, one in checks.items()}
     told = [*first, *findings(summary), *last]
     return Report(
-        archive, comparisons, tables.runs, summary, told, untrusted, tables.unjudged, says
+        results, comparisons, tables.runs, summary, told, untrusted, tables.unjudged, says
     )
 
 
-def unfinished(archive: Archive) -> str:
+def take_times(folder: Path) -> str:
+    """The command that takes the times of a run."""
+    return shlex.join(["crosscheck", "report", str(folder), "--timings", f"{TIMINGS:g}"])
+
+
+def unfinished(results: RunResults) -> str:
     """A sentence for the page of a run that has not ended; "" for one that has."""
-    if archive.complete:
+    if results.complete:
         return ""
-    return f"The run was stopped after {counted(len(archive.records), 'cell')}."
+    return f"The run was stopped after {counted(len(results.records), 'cell')}."
 
 
 def how_broken(row: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.routing import BaseRoute
 
-from crosscheck2d.reports.terminal.exits import TERMINATED, Stopped, refuse
+from crosscheck2d.reports.terminal.exits import TERMINATED, refuse, signal_status
 
 T = TypeVar("T")
 HOST, NAMES = "127.0.0.1", ("127.0.0.1", "localhost")
@@ -80,10 +80,8 @@ def serve(app: Starlette, port: int, path: str, opens: bool) -> None:
     logging.getLogger("uvicorn.error").addFilter(is_unexpected)
     try:
         server.run(sockets=[listening])
-    except (
-        KeyboardInterrupt
-    ) as stopped:  # the server raises it again when it has ended; Ctrl-C is its normal end
-        if isinstance(stopped, Stopped) and stopped.status == TERMINATED:
+    except KeyboardInterrupt:  # raised when it has ended; Ctrl-C is its normal end
+        if signal_status() == TERMINATED:
             raise
     finally:
         print("Stopped.")

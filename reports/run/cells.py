@@ -14,8 +14,14 @@ import numpy as np
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.scenarios.model import Scenario
 
-# including subfolders
-SOURCES = ("adapters/**/*.py", "adapters/**/*.js*", "reference_impl/**/*.py")
+# The source that decides a trajectory, and the source that decides what is said of it; including
+# subfolders.
+SOURCES = (
+    *("adapters/**/*.py", "adapters/**/*.js*", "reference_impl/**/*.py", "scenarios/model.py"),
+    *("reports/run/playing.py", "reports/run/trajectories.py", "reports/run/known_answers.py"),
+)
+JUDGE_SOURCE = ("reports/compare/**/*.py", "reports/run/comparing.py", "scenarios/**/*.py")
+CHECK_SOURCE = ("reports/check/**/*.py", "reports/check/**/*.toml")
 ROOT = Path(__file__).parents[2]
 # besides the distributions of the engines
 DECIDING = ("mini-racer", "numba", "numpy", "crosscheck2d")
@@ -103,7 +109,15 @@ def versions() -> dict[str, str]:
 
 
 @cache
-def source_hash(root: Path = ROOT) -> str:
-    """A hash over the engines' source, so that a changed adapter is a changed cell."""
-    files = sorted(path for pattern in SOURCES for path in root.glob(pattern))
+def source_hash(patterns: tuple[str, ...] = SOURCES, root: Path = ROOT) -> str:
+    """A hash over source files, by default the engines', so that a changed adapter is a changed
+    cell."""
+    files = sorted(path for pattern in patterns for path in root.glob(pattern))
     return digest(b"".join(path.read_bytes() for path in files))
+
+
+@cache
+def judge_hash() -> str:
+    """A hash of the source and the versions that compare runs: if a metric changes, scenes are
+    compared again."""
+    return digest(repr((source_hash(JUDGE_SOURCE), versions(), version("pandas"))).encode())

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,10 +17,12 @@ from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.table import COLUMNS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, rounding_of
-from crosscheck2d.reports.run.archive import Archive
-from crosscheck2d.reports.run.tables import is_sealed
+from crosscheck2d.reports.run.results import COMMAND, RunResults
+from crosscheck2d.reports.run.store import reading
+from crosscheck2d.reports.run.tables import joined
 from crosscheck2d.reports.run.timing_pass import is_busy, noise_floor
-from crosscheck2d.reports.terminal.counts import listed
+from crosscheck2d.reports.terminal.counts import counted, listed
+from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.reports.terminal.foreign_text import encoded
 from crosscheck2d.scenarios.truth.horizon import DIVERGED
 
@@ -112,16 +115,22 @@ class Difference:
 
 
 def difference(before: Path, after: Path) -> Difference:
-    """Compare the runs in two folders.
+    """Compare what both runs have, in two folders.
 
     Raises:
-        ValueError: a folder cannot be used; says which and what to do.
+        FolderTaken, Unusable, Damaged: a folder cannot be used; says which and what to do.
     """
-    one, other = Archive.read(before), Archive.read(after)
-    warnings, like = warnings_of(one, other)
-    cells = by_name(one), by_name(other)
-    tables = table_of(before), table_of(after)
+    with reading(before, COMMAND) as first, reading(after, COMMAND) as second:
+        one, other = RunResults.read(first), RunResults.read(second)
+        tables = table_of(one), table_of(other)
+        warnings, like = warnings_of(one, other)
+        cells = by_name(one), by_name(other)
     both = cells[0].keys() & cells[1].keys()
+    warnings += [
+        sentence_on_rest(results.folder, {name: own[name] for name in own if name not in both})
+        for results, own in zip((one, other), cells)
+        if own.keys() - both
+    ]
     edited = edited_scenes(*cells)
     if edited:
         warnings.append(
@@ -132,17 +141,17 @@ def difference(before: Path, after: Path) -> Difference:
     alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
     numbers, same = changed_numbers(*tables, alike if like else set(), edited)
     statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, both, edited)
-    busy = [archive for archive in (one, other) if archive.timings and is_busy(archive)]
+    busy = [results for results in (one, other) if results.timings and is_busy(results)]
     warnings += [
-        f"{archive.folder}: its times are not compared: two timings of the same engine"
-        f" differ by a factor of {1 + noise_floor(archive).floor:.2f}"
-        for archive in busy
+        f"{results.folder}: its times are not compared: two timings of the same engine"
+        f" differ by a factor of {1 + noise_floor(results).floor:.2f}"
+        for results in busy
     ]
     timed = timings_of(one, other, *cells) if like and not busy else []
     return Difference(warnings, statuses, numbers, same, len(both), timed)
 
 
-def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
+def warnings_of(one: RunResults, other: RunResults) -> tuple[list[str], bool]:
     """Warnings about machines, versions and completeness; and whether the machine is the same."""
     before, after = one.header, other.header
     said = [
@@ -158,23 +167,27 @@ def warnings_of(one: Archive, other: Archive) -> tuple[list[str], bool]:
     if before["seed"] != after["seed"]:
         said.append(f"differs in seed: {before['seed']} before, {after['seed']} after")
     said += [
-        f"{archive.folder} is not complete" for archive in (one, other) if not archive.complete
+        f"{results.folder} is not complete" for results in (one, other) if not results.complete
     ]
-    for archive in (one, other):
-        if damaged := [record["damage"] for record in archive.records if record["damage"]]:
-            more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-            said.append(
-                f"{archive.folder}: trajectories/{damaged[0]}{more}; "
-                f"crosscheck run --resume {archive.folder} plays it again"
-            )
     return said, like
 
 
-def by_name(archive: Archive) -> Cells:
-    """(scenario, `engine:profile` as the table has it, dt in s) -> the line of the cell."""
+def sentence_on_rest(folder: Path, rest: Cells) -> str:
+    """A sentence on the cells that only the run in `folder` has."""
+    engines = list(dict.fromkeys(name[1] for name in rest))
+    scenes = list(dict.fromkeys(name[0] for name in rest))
+    names = [
+        listed([*kind[:6], *([f"{len(kind) - 6} more"] if len(kind) > 6 else [])])
+        for kind in (engines, scenes)
+    ]
+    return f"only in {folder}: {counted(len(rest), 'cell')} of {names[0]}, in {names[1]}"
+
+
+def by_name(results: RunResults) -> Cells:
+    """(scenario, `engine:profile` as the table has it, dt in s) -> the record of the cell."""
     return {
         (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
-        for r in archive.records
+        for r in results.records
     }
 
 
@@ -190,19 +203,16 @@ def edited_scenes(before: Cells, after: Cells) -> list[str]:
 
 
 def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> list[Change]:
-    """The cells that ended differently. A cell that was not played again also counts as worse; in
-    an edited scene nothing does."""
+    """The cells of both runs that ended differently; in an edited scene none is worse."""
     changes = []
-    for name, record in before.items():
+    for name in [name for name in before if name in after]:
         scenario, engine, dt = name
-        was, now = record["status"], after[name]["status"] if name in after else "not played"
+        was, now = before[name]["status"], after[name]["status"]
         if was != now:
             if scenario in edited:
                 verdict = "other"
-            elif was == "ok" or now == "not played":
-                verdict = "worse"
             else:
-                verdict = "better" if now == "ok" else "other"
+                verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
             changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
     return changes
 
@@ -237,19 +247,14 @@ def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
     }
 
 
-def table_of(folder: Path) -> pd.DataFrame:
-    """deviations.csv with all values as text: equal text means equal bits. Raises `ValueError` if
-    the file was changed."""
-    path = folder / "deviations.csv"
-    try:
-        same, table = is_sealed(folder), pd.read_csv(path, dtype=str, keep_default_na=False)
-    except (OSError, ValueError) as fault:
-        why = getattr(fault, "strerror", None) or str(fault)
-        raise ValueError(f"{path}: {why}; make it: crosscheck report {folder}") from fault
-    columns = list(table.columns) == list(COLUMNS)
-    if not (columns and same):
-        why = "is not what was written" if columns else "its columns are not those of this version"
-        raise ValueError(f"{path}: {why}; delete it, and make it again: crosscheck report {folder}")
+def table_of(results: RunResults) -> pd.DataFrame:
+    """deviations.csv with all values as text: equal text means equal bits. Raises `Unusable`."""
+    table = pd.read_csv(BytesIO(joined(results.tables())), dtype=str, keep_default_na=False)
+    if list(table.columns) != list(COLUMNS):
+        raise Unusable(
+            f"{results.folder}: its tables are of another version; make them again: crosscheck"
+            f" report {results.folder}"
+        )
     return table
 
 
@@ -356,8 +361,8 @@ def ratio(was: float, now: float) -> float:
 
 
 def timings_of(
-    one: Archive,
-    other: Archive,
+    one: RunResults,
+    other: RunResults,
     before: Cells,
     after: Cells,
 ) -> list[Timing]:

@@ -20,8 +20,8 @@ from crosscheck2d.adapters.host.process import keep_processes
 from crosscheck2d.adapters.play import play_once, unwatched
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.run.cells import Cell, source_hash, versions
+from crosscheck2d.reports.run.pool import allow, leave
 from crosscheck2d.reports.run.trajectories import packed, parts_of
-from crosscheck2d.reports.run.worker_process import allow, leave
 from crosscheck2d.scenarios.model import Scenario, State
 
 # s to import, compile and load an engine: up to 30 on an idle machine, for all engines the first

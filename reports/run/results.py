@@ -1,140 +1,163 @@
-"""How the result of each kind of task becomes a line of the journal."""
+"""What the rows of a run say of its present plan: the nouns from which tables and page are made.
+
+kind           key is a hash of                        value; blob
+run            "plan", "comparisons"                   the plan, with the keys of its tasks; the key
+                                                       of each scene's table
+cell           scene, engine, step, source, versions   how it ended; its trajectory
+probes, check  engine, source, versions                findings of the probes; verdict of the check
+known_answer   its definition, source, versions        the number computed here
+truth          scene, source of the exact answers      status; the record
+comparison     the cells, the answer, the metrics      -; the scene's part of deviations.csv
+timing         the timed cells, the machine            the samples of all rounds, and their date
+export         name of a file                          the digests that it may have
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
-from crosscheck2d.adapters.conformance.conform import Finding, not_probed
-from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.run.archive import trajectory_file
-from crosscheck2d.reports.run.cells import Cell, content_key, digest, scene_hash
-from crosscheck2d.reports.run.journal import Journal
-from crosscheck2d.reports.run.known_answers import KnownAnswer
-from crosscheck2d.reports.run.playing import CellResult, source_and_versions
-from crosscheck2d.reports.run.tasks import Check, Means, RunPlan, engine_key
-from crosscheck2d.reports.run.trajectories import from_trail, packed
-from crosscheck2d.reports.run.worker_process import Failure
-from crosscheck2d.reports.terminal.foreign_text import put_bytes
-from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.reports.run.comparing import COMPARED, file_of, run_of
+from crosscheck2d.reports.run.scenes import SceneSource
+from crosscheck2d.reports.run.store import FILE, Store
+from crosscheck2d.reports.run.trajectories import load_trajectory
+from crosscheck2d.reports.terminal.exits import Unusable
+from crosscheck2d.scenarios.model import Trajectory
 
-Status = tuple[str, str, str]  # a task in words, its status, the reason of a failure
+COMMAND = "crosscheck run"
 
 
-class OtherVersions(Exception):
-    """The source or library versions of a worker differ from those of this machine."""
+@dataclass(frozen=True, eq=False)
+class RunResults:
+    """The rows of one run that its present plan uses.
 
+    Attributes:
+        store: where they are.
+        header: the plan: command, seed, started, machine, versions, and the request.
+        records: the rows of the cells that have ended, in reading order of scenes and engines,
+            coarse dt first; with the keys `cell`, `scene`, `seed` and `digest`.
+        conformance: `engine:profile` -> the findings of the probes.
+        known_answers: the reproduced known answers.
+        checked: solver's file, `PATH:own` -> the verdict of `crosscheck check`.
+        timing: the timing pass: its `taken` date, and its `lines`; empty if there is none.
+        complete: whether everything requested has ended.
+    """
 
-def keep_probes(
-    journal: Journal, plan: RunPlan, engine: str, result: list[Finding] | Failure
-) -> Status:
-    """Write what the probes of an engine found to the journal."""
-    status, reason = status_of(result)
-    # a solver of the exercise that hangs breaks no protocol
-    verdict: Literal["departs", "breaks"] = "departs" if plan.engines[engine].exercise else "breaks"
-    findings = (
-        [not_probed(engine, status, reason, verdict)] if isinstance(result, Failure) else result
-    )
-    line = {"conformance": [asdict(finding) for finding in findings]}
-    journal.append(line | {"of": engine, "key": unless_outside(result, engine_key(plan, engine))})
-    return f"conformance of {engine}", status, reason
+    store: Store
+    header: dict[str, Any]
+    records: list[dict[str, Any]]
+    conformance: dict[str, list[dict[str, Any]]]
+    known_answers: list[dict[str, Any]]
+    checked: dict[str, dict[str, Any]]
+    timing: Mapping[str, Any]
+    complete: bool
 
-
-def keep_known_answer(journal: Journal, known: KnownAnswer, result: float | Failure) -> Status:
-    """Write a reproduced known answer to the journal."""
-    ours = float("nan") if isinstance(result, Failure) else result
-    line = {"known_answer": asdict(known) | {"ours_J2": ours}}
-    key = unless_outside(result, content_key(repr(known)))
-    journal.append(line | {"of": repr(known), "key": key})
-    return f"known answer: {known.column} at dt {known.dt_s:g} s", *status_of(result)
-
-
-def status_of(result: Any) -> tuple[str, str]:
-    """The status of a task, and the reason of a failure."""
-    return (result.status, result.reason) if isinstance(result, Failure) else ("ok", "")
-
-
-def unless_outside(result: Any, key: str) -> str:
-    """The key for the line of a result; "" after a failure outside the engine: it matches no task,
-    so that the task is tried again when the run is resumed."""
-    return "" if isinstance(result, Failure) and result.outside else key
-
-
-def keep_check(journal: Journal, plan: RunPlan, engine: str, result: Check | Failure) -> Status:
-    """Write the verdict of `crosscheck check` on an engine's file to the journal."""
-    shown: list[list[str]]
-    passed, says, shown, key = False, ["It was saved while the run began: check it again."], [], ""
-    if isinstance(result, Failure):
-        says = [f"It could not be checked: {result.reason}"]
-    elif result.source == plan.engines[engine].source:
-        passed, says, shown, _ = result
-        key = engine_key(plan, engine)
-    # No key matches "": the file is checked again when the run is resumed.
-    verdict = {"passed": passed, "says": says, "shown": shown}
-    journal.append({"checked": verdict, "of": engine, "key": key})
-    return f"check of {engine}", *status_of(result)
-
-
-def keep_cell(
-    journal: Journal,
-    scenario: Scenario,
-    means: Means,
-    cell: Cell,
-    key: str,
-    result: CellResult | Failure,
-) -> dict[str, Any]:
-    """Write the trajectory of the cell with this `key`, then its line, which is returned."""
-    played = failed(cell, scenario, result) if isinstance(result, Failure) else result
-    run, samples = played.run, played.samples
-    if played.played_by != source_and_versions():
-        raise OtherVersions(
-            "a worker has other versions or other source of the engines than this machine"
+    @staticmethod
+    def read(store: Store) -> RunResults:
+        """Read the rows of a folder; raises `Unusable` if there is no plan."""
+        row = store.get("run", "plan")
+        if row is None:
+            raise Unusable(f"{store.folder / FILE}: has no plan, so nothing was played")
+        header, missing = row.value, 0
+        of: dict[str, list[tuple[Any, Any]]] = {}
+        for kind, tasks in header["tasks"].items():
+            for key, what in tasks:
+                row = store.get(kind, key)
+                if row is None:
+                    missing += 1
+                    continue
+                of.setdefault(kind, []).append((what, row.value))
+                if kind == "cell":
+                    about = {"cell": key, "scene": what, "seed": header["seed"]}
+                    of[kind][-1] = what, row.value | about | {"digest": row.digest}
+        timing = store.get("timing", header["timing"])
+        return RunResults(
+            store,
+            header,
+            [record for _, record in of.get("cell", [])],
+            {engine: value["findings"] for engine, value in of.get("probes", [])},
+            [value for _, value in of.get("known_answer", [])],
+            dict(of.get("check", [])),
+            timing.value if timing is not None else {},
+            not missing,
         )
-    path = trajectory_file(journal.path.parent, key)
-    if played.file:
-        put_bytes(path, played.file)
-    record = {
-        "cell": key,
-        "scene_hash": scene_hash(scenario),
-        "scene": cell.scene,
-        "seed": cell.seed,
-        "substeps": cell.substeps,
-        "scenario": run.scenario,
-        "engine": run.engine,
-        "profile": run.profile,
-        "dt_s": run.dt,
-        "status": run.status,
-        "reason": run.reason,
-        "step": (samples - 1) * cell.substeps if samples else -1,
-        "until_s": float(scenario.times[samples - 1]) if samples else float("nan"),
-        "seconds": run.seconds,
-        "timeout_s": means.timeout,
-        "outside": isinstance(result, Failure) and result.outside,
-        "file": digest(played.file) if played.file else "",
-        "settings": run.settings,
-        "versions": run.versions,
+
+    @property
+    def folder(self) -> Path:
+        """Where the run is."""
+        return self.store.folder
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the run that made the rows; NaN if it is not complete."""
+        return float(self.header["seconds"]) if self.complete else float("nan")
+
+    @cached_property
+    def cells(self) -> dict[str, list[str]]:
+        """Scene -> the keys of its cells."""
+        cells: dict[str, list[str]] = {}
+        for key, scene in self.header["tasks"]["cell"]:
+            cells.setdefault(scene, []).append(key)
+        return cells
+
+    @cached_property
+    def by_scene(self) -> dict[str, list[dict[str, Any]]]:
+        """Scene -> the records of its cells."""
+        by_scene: dict[str, list[dict[str, Any]]] = {}
+        for record in self.records:
+            by_scene.setdefault(record["scene"], []).append(record)
+        return by_scene
+
+    @cached_property
+    def sources(self) -> dict[str, SceneSource]:
+        """Scene -> what makes its scenario again."""
+        return sources_of(self.header)
+
+    @cached_property
+    def timings(self) -> dict[str, dict[int, dict[str, Any]]]:
+        """Key of a cell -> number of the timing (0; also 1 if timed twice) -> its line."""
+        timings: dict[str, dict[int, dict[str, Any]]] = {}
+        for line in self.timing.get("lines", []):
+            if "timing" in line:
+                timings.setdefault(line["timing"], {})[line["copy"]] = line
+        return timings
+
+    @cached_property
+    def overheads(self) -> dict[tuple[str, str, str], list[float]]:
+        """(what, `engine:profile`, scenario or "") -> s in each round, see stepping.py."""
+        return {
+            (line["overhead"], line["of"], line["scenario"]): line["cost"]
+            for line in self.timing.get("lines", [])
+            if "overhead" in line
+        }
+
+    def trajectory(self, record: Mapping[str, Any]) -> Trajectory | None:
+        """The trajectory of a cell; None if it has none."""
+        file = file_of(self.store, dict(record))
+        return load_trajectory(file) if file else None
+
+    def run(self, record: Mapping[str, Any], with_trajectory: bool = True) -> Any:
+        """The run of a cell."""
+        return run_of(dict(record), file_of(self.store, dict(record)) if with_trajectory else b"")
+
+    def tables(self) -> Sequence[bytes]:
+        """The scene tables of deviations.csv as they were last made; raises `Unusable` if there
+        are none."""
+        keys = self.store.get("run", "comparisons")
+        rows = [self.store.get(COMPARED, key) for key in (keys.value if keys else {}).values()]
+        if keys is None or None in rows:
+            raise Unusable(
+                f"{self.folder}: has no complete tables; make them: crosscheck report {self.folder}"
+            )
+        return [row.blob for row in rows if row is not None]
+
+
+def sources_of(header: Mapping[str, Any]) -> dict[str, SceneSource]:
+    """Scene -> what makes its scenario again, from a plan."""
+    return {
+        scene: SceneSource(**source | {"substeps": tuple(source["substeps"])})
+        for scene, source in header["sources"].items()
     }
-    journal.append(record)
-    return record
-
-
-def failed(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
-    """The result of a cell whose worker died or was stopped, with the states up to that time."""
-    trajectory = from_trail(failure.trail, scenario)
-    samples = len(trajectory) if trajectory else 0
-    last = (
-        f"; last good state: step {(samples - 1) * cell.substeps},"
-        f" {scenario.times[samples - 1]:g} s"
-        if samples
-        else ""
-    )
-    run = Run(
-        *cell.names,
-        scenario.name,
-        scenario.dt(cell.substeps),
-        failure.status,
-        failure.reason + last,
-    )
-    return CellResult(
-        run, samples, packed(trajectory) if trajectory else b"", source_and_versions()
-    )

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
-from crosscheck2d.reports.run.archive import stored_scene
-from crosscheck2d.reports.run.cells import scene_hash
-from crosscheck2d.reports.terminal.exits import Unusable
-from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.catalogue import scenario as from_catalogue
-from crosscheck2d.scenarios.files.scene_file import read_scene_file
+from crosscheck2d.scenarios.files.scene_file import read_scene_file, scenario_of
 from crosscheck2d.scenarios.files.tables import MOST_STEPS
 from crosscheck2d.scenarios.model import Scenario
-
-Records = Sequence[dict[str, Any]]  # the lines of a scene's cells, in the order of the tables
 
 
 def open_scene(scene: str, seed: int) -> Scenario:
@@ -24,31 +19,30 @@ def open_scene(scene: str, seed: int) -> Scenario:
     return read_scene_file(Path(scene)) if scene.endswith(".toml") else from_catalogue(scene, seed)
 
 
-def played_scenario(folder: Path, record: dict[str, Any]) -> Scenario:
-    """The scenario of a cell, given its line in the run of `folder`; raises `Unusable` if it has
-    changed since."""
-    scene = (
-        record["scene"]
-        if record["scene"] in SCENARIOS
-        else str(stored_scene(folder, record["scenario"]))
-    )
-    scenario = open_scene(scene, record["seed"])
-    if scene_hash(scenario) != record["scene_hash"]:
-        raise Unusable(
-            f"{scenario.name} has changed since it was played; crosscheck run --resume"
-            " plays it again"
-        )
-    return scenario
+class SceneSource(NamedTuple):
+    """A scene that was played, with what is needed to make its scenario again anywhere.
 
+    Attributes:
+        name: its name.
+        seed: that of a random scene.
+        substeps: the step sizes that were played.
+        text: its scene file; "" for a scene of the catalogue.
+        digest: its `scene_hash`.
+    """
 
-def scenario_of(folder: Path, records: Records) -> Scenario:
-    """The scenario of a scene's cells, with the step sizes played; raises `Unusable` if it has
-    changed since."""
-    [scenario] = [
-        played_scenario(folder, record)
-        for record in {one["scene_hash"]: one for one in records}.values()
-    ]
-    return replace(scenario, substeps=tuple(sorted({record["substeps"] for record in records})))
+    name: str
+    seed: int
+    substeps: tuple[int, ...]
+    text: str
+    digest: str
+
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        if self.text:
+            scenario = scenario_of(tomllib.loads(self.text), f"{self.name}.toml")
+        else:
+            scenario = from_catalogue(self.name, self.seed)
+        return replace(scenario, substeps=self.substeps)
 
 
 def with_steps(scenario: Scenario, dts: Sequence[float], full: bool) -> Scenario:

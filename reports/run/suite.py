@@ -1,124 +1,191 @@
-"""A run: play scenarios through engines, each cell once, and write every result to the run's folder
-at once."""
+"""A run: carry out the tasks of a plan that have no row yet, and write the row of each as it
+ends."""
 
 from __future__ import annotations
 
-import json
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
-from crosscheck2d.reports.run.archive import Archive, stored_scene
-from crosscheck2d.reports.run.cells import Cell, scene_hash
-from crosscheck2d.reports.run.folders import RUN
-from crosscheck2d.reports.run.journal import Journal, plain
+from crosscheck2d.adapters.conformance.conform import not_probed
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.run.cells import Cell, content_key, scene_hash
+from crosscheck2d.reports.run.cluster import Cluster
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, SceneTasks
 from crosscheck2d.reports.run.known_answers import KnownAnswer
-from crosscheck2d.reports.run.made import writing
-from crosscheck2d.reports.run.playing import CellResult
-from crosscheck2d.reports.run.results import keep_cell, keep_check, keep_known_answer, keep_probes
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.scene_tables import SceneTasks
-from crosscheck2d.reports.run.tasks import Checking, Means, RunPlan, finished_tasks, tasks_of
-from crosscheck2d.reports.run.timing_pass import Pass, cells_to_time, is_timed
-from crosscheck2d.reports.run.worker_process import Failure
-from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.plan import Means, RunPlan, RunTask, tasks_of
+from crosscheck2d.reports.run.playing import CellResult, source_and_versions
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.results import RunResults, sources_of
+from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.run.timing_pass import CellToTime, Pass, cells_to_time
+from crosscheck2d.reports.run.trajectories import from_trail, packed
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.scenarios.files.scene_file import scene_text
 from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.rows import Row
 
 
-def carry_out(plan: RunPlan, means: Means, journal: Journal, progress: Progress) -> None:
-    """Run every task of the plan that has no result in the journal, take the timings, and write all
-    results to the journal and its folder."""
-    folder = journal.path.parent
-    scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
-    tasks = tasks_of(plan, scenarios)
-    begin(plan, journal, scenarios, len(tasks))
-    archive = Archive.read(folder)
-    finished = finished_tasks(archive, plan, means, scenarios)
-    missing = {task: work for task, work in tasks.items() if task not in finished}
-    cells = [task for task in missing if isinstance(task, Cell)]
-    scene_tasks = SceneTasks(archive, cells, means.timeout, progress.note)
-    Playing(plan, means, journal, scenarios, scene_tasks, progress).run(missing, len(tasks))
-    archive = Archive.read(folder)
-    take_timings(archive, plan, means, journal, scenarios, progress)
-    delete_unused_trajectories(archive)
-    footer = {"tasks": len(tasks), "played": len(missing), "seconds": progress.seconds}
-    journal.append({"footer": footer})
+class OtherVersions(Exception):
+    """The source or library versions of a worker differ from those of this machine."""
+
+
+def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> None:
+    """Run every task of the plan that has no row, take the timings, and write all rows."""
+    scenarios = plan.scenarios()
+    tasks = dict(tasks_of(plan, scenarios))
+    header = plan.header(scenarios, list(tasks)) | {"timing": "", "seconds": nan}
+    before = store.rows.get("run", "plan")
+    store.put("run", "plan", header)
+    store.rows.delete("run", "comparisons")  # those of an earlier plan
+    rows = ((task, store.get(task.kind, task.key)) for task in tasks)
+    ended = {  # without the trajectories, which may be more than the memory holds
+        task: row._replace(blob=b"") for task, row in rows if row and is_usable(row, means)
+    }
+    Suite(plan, means, store, scenarios, progress).run(tasks, ended, header)
+    seconds = progress.seconds
+    if before is not None and len(tasks) == len(ended) and not isnan(before.value["seconds"]):
+        seconds = before.value["seconds"]  # of the command that played
+    store.put("run", "plan", header | {"seconds": seconds})
+    cells = cells_to_time(RunResults.read(store), plan.engines)
+    take_timings(store, cells, plan.timings, means, progress)
+
+
+def is_usable(row: Row, means: Means) -> bool:
+    """Whether a task with this row need not be done again: unless it was stopped at a shorter time
+    limit than the present one, or failed for a reason outside the engine."""
+    late = row.value.get("status") == "timeout" and row.value["timeout_s"] < means.timeout
+    return not (late or row.value.get("outside"))
 
 
 @dataclass(frozen=True)
-class Playing:
-    """The part of a run in which workers carry out the tasks and their results are kept.
+class Suite:
+    """The part of a run in which workers carry out the tasks.
 
     Attributes:
         scenarios: scene -> its scenario.
-        scene_tasks: the tasks of the scenes whose cells have all ended: exact answer and
-            comparison.
     """
 
     plan: RunPlan
     means: Means
-    journal: Journal
+    store: Store
     scenarios: Mapping[str, Scenario]
-    scene_tasks: SceneTasks
     progress: Progress
 
-    def run(self, missing: Mapping[Any, Callable[[], Any]], tasks: int) -> None:
-        """Carry out the `missing` ones of `tasks` tasks, and compare each scene when its cells have
-        ended."""
+    def run(
+        self,
+        tasks: Mapping[RunTask, Callable[[], Any]],
+        ended: Mapping[RunTask, Row],
+        header: Mapping[str, Any],
+    ) -> None:
+        """Carry out the tasks that have not `ended`, and compare each scene when its cells have."""
+        cells: dict[str, list[str]] = {}
+        for task in (task for task in tasks if task.kind == "cell"):
+            cells.setdefault(task.what.scene, []).append(task.key)
+        records = {
+            task.key: row.value | {"cell": task.key, "digest": row.digest}
+            for task, row in ended.items()
+            if task.kind == "cell"
+        }
+        scenes = SceneTasks(self.store, cells, sources_of(header), records, self.means.timeout)
+        missing = {task: work for task, work in tasks.items() if task not in ended}
         # A solver's file is checked on this machine, because the file is here; so are scenes
         # compared.
-        checks = {task: work for task, work in missing.items() if isinstance(task, Checking)}
-        played = {task: work for task, work in missing.items() if task not in checks}
-        alone = {task for task in played if isinstance(task, Cell) and self.leaves_state(task)}
-        urgent: deque[Any] = deque([*checks.items(), *self.scene_tasks.tasks()])
-        self.progress.start(len(missing), tasks)
-        if not missing:
-            self.show_waiting()
-        limits = self.means.timeout, self.means.memory
-        with closing(
-            run_all(played, self.means.workers, *limits, self.means.scheduler, alone, urgent)
-        ) as results:
+        checks = {task: work for task, work in missing.items() if task.kind == "check"}
+        played: dict[Any, Any] = {t: work for t, work in missing.items() if t not in checks}
+        left = [task for task in played if task.kind == "cell"]
+        alone = {task for task in left if self.plan.engines[task.what.engine].leaves_state}
+        urgent: deque[Any] = deque([*checks.items(), *scenes.tasks()])
+        self.progress.start(len(missing), len(tasks))
+        means, limits = self.means, (self.means.timeout, self.means.memory)
+        with ExitStack() as stack:
+            far = Cluster(means.scheduler, *limits, alone) if means.scheduler else None
+            if far is not None:
+                stack.enter_context(far)
+            results = run_all(played, means.workers, *limits, far, alone, urgent)
+            stack.enter_context(closing(results))
+            self.show_waiting(scenes)
             for task, result in results:
-                urgent.extend(self.keep(task, result))
-                self.show_waiting()
+                if task[0] in (ANSWER, COMPARED):
+                    urgent.extend(scenes.task_ended(task, result))
+                elif task.kind == "cell":
+                    scenes.records[task.key] = self.keep_cell(task, result)
+                    urgent.extend(scenes.next_task(task.what.scene))
+                else:
+                    self.keep(task, result)
+                self.show_waiting(scenes)
 
-    def leaves_state(self, cell: Cell) -> bool:
-        """Whether the engine of a cell needs a new process for each cell."""
-        return self.plan.engines[cell.engine].leaves_state
-
-    def keep(self, task: Any, result: Any) -> Iterable[Any]:
-        """Write the result of a task and show its status; returns the tasks that can start now."""
-        if isinstance(task, Path):  # the file of an exact answer or of a comparison
-            return self.scene_tasks.task_ended(task, result)
-        if isinstance(task, Cell):
-            return self.scene_tasks.cell_ended(self.kept_cell(task, result))
-        if isinstance(task, Checking):
-            self.progress.done(*keep_check(self.journal, self.plan, task.engine, result))
-        elif isinstance(task, KnownAnswer):
-            self.progress.done(*keep_known_answer(self.journal, task, result))
-        else:
-            self.progress.done(*keep_probes(self.journal, self.plan, task, result))
-        return ()
-
-    def kept_cell(self, cell: Cell, result: CellResult | Failure) -> dict[str, Any]:
-        """Write the result of a cell and show its status; returns the cell's line of the
-        journal."""
-        scenario = self.scenarios[cell.scene]
-        key = cell.key(scene_hash(scenario), self.plan.engines[cell.engine].source)
-        line = keep_cell(self.journal, scenario, self.means, cell, key, result)
-        shown = f"{line['scenario']}  {cell.engine}  dt {line['dt_s']:.4g} s"
-        self.progress.done(shown, line["status"], line["reason"])
-        return line
-
-    def show_waiting(self) -> None:
+    def show_waiting(self, scenes: SceneTasks) -> None:
         """When every cell has ended: show for which exact answers the run still waits."""
-        if self.scene_tasks.asked and not self.scene_tasks.playing:
-            self.progress.say(waiting_for(self.scene_tasks.asked))
+        if len(scenes.records) == sum(map(len, scenes.cells.values())) and scenes.awaited:
+            self.progress.say(waiting_for(scenes.awaited))
+
+    def keep(self, task: RunTask, result: Any) -> None:
+        """Write the row of a task that is not a cell, and show its status."""
+        failed = isinstance(result, Failure)
+        status, reason = (result.status, result.reason) if failed else ("ok", "")
+        outside = failed and result.outside
+        value: dict[str, Any]
+        if task.kind == "probes":
+            title = f"conformance of {task.what}"
+            # a solver of the exercise that hangs breaks no protocol
+            exercise = self.plan.engines[task.what].exercise
+            how = "departs" if exercise else "breaks"
+            findings = [not_probed(task.what, status, reason, how)] if failed else result  # type: ignore[arg-type]
+            value = {"findings": [asdict(finding) for finding in findings]}
+        elif task.kind == "known_answer":
+            known: KnownAnswer = task.what
+            title = f"known answer: {known.column} at dt {known.dt_s:g} s"
+            value = asdict(known) | {"ours_J2": nan if failed else result}
+        else:
+            title = f"check of {task.what}"
+            now = not failed and result.source == self.plan.engines[task.what].source
+            outside, value = not now, {"passed": False, "shown": []}
+            if now:
+                value = {name: getattr(result, name) for name in ("passed", "says", "shown")}
+            elif failed:
+                value["says"] = [f"It could not be checked: {reason}"]
+            else:
+                value["says"] = ["It was saved while the run began: check it again."]
+        self.store.put(task.kind, task.key, value | {"outside": outside})
+        self.progress.done(title, status, reason)
+
+    def keep_cell(self, task: RunTask, result: CellResult | Failure) -> dict[str, Any]:
+        """Write the row of a cell and show its status; returns its record."""
+        cell: Cell = task.what
+        scenario = self.scenarios[cell.scene]
+        played = failed_cell(cell, scenario, result) if isinstance(result, Failure) else result
+        run, samples = played.run, played.samples
+        if played.played_by != source_and_versions():
+            raise OtherVersions(
+                "a worker has other versions or other source of the engines than this machine"
+            )
+        value = {
+            "scene_hash": scene_hash(scenario),
+            "substeps": cell.substeps,
+            "scenario": run.scenario,
+            "engine": run.engine,
+            "profile": run.profile,
+            "dt_s": run.dt,
+            "status": run.status,
+            "reason": run.reason,
+            "step": (samples - 1) * cell.substeps if samples else -1,
+            "until_s": float(scenario.times[samples - 1]) if samples else nan,
+            "seconds": run.seconds,
+            "timeout_s": self.means.timeout,
+            "outside": isinstance(result, Failure) and result.outside,
+            "settings": run.settings,
+            "versions": run.versions,
+        }
+        row = self.store.put("cell", task.key, value, played.file)
+        title = f"{run.scenario}  {cell.engine}  dt {run.dt:.4g} s"
+        self.progress.done(title, run.status, run.reason)
+        return value | {"cell": task.key, "digest": row.digest}
 
 
 def waiting_for(scenes: Sequence[str]) -> str:
@@ -127,55 +194,51 @@ def waiting_for(scenes: Sequence[str]) -> str:
     return f"the exact answer to {Path(scenes[0]).stem}{more}"
 
 
-def begin(plan: RunPlan, journal: Journal, scenarios: Mapping[str, Scenario], tasks: int) -> None:
-    """Make the folders, copy the scene files, write the header to the journal and to
-    machine.json."""
-    folder = journal.path.parent
-    for name in ("trajectories", "scenes", "compared"):
-        (folder / name).mkdir(exist_ok=True)
-    named = {scene: scenarios[scene].name for scene in plan.scenes if scene.endswith(".toml")}
-    copies = {
-        copy: scene_text(scenarios[scene])
-        for scene, name in named.items()
-        # if the plan reads the copy itself, the original scene file is gone
-        if (copy := stored_scene(folder, name)) != plan.files.get(scene)
-    }
-    header = plan.header() | {"tasks": tasks, "names": named}
-    about_it = folder / "machine.json"
-    with writing(folder, [path.relative_to(folder).as_posix() for path in (*copies, about_it)]):
-        for path, text in copies.items():
-            put_text(path, text)
-        put_text(about_it, json.dumps(plain(header), indent=2) + "\n")
-    journal.append({"header": header})
+def failed_cell(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
+    """The result of a cell whose worker died or was stopped, with the states up to that time."""
+    trajectory = from_trail(failure.trail, scenario)
+    samples = len(trajectory) if trajectory else 0
+    last = ""
+    if samples:
+        step, t = (samples - 1) * cell.substeps, scenario.times[samples - 1]
+        last = f"; last good state: step {step}, {t:g} s"
+    run = Run(
+        *cell.names,
+        scenario.name,
+        scenario.dt(cell.substeps),
+        failure.status,
+        failure.reason + last,
+    )
+    file = packed(trajectory) if trajectory else b""
+    return CellResult(run, samples, file, source_and_versions())
 
 
 def take_timings(
-    archive: Archive,
-    plan: RunPlan,
+    store: Store,
+    cells: Sequence[CellToTime],
+    seconds: float,
     means: Means,
-    journal: Journal,
-    scenarios: Mapping[str, Scenario],
     progress: Progress,
+    again: bool = False,
 ) -> None:
-    """Run the timing pass, unless its result is in the journal; no other task runs meanwhile."""
-    cells = cells_to_time(archive, plan.engines, scenarios) if plan.timings else []
-    if not cells or is_timed(archive, cells):
+    """Time these cells in at most `seconds`, while no other task runs, unless that was done on this
+    machine, and not `again`."""
+    plan = store.get("run", "plan")
+    assert plan is not None
+    machine = about("", 0)["machine"]
+    key = content_key(*sorted(cell.key for cell in cells), repr(machine), plan.value["seed"])
+    store.put("run", "plan", plan.value | {"timing": key, "timings": seconds})
+    if not cells or not seconds or (store.get("timing", key) and not again):
         return
-    progress.start(1, 1, f"timing, at most {plan.timings:g} s")
-    task: dict[Any, Callable[[], Any]] = {"timing": Pass(cells, plan.timings, plan.seed)}
-    with closing(run_all(task, 1, plan.timings + means.timeout, means.memory)) as results:
+    progress.start(1, 1, f"timing, at most {seconds:g} s")
+    work: dict[Any, Callable[[], Any]] = {"timing": Pass(cells, seconds, plan.value["seed"])}
+    with closing(run_all(work, 1, seconds + means.timeout, means.memory)) as results:
         for _, result in results:
             if isinstance(result, Failure):
                 progress.done("timing", result.status, result.reason)
-            else:
-                for line in result:
-                    journal.append(line)
+            elif result:
+                taken = datetime.now(UTC).isoformat(timespec="seconds")
+                store.put("timing", key, {"taken": taken, "lines": result})
                 progress.done("timing")
-
-
-def delete_unused_trajectories(archive: Archive) -> None:
-    """Delete the trajectories of cells that the journal no longer names."""
-    named = {record["cell"] for record in archive.records}
-    for path in (archive.folder / "trajectories").iterdir():
-        if path.stem not in named and RUN.names(f"trajectories/{path.name}"):
-            path.unlink()
+            else:
+                progress.done("timing", "timeout", f"{seconds:g} s are not enough")

@@ -14,7 +14,9 @@ import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.cells import Cell
+from crosscheck2d.reports.run.pool import allow
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.stepping import (
     CALL,
     EMPTY,
@@ -24,9 +26,9 @@ from crosscheck2d.reports.run.stepping import (
     overheads,
 )
 from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
-from crosscheck2d.reports.run.worker_process import allow
 from crosscheck2d.scenarios.model import Scenario
 
+TIMINGS = 12.0  # s that it may take unless it is said otherwise
 ROUNDS = 9  # rounds at most, without the warm-up
 SCENES = (
     "free_fall",  # flight
@@ -95,26 +97,24 @@ class CellToTime(NamedTuple):
         return replace(scenario, duration=samples * scenario.sample_interval)
 
 
-def cells_to_time(
-    archive: Archive, engines: Mapping[str, EngineRow], scenarios: Mapping[str, Scenario]
-) -> list[CellToTime]:
-    """The cells to be timed: those of `timed_scenes` that were played to their end."""
-    played = {record["scene"] for record in archive.records if record["status"] == "ok"}
-    chosen = set(timed_scenes([scene for scene in scenarios if scene in played]))
-    return [
-        CellToTime(
-            record["cell"],
-            name,
-            engines[name],
-            replace(scenarios[record["scene"]], truth=None),
-            record["substeps"],
-            record["seconds"],
-        )
-        for record in archive.records
-        if (name := f"{record['engine']}:{record['profile']}") in engines
-        and record["status"] == "ok"
-        and record["scene"] in chosen
-    ]
+def cells_to_time(results: RunResults, engines: Mapping[str, EngineRow]) -> list[CellToTime]:
+    """The cells to be timed: those of `timed_scenes` that were played to their end by the present
+    source of their engine."""
+    played = [record for record in results.records if record["status"] == "ok"]
+    there = {record["scene"] for record in played}
+    sources = results.sources
+    chosen = timed_scenes([scene for scene in results.header["scenes"] if scene in there])
+    scenarios = {scene: replace(sources[scene].scenario(), truth=None) for scene in chosen}
+    cells = []
+    for record in played:
+        name, scene = f"{record['engine']}:{record['profile']}", record["scene"]
+        if scene in scenarios and name in engines:
+            cell = Cell(scene, record["seed"], name, record["substeps"])
+            if record["cell"] == cell.key(record["scene_hash"], engines[name].source):
+                times = record["substeps"], record["seconds"]
+                what = record["cell"], name, engines[name], scenarios[scene]
+                cells.append(CellToTime(*what, *times))
+    return cells
 
 
 def timed_scenes(played: Sequence[str]) -> list[str]:
@@ -133,7 +133,7 @@ class Pass:
     seed: int
 
     def __call__(self) -> list[dict[str, Any]]:
-        """A line of the journal for each thing timed; none if not even the warm-up fits into the
+        """A line for each thing timed; none if not even the warm-up fits into the
         time."""
         allow(self.seconds + STARTING)
         started = perf_counter()
@@ -190,7 +190,7 @@ def can(timed: Timed) -> bool:
 
 
 def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
-    """The line of the journal for the samples of one key."""
+    """The line for the samples of one key."""
     costs = [sample.cost for sample in samples]
     if key[0] == "timing":
         _, cell, copy, until = key
@@ -201,37 +201,31 @@ def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
 
 
 def as_played(cell: CellToTime) -> dict[str, Any]:
-    """The line of the journal for a cell that is not timed again: its time as played, an upper
+    """The line for a cell that is not timed again: its time as played, an upper
     bound, because collisions were recorded."""
     until = cell.scenario.duration
     cost = [cell.seconds / until]
     return {"timing": cell.key, "copy": 0, "timed_s": until, "cost": cost, "wrapping": [0.0]}
 
 
-def is_busy(archive: Archive) -> bool:
+def is_busy(results: RunResults) -> bool:
     """Whether other work kept the machine so busy that times are not shown."""
-    return noise_floor(archive).floor > BUSY
+    return noise_floor(results).floor > BUSY
 
 
-def is_timed(archive: Archive, cells: Sequence[CellToTime]) -> bool:
-    """Whether the journal has a timing of each of the cells."""
-    return all(cell.key in archive.timings for cell in cells)
-
-
-def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame:
-    """timings.csv with `COLUMNS`: a row for each timed cell.
-
-    scenarios: by name, with their steps.
-    """
-    rows = []
-    for record in archive.records:
-        lines = archive.timings.get(record["cell"], {})
+def timings(results: RunResults) -> pd.DataFrame:
+    """timings.csv with `COLUMNS`: a row for each timed cell."""
+    rows: list[tuple[Any, ...]] = []
+    scenarios: dict[str, Scenario] = {}
+    for record in results.records:
+        lines = results.timings.get(record["cell"], {})
         if 0 not in lines:
             continue
         line, name = lines[0], f"{record['engine']}:{record['profile']}"
         low, cost, high = np.percentile(line["cost"], [25, 50, 75])
         again = lines.get(1, {}).get("cost", [np.nan])
-        scenario = scenarios[record["scenario"]]
+        scene = record["scene"]
+        scenario = scenarios[scene] = scenarios.get(scene) or results.sources[scene].scenario()
         rows.append(
             (
                 record["scenario"],
@@ -241,8 +235,8 @@ def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame
                 line["timed_s"],
                 len(line["cost"]),
                 *(1e6 * value for value in (cost, low, high)),
-                1e6 * binding(archive, name, scenario, record["substeps"]),
-                1e6 * median_of(archive.overheads.get((READ, name, scenario.name))),
+                1e6 * binding(results, name, scenario, record["substeps"]),
+                1e6 * median_of(results.overheads.get((READ, name, scenario.name))),
                 1e6 * float(np.median(line["wrapping"])),
                 1e6 * float(np.median(again)),
             )
@@ -250,10 +244,10 @@ def timings(archive: Archive, scenarios: Mapping[str, Scenario]) -> pd.DataFrame
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def binding(archive: Archive, name: str, scenario: Scenario, substeps: int) -> float:
+def binding(results: RunResults, name: str, scenario: Scenario, substeps: int) -> float:
     """s per simulated second that the steps and calls of an engine take in an empty world; nan if
     that is not known."""
-    step, singly = (median_of(archive.overheads.get((what, name, ""))) for what in (EMPTY, CALL))
+    step, singly = (median_of(results.overheads.get((what, name, ""))) for what in (EMPTY, CALL))
     return binding_of(step, singly, scenario, substeps)
 
 
@@ -262,7 +256,7 @@ def median_of(costs: Sequence[float] | None) -> float:
     return float(np.median(costs)) if costs else np.nan
 
 
-def noise_floor(archive: Archive) -> Noise:
+def noise_floor(results: RunResults) -> Noise:
     """The ratios of the two timings of a cell, over all cells timed twice."""
-    pairs = [lines for lines in archive.timings.values() if {0, 1} <= lines.keys()]
+    pairs = [lines for lines in results.timings.values() if {0, 1} <= lines.keys()]
     return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])

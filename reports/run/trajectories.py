@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import io
-from contextlib import nullcontext
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from crosscheck2d.scenarios.model import Collisions, Scenario, State, Trajectory, frozen
-from crosscheck2d.scenarios.regular import opened
+from crosscheck2d.scenarios.regular import all_of
 
 STATE = ("position", "velocity", "angle", "angular_velocity")
 COLLISIONS = {
@@ -31,12 +29,9 @@ def packed(trajectory: Trajectory, small: bool = False) -> bytes:
     return file.getvalue()
 
 
-def load_trajectory(file: Path | BinaryIO) -> Trajectory:
-    """The trajectory that `packed` wrote."""
-    with (
-        nullcontext(file) if not isinstance(file, Path) else opened(file) as there,
-        np.load(there) as saved,
-    ):
+def load_trajectory(file: Path | bytes) -> Trajectory:
+    """The trajectory that `packed` gave, from its bytes or a file."""
+    with np.load(io.BytesIO(all_of(file) if isinstance(file, Path) else file)) as saved:
         columns = {name: saved[key] for name, key in COLLISIONS.items()}
         collisions = Collisions(
             **{name: frozen(column, column.dtype) for name, column in columns.items()}

@@ -26,10 +26,10 @@ from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.machine import busy_cores
 from crosscheck2d.reports.run.playing import LOADING, ClockStart
+from crosscheck2d.reports.run.pool import Failure, allow
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.stepping import Stepping
 from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
-from crosscheck2d.reports.run.worker_process import Failure, allow
 from crosscheck2d.reports.speed.causes import cause_of
 from crosscheck2d.reports.speed.effort import doublings
 from crosscheck2d.reports.speed.measure import done

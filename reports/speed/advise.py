@@ -30,7 +30,7 @@ from crosscheck2d.reports.speed.advice import (
 from crosscheck2d.reports.speed.purposes import PURPOSES
 from crosscheck2d.reports.speed.scored_part import STARTS
 from crosscheck2d.reports.terminal.console import Console
-from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say, stoppable
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_table, print_texts
 
@@ -49,7 +49,7 @@ def give_advice(
     (checked,) = checked_scenes([scene], [], False, seed)
     rows = {name: row_of(name) for name in checked_engines(engines, ENGINES)}
     names = told_apart(rows, open_scene(checked, seed).scene)
-    with stoppable(), Progress() as progress:
+    with Progress() as progress:
         try:
             inquiry = Inquiry(checked, seed, os.cpu_count() or 1, progress)
             advice = inquiry.advice(purpose, bound, names)

@@ -14,16 +14,9 @@ from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
 from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
-from crosscheck2d.reports.run.folders import (
-    discard,
-    given_back,
-    open_part,
-    place_of,
-    replace_folder,
-)
-from crosscheck2d.reports.run.journal import Journal
 from crosscheck2d.reports.run.machine import about
-from crosscheck2d.reports.run.made import FolderKind, digest_of, writing
+from crosscheck2d.reports.run.made import digest_of
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.speed import figures
 from crosscheck2d.reports.speed.effort import FULL, QUICK
 from crosscheck2d.reports.speed.explained import sentence
@@ -33,21 +26,19 @@ from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_p
 from crosscheck2d.reports.speed.plan import SpeedPlan
 from crosscheck2d.reports.speed.results import QUIET, Results
 from crosscheck2d.reports.terminal.console import Console
-from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.exits import DONE, FAILED, broken_off, say
-from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
-SPEED = FolderKind("crosscheck speed", r"journal\.jsonl")
+SPEED = "crosscheck speed"
 
 
 def run_speed(
     scenes: Sequence[str],
     engines: Sequence[str],
     full: bool,
-    resume: bool,
+    fresh: bool,
     seed: int,
     out: Path,
     command: str,
@@ -67,38 +58,33 @@ def run_speed(
         whole=not named,
     )
     header = about(command, seed)
-    with opening(out):
-        out = place_of(out)
-        journal = open_part(out, SPEED)
-        with given_back(journal):
-            kept = kept_of(plan, header, journal, resume)
-    part = kept.journal.path.parent
-    with (
-        broken_off(part, lambda: f"The finished part is kept in {part}: ask again with --resume"),
-        kept.journal,
-    ):
-        measured, header = carry_out(plan, header, kept, resume)
-        if measured.errors.empty:
-            nothing_measured(part, measured)
-        results = Results(plan, measured)
-        write_all(part, results, header)
-        journal.close()
-        replace_folder(part, out, SPEED)
-    print_summary(results, str(out / PAGE))
+    with opening(out, SPEED, fresh) as store:
+        kept = kept_of(plan, header, store)
+        with keeping(out, lambda: "The finished part is kept: give the same command again"):
+            measured, header = carry_out(plan, header, kept)
+            if measured.errors.empty:
+                nothing_measured(measured)
+            results = Results(plan, measured)
+            write_all(store, results, header)
+        print_summary(results, str(store.folder / PAGE))
+        if kept.first < header["started"]:
+            Console().print(
+                f"Some of it was measured before, from {kept.first} on: --fresh measures again",
+                highlight=False,
+            )
     sys.exit(DONE)
 
 
-def nothing_measured(part: Path, measured: Measured) -> NoReturn:
-    """Delete the unfinished folder, and print why no error can be measured; exits 1."""
-    discard(part, SPEED)
+def nothing_measured(measured: Measured) -> NoReturn:
+    """Print why no error can be measured; exits 1."""
     for what, why in measured.left_out:
         say(f"{what}: {why}")
     say("no scene that was asked for has an exact answer, so no error can be measured")
     sys.exit(FAILED)
 
 
-def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume: bool) -> Kept:
-    """What is kept of an interrupted measurement of this plan, by the same versions on the same
+def kept_of(plan: SpeedPlan, header: Mapping[str, Any], store: Store) -> Kept:
+    """What is kept of an earlier measurement of this plan, by the same versions on the same
     machine."""
     files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
     files |= {name: row_of(name).source for name in plan.engines if name.endswith(OWN)}
@@ -109,32 +95,31 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], journal: Journal, resume
         "effort": asdict(plan.effort),
         "whole": plan.whole,
     }
-    return Kept(
-        journal, asked | {key: header[key] for key in ("seed", "versions", "machine")}, resume
-    )
+    return Kept(store, asked | {key: header[key] for key in ("seed", "versions", "machine")})
 
 
 def carry_out(
-    plan: SpeedPlan, header: dict[str, Any], kept: Kept, resume: bool
+    plan: SpeedPlan, header: dict[str, Any], kept: Kept
 ) -> tuple[Measured, dict[str, Any]]:
     """What was measured, and the header of tables and page."""
     with Progress() as progress:
-        if resume:
-            progress.note(f"Kept from the interrupted run: {counted(len(kept), 'task')}.")
         measured = Measuring(plan, progress, kept).run()
         progress.say("writing the tables and the page")
-        return measured, header | {"seconds": progress.seconds, "load": measured.busy}
+        times = {"seconds": progress.seconds, "load": measured.busy}
+        return measured, header | times | {"measured": kept.first}
 
 
-def write_all(folder: Path, results: Results, header: Mapping[str, Any]) -> None:
+def write_all(store: Store, results: Results, header: Mapping[str, Any]) -> None:
     """Tables first, then the page, so that what was measured is kept whatever happens to the
     page."""
-    with writing(folder, (MACHINE, *results.files, FIGURES, PAGE)):
-        put_text(folder / MACHINE, json.dumps(header, indent=1) + "\n")
-        results.write(folder)
-        if results.plan.whole:
-            figures.write(folder / FIGURES, results, header)
-        write_page(folder / PAGE, results, header)
+    store.export(MACHINE, json.dumps(header, indent=1) + "\n")
+    for name, table in results.files.items():
+        store.export(name, table.to_csv(index=False))
+    if results.plan.whole:
+        with store.exporting(FIGURES) as path:
+            figures.write(path, results, header)
+    with store.exporting(PAGE) as path:
+        write_page(path, results, header)
 
 
 def print_summary(results: Results, page: str) -> None:

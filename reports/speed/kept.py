@@ -1,75 +1,60 @@
-"""Stores the results of a measurement on disk, task by task, so that an interruption loses no
-finished task."""
+"""Stores the results of a measurement, task by task, so that an interruption loses no finished
+task."""
 
 from __future__ import annotations
 
 import json
-import os
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any
 
-from crosscheck2d.reports.run.folders import may_go_on
-from crosscheck2d.reports.run.journal import Journal, lines_of, plain
+from crosscheck2d.reports.run.cells import digest, source_hash
+from crosscheck2d.reports.run.store import Store
 
-LINES = {"header": (), "task": ("result",)}
-"""The kinds of lines of the journal -> what they hold: the measurement that was asked for; a task,
-and what it gave: rows as `ladder.errors_of`, `budget.budget_of`, `measure.sample_row`,
-`cheapest.closed_form` and `measure.size_rows` return them."""
-TEXT = {
-    *("scenario", "engine", "profile", "kind", "change", "status", "reason"),
-    *("contribution", "note", "truth", "stopped"),
-}
-"""The columns of results that hold text, which may be "nan"."""
+SOURCE = (
+    "reports/speed/**/*.py",
+    "reports/compare/**/*.py",
+    "reports/run/*.py",
+    "scenarios/**/*.py",
+)
+TASK = "measurement"  # the kind of the rows
 
 
 class Kept:
-    """The results of tasks: those of an interrupted measurement of the same plan, and new ones
-    as they come.
+    """The results of tasks: those of an earlier measurement of the same plan, and new ones as they
+    come.
 
-    A task is a tuple of strings and whole numbers. A result is what JSON can hold, and numbers
-    that are not finite.
+    A task is a tuple of strings and whole numbers. A result is what JSON can hold.
+
+    Attributes:
+        first: when the first of the results that were used was measured.
     """
 
-    def __init__(self, journal: Journal, header: dict[str, Any], resume: bool) -> None:
-        """Go on, if `resume` and the journal is of a measurement with the very same `header`.
+    def __init__(self, store: Store, plan: Mapping[str, Any]) -> None:
+        """`plan`: all that decides the results: the request, versions and machine."""
+        self.store, self.plan = store, json.dumps([plan, source_hash(SOURCE)], sort_keys=True)
+        self.first = now()
 
-        Raises:
-            FolderTaken: as `may_go_on`.
-            ValueError: as `lines_of`.
-        """
-        self.journal, folder = journal, journal.path.parent
-        lines = [line for _, _, line in lines_of(folder, LINES)]
-        headers = [line["header"] for line in lines if "header" in line]
-        tasks = [line for line in lines if "task" in line]
-        # two, if somebody has joined two journals
-        same = headers == [json.loads(json.dumps(plain(header)))]
-        may_go_on(folder, len(tasks), same, resume)
-        self.results = {json.dumps(line["task"]): line["result"] for line in tasks if same}
-        if not same:
-            os.truncate(journal.path, 0)
-            journal.append({"header": header})
-
-    def __len__(self) -> int:
-        """The number of tasks that the interrupted measurement finished."""
-        return len(self.results)
+    def key(self, task: tuple[Any, ...]) -> str:
+        """The key of the row of a task."""
+        return digest(f"{self.plan} {json.dumps(task)}".encode())
 
     def __contains__(self, task: tuple[Any, ...]) -> bool:
-        """Whether the interrupted measurement finished this task."""
-        return json.dumps(task) in self.results
+        """Whether the task has a result."""
+        return self.store.get(TASK, self.key(task)) is not None
 
     def __getitem__(self, task: tuple[Any, ...]) -> Any:
         """The result of the task."""
-        return numbered(self.results[json.dumps(task)])
+        row = self.store.get(TASK, self.key(task))
+        assert row is not None
+        self.first = min(self.first, row.value["at"])
+        return row.value["result"]
 
     def add(self, task: tuple[Any, ...], result: Any) -> None:
         """Store the result of a task."""
-        self.journal.append({"task": task, "result": result})
+        self.store.put(TASK, self.key(task), {"at": now(), "result": result})
 
 
-def numbered(value: Any) -> Any:
-    """The inverse of `plain`: "nan", "inf" and "-inf" become numbers again, except in columns of
-    text."""
-    if isinstance(value, dict):
-        return {key: item if key in TEXT else numbered(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [numbered(item) for item in value]
-    return float(value) if value in ("nan", "inf", "-inf") else value
+def now() -> str:
+    """The date and time."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

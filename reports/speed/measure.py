@@ -15,10 +15,9 @@ import pandas as pd
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.reports.run.machine import busy_cores
-from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.timing import Sample
-from crosscheck2d.reports.run.worker_process import Failure
 from crosscheck2d.reports.speed import budget, cheapest, ladder, scored_part, sizes
 from crosscheck2d.reports.speed.estimate import estimate
 from crosscheck2d.reports.speed.kept import Kept

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import pandas as pd
 
@@ -13,7 +12,6 @@ from crosscheck2d.reports.run.timing import Noise, noise_of
 from crosscheck2d.reports.speed import cheapest, explained, tables, versus
 from crosscheck2d.reports.speed.measure import Measured
 from crosscheck2d.reports.speed.plan import SpeedPlan
-from crosscheck2d.reports.terminal.foreign_text import put_text
 from crosscheck2d.scenarios.model import Scenario
 
 QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
@@ -104,11 +102,6 @@ class Results:
             "speed_versus": self.versus,
         }
         return {f"{name}.csv": table for name, table in tables.items()}
-
-    def write(self, folder: Path) -> None:
-        """The tables as CSV files."""
-        for name, table in self.files.items():
-            put_text(folder / name, table.to_csv(index=False))
 
 
 def poolable(table: pd.DataFrame, asked: dict[str, Scenario]) -> pd.DataFrame:

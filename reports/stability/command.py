@@ -13,16 +13,8 @@ import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.run.arguments import checked_engines, opening, unknown
-from crosscheck2d.reports.run.folders import (
-    given_back,
-    may_go_on,
-    open_part,
-    place_of,
-    replace_folder,
-)
-from crosscheck2d.reports.run.journal import Journal
-from crosscheck2d.reports.run.made import FolderKind, writing
-from crosscheck2d.reports.run.runner import affordable
+from crosscheck2d.reports.run.pool import affordable
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import Limit
 from crosscheck2d.reports.stability.maps import MAPS
@@ -31,7 +23,6 @@ from crosscheck2d.reports.stability.page import write_page
 from crosscheck2d.reports.stability.results import (
     StabilityPlan,
     StabilityResults,
-    Task,
     carry_out,
     case_named,
     done_before,
@@ -44,8 +35,7 @@ from crosscheck2d.reports.stability.touching import TOUCHING, AtGap
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from crosscheck2d.reports.stability.vary import VARIES, cannot_vary
 from crosscheck2d.reports.terminal.console import Console
-from crosscheck2d.reports.terminal.exits import DONE, FAILED, Unusable, broken_off, refuse, say
-from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.exits import DONE, FAILED, Unusable, keeping, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_table, print_texts
 from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
@@ -54,8 +44,8 @@ SEE = (
     "limits.csv and stability.html have the names of all, or tests/data/stability_limits.csv; for"
     " --vary see --help"
 )
-LIMITS, LAWS, MAP, PAGE = FILES = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
-STABILITY = FolderKind("crosscheck stability", r"journal\.jsonl")
+LIMITS, LAWS, MAP, PAGE = ("limits.csv", "laws.csv", "maps.csv", "stability.html")
+STABILITY = "crosscheck stability"
 
 
 def find_limits(
@@ -63,7 +53,7 @@ def find_limits(
     vary: Sequence[str],
     engines: Sequence[str],
     full: bool,
-    resume: bool,
+    fresh: bool,
     out: Path,
     workers: int,
     command: str,
@@ -82,56 +72,39 @@ def find_limits(
         cases, maps, touching, chosen, form, affordable(workers or os.cpu_count() or 1), command
     )
     with taking_part(added):
-        find(plan, resume, out)
+        find(plan, fresh, out)
 
 
-def find(plan: StabilityPlan, resume: bool, out: Path) -> NoReturn:
+def find(plan: StabilityPlan, fresh: bool, out: Path) -> NoReturn:
     """Find what was asked for, which was checked; exits as `find_limits`."""
     if not tasks_of(plan) and {*plan.engines} <= {*WITH_FRICTION_ONLY}:
         refuse([f"--engine {name}: plays as {ENGINES[name].bits_of} here" for name in plan.engines])
-    with opening(out):
-        out = place_of(out)
-        journal = open_part(out, STABILITY)
-        with given_back(journal):
-            done = gone_on_with(journal, plan, resume)
-    part = journal.path.parent
-    kept = f"The finished part is kept in {part}: ask again with --resume"
-    tasks = [task for task in tasks_of(plan) if task not in done]
-    Console(stderr=True).print(f"{expected(tasks, plan.workers)}.", highlight=False)
-    with broken_off(part, lambda: kept), journal, Progress() as progress:
-        carry_out(plan, journal, done, progress)
-        progress.say("writing the tables and the page")
-        try:
-            found = write_files(part)
-        except SceneFileError as fault:  # it was there when all began
-            raise Unusable(str(fault)) from fault
-        journal.close()
-        replace_folder(part, out, STABILITY)
-    finish(found, out)
+    with opening(out, STABILITY, fresh) as store:
+        tasks = [task for task in tasks_of(plan) if task not in done_before(plan, store)]
+        Console(stderr=True).print(f"{expected(tasks, plan.workers)}.", highlight=False)
+        kept = "The finished part is kept: give the same command again"
+        with keeping(out, lambda: kept), Progress() as progress:
+            carry_out(plan, store, progress)
+            progress.say("writing the tables and the page")
+            try:
+                found = write_files(store)
+            except SceneFileError as fault:  # it was there when all began
+                raise Unusable(str(fault)) from fault
+        finish(found, store.folder)
 
 
-def gone_on_with(journal: Journal, plan: StabilityPlan, resume: bool) -> set[Task]:
-    """The tasks of the plan that an interrupted run finished; raises as `may_go_on`, so that no
-    other results are lost."""
-    had, done = done_before(journal.path.parent, plan)
-    may_go_on(journal.path.parent, had, bool(done), resume)
-    if not done:
-        os.truncate(journal.path, 0)
-    return done
-
-
-def write_files(folder: Path) -> StabilityResults:
-    """limits.csv, maps.csv, laws.csv and stability.html from the journal; returns what it holds."""
-    results = read(folder)
+def write_files(store: Store) -> StabilityResults:
+    """limits.csv, maps.csv, laws.csv and stability.html from the rows; returns what they hold."""
+    results = read(store)
     laws = [(one.name, one.engine, *at[:-1]) for one in results.laws for at in one.gaps]
     cells = [(one.name, one.engine, *cell) for one in results.maps for cell in one.cells]
-    with writing(folder, FILES):
-        put_text(folder / LIMITS, table(results.limits).to_csv(index=False))
-        columns = ["scene", "engine", *AtGap._fields[:-1]]
-        put_text(folder / LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
-        columns = ["map", "engine", "x", "y", "reading", "failed", "verdict", "event"]
-        put_text(folder / MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
-        write_page(folder / PAGE, results)
+    store.export(LIMITS, table(results.limits).to_csv(index=False))
+    columns = ["scene", "engine", *AtGap._fields[:-1]]
+    store.export(LAWS, pd.DataFrame(laws, columns=columns).to_csv(index=False))
+    columns = ["map", "engine", "x", "y", "reading", "failed", "verdict", "event"]
+    store.export(MAP, pd.DataFrame(cells, columns=columns).to_csv(index=False))
+    with store.exporting(PAGE) as path:
+        write_page(path, results)
     return results
 
 

@@ -67,7 +67,7 @@ class MapOf:
 
     @staticmethod
     def from_record(record: dict[str, Any]) -> MapOf:
-        """From a line of the journal."""
+        """From the value of its row."""
         cells = tuple((x, y, float(value), *failure) for x, y, value, *failure in record["cells"])
         return MapOf(record["name"], record["engine"], cells, record["status"])
 

@@ -1,16 +1,14 @@
-"""Carries out the stability report: every case on every engine, written to a journal as each one
+"""Carries out the stability report: every case on every engine, a row for each as it
 ends, and the table of limits."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from math import nan
-from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
@@ -19,11 +17,11 @@ import pandas as pd
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
 from crosscheck2d.adapters.npm_packages import version_of
-from crosscheck2d.reports.run.journal import Journal, lines_of, of_another_version, plain, unusable
+from crosscheck2d.reports.run.cells import content_key, source_hash
 from crosscheck2d.reports.run.machine import about
-from crosscheck2d.reports.run.made import digest_of, writing
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.made import digest_of
+from crosscheck2d.reports.run.pool import Failure, run_all
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
 from crosscheck2d.reports.stability.failures import with_failure
@@ -42,7 +40,6 @@ from crosscheck2d.reports.stability.touching import TOUCHING, LawOf, law_of
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from crosscheck2d.reports.stability.vary import case_of_file
 from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.foreign_text import put_text
 from crosscheck2d.reports.terminal.progress import Progress
 
 COLUMNS = (
@@ -50,14 +47,8 @@ COLUMNS = (
     *("seeds", "reason", "verdict", "failed_fraction", "runs", "monotone", "spacing", "tested"),
     *("source", "event", "form", "cause"),
 )
-LINES = {
-    "header": ("seed", "started", "versions", "machine", "form", "files"),
-    "task": (),
-    "footer": ("tasks", "seconds"),
-}
-"""The kinds of lines of the journal -> what they hold: what was asked for, and the versions that
-played it; a `Task`, with a `Limit`, a `MapOf` or a `LawOf` under the name of its kind; how much was
-done."""
+SOURCE = ("reports/stability/**/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
+HEADER = "stability", "plan"  # kind and key of the row with what was asked for
 # s of processor time that a search takes in the quick form, the mean of all engines (1200 searches
 # on one machine): of the cases that take longest, and of the mean of the others
 SECONDS = {
@@ -105,6 +96,14 @@ class StabilityPlan:
         """What decides the numbers, npm packages too."""
         packages = dict.fromkeys(row.package for row in self.added.values() if row.package)
         return {**about("", 0)["versions"], **{name: version_of(name) for name in packages}}
+
+    def key(self, task: Task) -> str:
+        """The key of the row of a task: a hash of all that decides its result."""
+        path = task.name.rpartition(":")[0]
+        row = self.added.get(task.engine)
+        own = row.source if row is not None else ""
+        what = repr(task), repr(self.versions), digest_of(path) if path else "", own
+        return content_key(*what, source_hash(SOURCE))
 
 
 @dataclass(frozen=True)
@@ -162,30 +161,28 @@ def found_limit(task: Task) -> Limit:
     return replace(limit, seconds=process_time() - started)
 
 
-def carry_out(
-    plan: StabilityPlan, journal: Journal, done: Collection[Task], progress: Progress
-) -> None:
-    """Do every task that is not in `done`; all results go into the journal's folder."""
-    folder = journal.path.parent
-    named = [*plan.cases, *(name for name in plan.added if name not in FETCHED)]
-    paths = [name.rpartition(":")[0] for name in named]
-    files = {path: digest_of(path) for path in paths if path}
-    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form, "files": files}
-    journal.append({"header": header})
-    with writing(folder, ["machine.json"]):
-        put_text(folder / "machine.json", json.dumps(plain(header), indent=2) + "\n")
-    wanted = tasks_of(plan)
-    tasks: dict[Any, Callable[[], Any]] = {
-        task: partial(task, plan.added) for task in wanted if task not in done
+def done_before(plan: StabilityPlan, store: Store) -> set[Task]:
+    """The tasks of the plan that have a row and ended well."""
+    rows = {task: store.get(task.kind, plan.key(task)) for task in tasks_of(plan)}
+    return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
+
+
+def carry_out(plan: StabilityPlan, store: Store, progress: Progress) -> None:
+    """Do every task that has no row yet, and write the row of each as it ends."""
+    tasks, done = {task: plan.key(task) for task in tasks_of(plan)}, done_before(plan, store)
+    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form}
+    wanted = [(key, asdict(task)) for task, key in tasks.items()]
+    store.put(*HEADER, header | {"tasks": wanted})
+    work: dict[Any, Callable[[], Any]] = {
+        task: partial(task, plan.added) for task in tasks if task not in done
     }
-    progress.start(len(tasks), len(wanted))
-    with closing(run_all(tasks, plan.workers, FORMS[plan.form].timeout)) as results:
+    progress.start(len(work), len(tasks))
+    with closing(run_all(work, plan.workers, FORMS[plan.form].timeout)) as results:
         for task, result in results:
             reason = result.reason if isinstance(result, Failure) else ""
             result = failed(task, result) if isinstance(result, Failure) else result
-            journal.append({"task": asdict(task), task.kind: asdict(result)})
+            store.put(task.kind, tasks[task], asdict(result))
             progress.done(f"{task.name}  {task.engine}", result.status, reason)
-    journal.append({"footer": {"tasks": len(tasks), "seconds": progress.seconds}})
 
 
 def tasks_of(plan: StabilityPlan) -> list[Task]:
@@ -234,10 +231,20 @@ class StabilityResults(NamedTuple):
         return [*self.limits, *self.maps, *self.laws]
 
 
-def read(folder: Path) -> StabilityResults:
-    """The stability report in a folder, in reading order; raises `ValueError` if its journal
-    cannot be used."""
-    headers, results = journalled(folder)
+def read(store: Store) -> StabilityResults:
+    """The stability report in a folder, in reading order."""
+    plan = store.get(*HEADER)
+    assert plan is not None
+    made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
+        "limit": limit_from,
+        "map": MapOf.from_record,
+        "law": LawOf.from_record,
+    }
+    results: dict[Task, Limit | MapOf | LawOf] = {}
+    for key, wanted in plan.value["tasks"]:
+        task = Task(**wanted)
+        if row := store.get(task.kind, key):
+            results[task] = made[task.kind](row.value)
     order = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
     engines = engines_now()
 
@@ -248,36 +255,7 @@ def read(folder: Path) -> StabilityResults:
     limits = explained([result for result in ordered if isinstance(result, Limit)])
     maps = [result for result in ordered if isinstance(result, MapOf)]
     laws = [result for result in ordered if isinstance(result, LawOf)]
-    return StabilityResults(limits, maps, laws, headers[-1])
-
-
-def journalled(folder: Path) -> tuple[list[dict[str, Any]], dict[Task, Limit | MapOf | LawOf]]:
-    """The headers in a folder's journal, and the result of every task; if a task has two lines,
-    the later one counts.
-
-    Raises:
-        ValueError: as `lines_of`, or a line is of an engine that is not asked for.
-    """
-    made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
-        "limit": limit_from,
-        "map": MapOf.from_record,
-        "law": LawOf.from_record,
-    }
-    headers: list[dict[str, Any]] = []
-    results: dict[Task, Limit | MapOf | LawOf] = {}
-    engines = engines_now()
-    for number, kind, line in lines_of(folder, LINES):
-        if kind == "header":
-            headers.append(line["header"])
-        elif kind == "task":
-            try:
-                task = Task(**line["task"])
-                results[task] = made[task.kind](line[task.kind])
-            except (KeyError, TypeError, ValueError):
-                raise of_another_version(folder, number) from None
-            if task.engine not in engines:  # an engine's own file
-                raise unusable(folder, number, f"is of {task.engine}, which is not asked for")
-    return headers, results
+    return StabilityResults(limits, maps, laws, plan.value)
 
 
 def engines_now() -> list[str]:
@@ -288,7 +266,7 @@ def engines_now() -> list[str]:
 
 
 def limit_from(record: dict[str, Any]) -> Limit:
-    """The limit in a line of the journal, in which numbers that are not finite are text."""
+    """The limit in the value of a row."""
     trials = (Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
     numbers = floats(record, "works_at", "fails_at", "spacing", "seconds", "ratio")
     whole = {"trials": tuple(trials), "mechanisms": tuple(record["mechanisms"])}
@@ -298,23 +276,6 @@ def limit_from(record: dict[str, Any]) -> Limit:
 def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
     """These fields of a record as numbers; other fields may hold the text "nan"."""
     return {name: float(record[name]) for name in names}
-
-
-def done_before(folder: Path, plan: StabilityPlan) -> tuple[int, set[Task]]:
-    """How many tasks ended well in an interrupted run, and those of the plan, if versions and scene
-    files are the same.
-
-    Raises:
-        ValueError: the journal is none of a stability report.
-    """
-    headers, results = journalled(folder)
-    well = {task for task, result in results.items() if result.status == "ok"}
-    same = all(
-        header["versions"] == plan.versions
-        and all(digest_of(path) == digest for path, digest in header["files"].items())
-        for header in headers
-    )
-    return len(well), well & set(tasks_of(plan)) if same else set()
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:

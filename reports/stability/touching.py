@@ -76,7 +76,7 @@ class LawOf:
 
     @staticmethod
     def from_record(record: dict[str, Any]) -> LawOf:
-        """From a line of the journal, where what is not finite is text."""
+        """From the value of its row."""
         gaps = []
         for gap, law, off, momentum, energy, velocity in record["gaps"]:
             rows = tuple((float(x), float(y)) for x, y in velocity)

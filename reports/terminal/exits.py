@@ -13,20 +13,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from crosscheck2d.adapters.system import REPEATED, every, signals_wait
 from crosscheck2d.reports.terminal.foreign_text import legible
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 STATUS = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
-AGAIN = 1.0  # s between two repetitions of a signal
-
-
-class Stopped(KeyboardInterrupt):
-    """Ctrl-C, or SIGTERM from a batch system or a shutdown: both end a command in the same way."""
-
-    def __init__(self, status: int = INTERRUPTED) -> None:
-        super().__init__()
-        self.status = status
 
 
 class FolderTaken(Exception):
@@ -37,115 +27,75 @@ class Unusable(ValueError):
     """A file of a run does not fit the others; says which, why, and what to do."""
 
 
-class SignalHandler:
-    """The handler of both signals. `status`: of the first that came, 0 if none has."""
+class Signals:
+    """The handler of Ctrl-C and of SIGTERM, with which a batch system or a shutdown ends a command:
+    both raise `KeyboardInterrupt`. `status`: the exit status of the first that came, or 0."""
 
     def __init__(self) -> None:
         self.status = DONE
 
     def __call__(self, number: int, _: object) -> NoReturn:
-        """Raise `Stopped`, and again every `AGAIN` s, because an exception in a destructor or a
-        callback from C is lost."""
-        self.status = self.status or STATUS.get(signal.Signals(number), INTERRUPTED)
-        every(AGAIN)
-        raise Stopped(self.status)
+        """Stop the command."""
+        self.status = self.status or STATUS[signal.Signals(number)]
+        raise KeyboardInterrupt
 
 
-@contextmanager
-def stoppable() -> Iterator[SignalHandler]:
-    """Context in which Ctrl-C and SIGTERM raise `Stopped`; nesting changes nothing.
-
-    An ignored SIGINT stays ignored, as in a shell's background job.
-    """
-    before = {number: signal.getsignal(number) for number in (*STATUS, REPEATED)}
-    outer = before[signal.SIGTERM]
-    if isinstance(outer, SignalHandler):
-        yield outer
-        return
-    signals = SignalHandler()
-    for number in {*STATUS, REPEATED}:
-        if before[number] is not signal.SIG_IGN:
-            signal.signal(number, signals)
-    try:
-        yield signals
-    finally:
-        with ignoring_signals():
-            pass
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-@contextmanager
-def ignoring_signals() -> Iterator[None]:
-    """Context in which an ending command ignores both signals; the timer stays off afterwards."""
-    every(0)
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in STATUS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-@contextmanager
-def deferring_signals() -> Iterator[None]:
-    """Context for short work that must not be interrupted: a signal is handled after it."""
-    with signals_wait({*STATUS, REPEATED}):
-        yield
+def signal_status() -> int:
+    """The exit status of the signal that stops this command; 0 if none has come."""
+    handler = signal.getsignal(signal.SIGTERM)
+    return handler.status if isinstance(handler, Signals) else DONE
 
 
 @contextmanager
 def ends_on_signals() -> Iterator[None]:
     """Context of a whole command: a signal ends it with status 130 or 143, without waiting for
-    threads.
-
-    The work of a thread is in another process, which ends with this one.
-    """
-    with stoppable() as signals:
-        try:
-            yield
-            status: str | int | None = DONE
-        except SystemExit as end:
-            status = end.code
-        except KeyboardInterrupt:
-            status = INTERRUPTED
-        with ignoring_signals():
-            if not signals.status:
-                sys.exit(status)
-            for stream in (sys.stdout, sys.stderr):
-                with suppress(OSError, ValueError):
-                    stream.flush()
-            # Typer makes 130 of any KeyboardInterrupt.
-            os._exit(
-                signals.status if status == INTERRUPTED or not isinstance(status, int) else status
-            )
+    threads. An ignored signal stays ignored, as in a shell's background job."""
+    signals = Signals()
+    before = {number: signal.getsignal(number) for number in STATUS}
+    for number in STATUS:
+        if before[number] is not signal.SIG_IGN:
+            signal.signal(number, signals)
+    status: str | int | None = DONE
+    try:
+        yield
+    except SystemExit as end:
+        status = end.code
+    except KeyboardInterrupt:
+        status = INTERRUPTED
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if signals.status else handler)
+    if not signals.status:
+        sys.exit(status)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    # Typer makes 130 of any KeyboardInterrupt.
+    os._exit(signals.status if status == INTERRUPTED or not isinstance(status, int) else status)
 
 
 @contextmanager
-def broken_off(part: Path, kept: Callable[[], str]) -> Iterator[None]:
-    """Context for long work that writes into `part`: if it is interrupted, or the disk is full, it
+def keeping(out: Path, kept: Callable[[], str]) -> Iterator[None]:
+    """Context for long work that writes into `out`: if it is interrupted, or the disk is full, it
     prints what is `kept`.
 
-    Exits 130 after Ctrl-C, 143 after SIGTERM, 1 if something cannot or may no longer be written, 2
-    if earlier files do not fit.
+    Exits 130 after a signal, 1 if something cannot or may no longer be written, 2 if what is there
+    cannot be used.
     """
-    with stoppable():
-        try:
-            yield
-        except KeyboardInterrupt as stopped:
-            with ignoring_signals():
-                status = stopped.status if isinstance(stopped, Stopped) else INTERRUPTED
-                say(f"\n{'Terminated' if status == TERMINATED else 'Interrupted'}. {kept()}")
-                sys.exit(status)
-        except FolderTaken as fault:
-            say(f"{fault}. {kept()}")
-            sys.exit(FAILED)
-        except OSError as fault:
-            say(f"cannot write to {part}: {fault.strerror or fault}. {kept()}")
-            sys.exit(FAILED)
-        except Unusable as fault:
-            say(f"{fault}. {kept()}")
-            sys.exit(BAD_INPUT)
+    try:
+        yield
+    except KeyboardInterrupt:
+        say(f"\nInterrupted. {kept()}")
+        sys.exit(INTERRUPTED)
+    except FolderTaken as fault:
+        say(f"{fault}. {kept()}")
+        sys.exit(FAILED)
+    except OSError as fault:
+        say(f"cannot write to {fault.filename or out}: {fault.strerror or fault}. {kept()}")
+        sys.exit(FAILED)
+    except Unusable as fault:
+        say(f"{fault}. {kept()}")
+        sys.exit(BAD_INPUT)
 
 
 def refuse(faults: Sequence[str]) -> NoReturn:

@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import EPIPE
 from typing import Any
 
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, say
@@ -47,7 +48,7 @@ def printing() -> Iterator[None]:
         yield
     except SystemExit as end:
         sys.stdout.flush()
-        if outlet.fault is None:
+        if outlet.fault is None or outlet.fault.errno == EPIPE:  # as of `crosscheck list | head`
             raise
         say(
             f"cannot write to standard output: {outlet.fault.strerror}; not all was printed, but"

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import NoReturn
 
 import pandas as pd
 
 from crosscheck2d.reports.run.arguments import opening, unknown
-from crosscheck2d.reports.run.folders import made_anew, place_of
-from crosscheck2d.reports.run.made import FolderKind, may_replace, writing
+from crosscheck2d.reports.run.cells import content_key, source_hash
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.terminal.console import Console
-from crosscheck2d.reports.terminal.exits import DONE, broken_off, refuse
-from crosscheck2d.reports.terminal.foreign_text import put_text
+from crosscheck2d.reports.terminal.counts import counted
+from crosscheck2d.reports.terminal.exits import DONE, keeping, refuse
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.reports.terminal.tables import print_table
 from crosscheck2d.reports.tune.search import (
@@ -28,47 +28,57 @@ from crosscheck2d.reports.tune.search import (
     SettingsSearch,
 )
 
-NAME = "matched.csv"
-TUNE = FolderKind("crosscheck tune")
+NAME, TUNE = "matched.csv", "crosscheck tune"
+SOURCE = ("reports/tune/*.py", "reports/compare/**/*.py", "scenarios/**/*.py")
+NUMBERS = ("same_dt", "cost", "equal_cost")  # columns in which an empty field is NaN
 
 
-def tune(engines: Sequence[str], out: Path) -> NoReturn:
+def tune(engines: Sequence[str], fresh: bool, out: Path) -> NoReturn:
     """Search the settings of `engines`, `UNASKED` if none is named; write matched.csv into
     `out`; exits 0.
 
     The table of an engine is written as soon as its search has ended. Exits 2 on a name that is no
-    engine with settings, or where `out` may not be written, 130 and 143 when broken off.
+    engine with settings, or where `out` may not be written, 130 and 143 when interrupted.
     """
     if faults := [unknown("engine", name, TUNED) for name in engines if name not in TUNED]:
         refuse(faults)
-    with opening(out):
-        out = place_of(out)
-        may_replace(out, TUNE)
-        out.parent.mkdir(parents=True, exist_ok=True)
-        # so that it is known before the search whether it can be written
-        with TemporaryFile(dir=out.parent):
-            pass
     tables: list[pd.DataFrame] = []
     with (
-        broken_off(
-            out,
-            lambda: (
-                f"The finished searches are in {out / NAME}." if tables else "No search finished."
-            ),
-        ),
+        opening(out, TUNE, fresh) as store,
+        keeping(out, lambda: f"{counted(len(tables), 'search', 'searches')} finished."),
         Progress() as bar,
     ):
         for engine in dict.fromkeys(engines or UNASKED):
-            bar.say(f"{engine}: the exact answers, and the present settings")
-            search = SettingsSearch(engine, say=bar.note)
-            bar.say(f"{engine}: pairs of settings, and setting by setting")
-            found = pd.concat([*tables, search.run()])
-            with made_anew(out, TUNE, "--out") as part, writing(part, [NAME]):
-                put_text(part / NAME, found.to_csv(index=False))
-            tables = [found]
+            tables.append(read_table(searched(engine, store, bar)))
+            found = pd.concat(tables)
+            store.export(NAME, found.to_csv(index=False))
     show(found)
     Console().print(f"\n{out / NAME}", style="bold", highlight=False, soft_wrap=True)
     sys.exit(DONE)
+
+
+def searched(engine: str, store: Store, bar: Progress) -> bytes:
+    """The table of an engine, from its row or from a new search."""
+    key = content_key(engine, source_hash(SOURCE))
+    row = store.get("search", key)
+    if row is None:
+        bar.say(f"{engine}: the exact answers, and the present settings")
+        search = SettingsSearch(engine, say=bar.note)
+        bar.say(f"{engine}: pairs of settings, and setting by setting")
+        row = store.put("search", key, None, search.run().to_csv(index=False).encode())
+    return row.blob
+
+
+def read_table(csv: bytes) -> pd.DataFrame:
+    """A table of a search, bit for bit as written."""
+    empty = {column: [""] for column in NUMBERS}
+    return pd.read_csv(
+        BytesIO(csv),
+        keep_default_na=False,
+        na_values=empty,
+        dtype={"value": str},
+        float_precision="round_trip",
+    )
 
 
 def show(table: pd.DataFrame) -> None:

@@ -1,5 +1,5 @@
-"""A cache of truth records on disk, in the user's cache folder. It only saves time: every record
-can be computed again."""
+"""A cache of truth records: rows of one file in the user's cache folder. It only saves time: every
+record can be computed again."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ import hashlib
 import io
 import json
 import os
-import tempfile
-import zipfile
-import zlib
-from contextlib import suppress
+from contextlib import closing, suppress
+from errno import ENOENT
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,11 +17,12 @@ import numpy as np
 from platformdirs import user_cache_path
 
 from crosscheck2d.scenarios.model import Scenario, frozen
-from crosscheck2d.scenarios.regular import opened
+from crosscheck2d.scenarios.rows import Damaged, Rows
 
 HERE = Path(__file__).parent
-ARRAYS = {"legs": 15, "events": 5, "outcomes": 4, "orders": 3}
-"""The arrays of a record and how many columns each has."""
+FILE, KIND = "exact_answers.sqlite", "record"
+ARRAYS = ("legs", "events", "outcomes", "orders")
+"""The arrays of a record."""
 NUMBERS = ("horizon", "error_bound", "bits", "method", "reason", "float64_horizon", "remains")
 
 
@@ -75,86 +74,53 @@ def source_hash(folder: Path = HERE) -> str:
 
 
 def look_up(key: str) -> dict[str, Any] | None:
-    """The fields of the record cached under `key`; None if there is none, or if it cannot be read
-    in full."""
+    """The fields of the record cached under `key`; None if there is none that can be read."""
+    with suppress(OSError, Damaged), closing(opened_rows()) as rows:
+        row = rows.get(KIND, key)
+        return None if row is None else unpacked(row.blob)
+    return None
+
+
+def keep(key: str, fields: dict[str, Any]) -> bool:
+    """Write the fields of a record under `key`, all or nothing; False if that cannot be done."""
+    with suppress(OSError, Damaged), closing(opened_rows()) as rows:
+        rows.put(KIND, key, None, packed(fields), again=False)
+        return True
+    return False
+
+
+def fault() -> str:
+    """Why nothing is cached, as a sentence; "" if the cache can be used."""
+    try:
+        opened_rows().close()
+    except OSError as error:
+        named = f"{error.filename}: " if error.filename else ""
+        return f"exact answers are not kept for later: {named}{error.strerror or error}"
+    except Damaged as error:
+        return f"exact answers are not kept for later: {error}"
+    return ""
+
+
+def opened_rows() -> Rows:
+    """The rows of the cache, into which many processes write; raises `OSError` or `Damaged`."""
     where = folder()
-    return None if where is None else unpacked(where / f"{key}.npz")
-
-
-# Raised when an archive is damaged or not one of ours; the record then counts as missing. One wrong
-# bit can look like an unknown compression (NotImplementedError), an encrypted file (RuntimeError),
-# or an array larger than the memory (MemoryError).
-UNREADABLE = (
-    OSError,
-    ValueError,
-    LookupError,
-    EOFError,
-    TypeError,
-    RuntimeError,
-    MemoryError,
-    SyntaxError,
-    zipfile.BadZipFile,
-    zlib.error,
-    RecursionError,
-)
+    if where is None:
+        raise FileNotFoundError(ENOENT, "there is no home folder")
+    where.mkdir(parents=True, exist_ok=True)
+    return Rows(where / FILE)
 
 
 def packed(fields: dict[str, Any]) -> bytes:
-    """The fields of a record as the bytes of an .npz."""
+    """The fields of a record as bytes."""
     file = io.BytesIO()
     numbers = json.dumps({name: fields[name] for name in NUMBERS})
     np.savez_compressed(file, **{name: fields[name] for name in ARRAYS}, numbers=np.array(numbers))
     return file.getvalue()
 
 
-def unpacked(path: Path) -> dict[str, Any] | None:
-    """The fields of the record in a file written from `packed` bytes; None if it cannot be read in
-    full."""
-    try:
-        with opened(path) as file, np.load(file, allow_pickle=False) as saved:
-            arrays = {name: frozen(saved[name]) for name in ARRAYS}
-            numbers = json.loads(str(saved["numbers"]))
-    except UNREADABLE:
-        return None
-    fits = all(
-        arrays[name].shape[1:] == (width,) for name, width in ARRAYS.items()
-    ) and has_valid_types(numbers)
-    return arrays | numbers | {"remains": tuple(numbers["remains"])} if fits else None
-
-
-def has_valid_types(numbers: Any) -> bool:
-    """Whether `numbers` has the names and types of `NUMBERS`: the file may have been edited."""
-    if not isinstance(numbers, dict) or set(numbers) != set(NUMBERS):
-        return False
-    of = {type(numbers[name]) for name in ("horizon", "error_bound", "float64_horizon")}
-    texts = numbers["remains"]
-    return (
-        of <= {int, float}
-        and type(numbers["bits"]) is int
-        and all(isinstance(numbers[name], str) for name in ("method", "reason"))
-        and isinstance(texts, list)
-        and all(isinstance(text, str) for text in texts)
-    )
-
-
-def keep(key: str, fields: dict[str, Any]) -> bool:
-    """Write the fields of a record under `key`, all or nothing; False if the folder cannot be
-    written to."""
-    where = folder()
-    if where is None:
-        return False
-    temporary = None
-    try:
-        where.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=where, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            file.write(packed(fields))
-        # Another process may write the same record at the same time: the last rename wins, and both
-        # files are complete.
-        os.replace(temporary, where / f"{key}.npz")
-    except OSError:
-        if temporary:
-            with suppress(OSError):
-                os.unlink(temporary)
-        return False
-    return True
+def unpacked(data: bytes) -> dict[str, Any]:
+    """The fields of the record that `packed` gave."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as saved:
+        numbers = json.loads(str(saved["numbers"]))
+        arrays = {name: frozen(saved[name]) for name in ARRAYS}
+    return {**arrays, **numbers} | {"remains": tuple(numbers["remains"])}

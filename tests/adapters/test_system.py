@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -47,7 +46,7 @@ for package in ("adapters", "reference_impl", "reports", "scenarios"):
             name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
             importlib.import_module(f"crosscheck2d.{name}")
 from crosscheck2d.adapters import system
-assert not system.KERNEL and not system.ALARMS
+assert not system.KERNEL
 try:
     import fcntl
 except ImportError as error:
@@ -128,7 +127,7 @@ LIMITS = {"kernel": "the kernel", "portable": "a thread that watches the process
 def test_a_bad_engine_ends_the_same_on_the_portable_branch():
     """The tests of the workers and of hand-written solvers themselves, on the other branch."""
     chosen = "bad_cell or endless or memory"
-    files = ["tests/reports/run/test_runner.py", "tests/adapters/test_own_solver.py"]
+    files = ["tests/reports/run/test_pool.py", "tests/adapters/test_own_solver.py"]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-n", "0", "-q", "-k", chosen, *files],
         cwd=ROOT,
@@ -273,46 +272,6 @@ def test_windows_locks_a_byte_behind_all_that_is_written(
 def windows() -> SimpleNamespace:
     """The module `os`, which says that it is of Windows."""
     return SimpleNamespace(**{**vars(os), "name": "nt"})
-
-
-def test_a_signal_comes_again_without_alarms(monkeypatch: pytest.MonkeyPatch):
-    """From a thread, until it is called off."""
-    came: list[int] = []
-    monkeypatch.setattr(system, "ALARMS", False)
-    monkeypatch.setattr(system, "REPEATED", signal.SIGUSR1)
-    before = signal.signal(signal.SIGUSR1, lambda number, _: came.append(number))
-    try:
-        system.every(0.01)
-        end = time.monotonic() + 30.0
-        while len(came) < 3 and time.monotonic() < end:
-            time.sleep(0.001)
-        system.every(0)
-        time.sleep(0.03)
-        until = len(came)
-        time.sleep(0.05)
-    finally:
-        signal.signal(signal.SIGUSR1, before)
-
-    assert until >= 3
-    assert len(came) == until
-
-
-@pytest.mark.parametrize("alarms", [True, False])
-def test_a_signal_waits_until_what_must_not_be_broken_off_is_done(
-    monkeypatch: pytest.MonkeyPatch, alarms: bool
-):
-    """And then it is handled, once."""
-    done: list[str] = []
-    monkeypatch.setattr(system, "ALARMS", alarms)
-    before = signal.signal(signal.SIGUSR1, lambda *_: done.append("handled"))
-    try:
-        with system.signals_wait({signal.SIGUSR1}):
-            signal.raise_signal(signal.SIGUSR1)
-            done.append("written")
-    finally:
-        signal.signal(signal.SIGUSR1, before)
-
-    assert done == ["written", "handled"]
 
 
 @pytest.mark.slow

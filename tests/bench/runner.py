@@ -18,15 +18,14 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.run.archive import Archive
 from crosscheck2d.reports.run.cells import Cell, scene_hash
-from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.plan import Means, RunPlan, RunTask
 from crosscheck2d.reports.run.playing import play_here
-from crosscheck2d.reports.run.results import keep_cell
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.suite import begin, carry_out
+from crosscheck2d.reports.run.pool import run_all
+from crosscheck2d.reports.run.results import COMMAND, RunResults
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.run.suite import Suite, carry_out
 from crosscheck2d.reports.run.tables import make_tables
-from crosscheck2d.reports.run.tasks import Means, RunPlan
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import box
@@ -38,7 +37,7 @@ ROUNDS = 3
 
 
 class Cost(NamedTuple):
-    """Of a run in s: wall time from the first line of the journal to the last, wall time inside the
+    """Of a run in s: wall time from the first row to the last, wall time inside the
     engines' `step`, and processor time of this process and its workers."""
 
     wall: float
@@ -65,13 +64,14 @@ def played(
         "bench",
     )
     inside, started, before = 0.0, perf_counter(), sum(processor())
-    with Journal(folder) as journal:
-        begin(plan, journal, scenarios, len(tasks))
+    with writing(folder / "out", COMMAND) as store, Progress() as progress:
+        progress.start(len(tasks), len(tasks))
+        suite = Suite(plan, Means(workers), store, scenarios, progress)
         for cell, result in run_all(tasks, workers, timeout=3600.0):
             key = cell.key(scene_hash(scenarios[cell.scene]), "")
-            line = keep_cell(journal, scenarios[cell.scene], Means(workers), cell, key, result)
-            assert line["status"] == "ok", line["reason"]
-            inside += line["seconds"]
+            record = suite.keep_cell(RunTask("cell", key, cell), result)
+            assert record["status"] == "ok", record["reason"]
+            inside += record["seconds"]
     return Cost(perf_counter() - started, inside, sum(processor()) - before)
 
 
@@ -184,26 +184,26 @@ def play_many(folder: Path) -> None:
     there."""
     scenes = sorted(str(path) for path in folder.glob("*.toml"))
     out = folder / "out"
-    out.mkdir()
     plan = RunPlan(scenes, ENGINES, seed=0, dts=[], full=False, timings=0, command="bench")
     started = perf_counter()
-    with Journal(out) as journal, Clocked() as progress:
-        carry_out(plan, Means(workers=2), journal, progress)
-        archive = Archive.read(out)
-        make_tables(archive, lambda _: None)
-    made, inside = perf_counter(), sum(record["seconds"] for record in archive.records)
+    with writing(out, COMMAND) as store, Clocked() as progress:
+        carry_out(plan, Means(workers=2), store, progress)
+        results = RunResults.read(store)
+        make_tables(results, lambda _: None)
+    made, inside = perf_counter(), sum(record["seconds"] for record in results.records)
     print(
-        f"{len(archive.records)} cells on 2 workers: {made - started:.1f} s, {inside:.1f} s of them"
+        f"{len(results.records)} cells on 2 workers: {made - started:.1f} s, {inside:.1f} s of them"
         " in the engines"
     )
     print(f"  tables {made - progress.last:.2f} s after the last cell (ceiling 3), {used()}")
 
 
 def tables_again(folder: Path) -> None:
-    """Print how long journal and tables take when all has been compared."""
+    """Print how long rows and tables take when all has been compared."""
     started = perf_counter()
-    make_tables(Archive.read(folder / "out"), lambda _: None)
-    print(f"  journal and tables again {perf_counter() - started:.2f} s (ceiling 3), {used()}")
+    with writing(folder / "out", COMMAND) as store:
+        make_tables(RunResults.read(store), lambda _: None)
+    print(f"  rows and tables again {perf_counter() - started:.2f} s (ceiling 3), {used()}")
 
 
 def used() -> str:

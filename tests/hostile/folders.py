@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import os
 import socket
+import sqlite3
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -36,17 +36,19 @@ FOREIGN: dict[str, dict[str, str | bytes]] = {
         "out/index.html": "mine",
     },
     "a journal that is a diary": {"out/journal.jsonl": '{"dear": "diary"}\n'},
-    "a made.json of another program": {
-        "out/made.json": '{"command": "make", "finished": true, "files": {}}'
-    },
-    "a made.json that is no table": {"out/made.json": "[1, 2, 3]", "out/a.txt": "mine"},
+    "a results.sqlite of another program": {"out/results.sqlite": "years of work" * 100},
     "a file that is hidden": {"out/.git/config": "[core]"},
 }
 TAKEN = tuple(
-    Input(f"{command} into a folder with {what}", (*words, "out"), SCENE | files, says=says(what))
+    Input(
+        f"{command} into a folder with {what}",
+        (*words, "out"),
+        SCENE | files,
+        says="is damaged" if "another program" in what else "out",
+    )
     for what, files in FOREIGN.items()
-    for says in [lambda what: "made by make" if "another program" in what else "holds"]
     for command, words in OUT.items()
+    if command != "lesson"
 )
 
 # What is no folder, or none that can be written: the path after --out, and how it comes about.
@@ -116,25 +118,30 @@ def moved_and_linked(name: str, here: Path) -> None:
 
 
 def held(here: Path) -> None:
-    """Another process writes its journal, until this one has been played."""
-    HELD.append(file := (here / "out" / "journal.jsonl").open("ab"))
+    """Another process writes there, until this one has been played."""
+    HELD.append(file := (here / "out" / ".crosscheck.lock").open("ab"))
     fcntl.flock(file, fcntl.LOCK_EX)
 
 
 HELD: list[object] = []
 
 
-def unfinished(here: Path) -> None:
-    """The run was killed: it is where it was while it lasted, and not finished."""
-    moved("out", "out.part", here)
-    made = json.loads((here / "out.part" / "made.json").read_text())
-    (here / "out.part" / "made.json").write_text(
-        json.dumps(made | {"finished": False, "out": "out"}, indent=1) + "\n"
-    )
+def damaged(here: Path) -> None:
+    """The file of the rows is torn."""
+    path = here / "out" / "results.sqlite"
+    path.write_bytes(path.read_bytes()[:20_000])
+
+
+def edited(here: Path) -> None:
+    """Every row is another."""
+    file = sqlite3.connect(here / "out" / "results.sqlite")
+    file.execute("update results set value = '{}' where kind = 'cell'")
+    file.commit()
+    file.close()
 
 
 AGAIN = (*RUN, "--out", "out")
-RESUME = ("run", "--resume", "out")
+REPORT = ("report", "out")
 OURS = (
     *(
         Input(
@@ -145,20 +152,12 @@ OURS = (
         )
         for what, path in {
             "a run with a note": "notes.txt",
-            "a run with a scene of the user's": "scenes/mine.toml",
             "a run with a trajectory of the user's": "trajectories/mine.npz",
             "a run with a folder of the user's": "trajectories/deeper/mine.txt",
             "a run whose page was written over": "report.html",
             "a run whose table was edited": "deviations.csv",
-            "a run with a table of the user's": "compared/mine.csv",
         }.items()
-        for words in (AGAIN, RESUME)
-    ),
-    Input(
-        "a run whose trajectories are a link",
-        AGAIN,
-        prepare=copied("out", then=partial(moved_and_linked, "out/trajectories")),
-        says="holds trajectories",
+        for words in (AGAIN, REPORT)
     ),
     Input(
         "a run that is a link to a run",
@@ -170,34 +169,25 @@ OURS = (
     ),
     Input(
         "a run that another process writes",
-        RESUME,
+        AGAIN,
         prepare=copied("out", then=held),
         says="another crosscheck",
     ),
-    Input(
-        "a run into one that was broken off",
-        AGAIN,
-        prepare=copied("out", then=unfinished),
-        says="interrupted run",
-    ),
-    Input(
-        "a run whose part is somebody's folder",
-        AGAIN,
-        prepare=copied("out", then=partial(note, "out.part/mine.txt")),
-        says="out.part: holds mine.txt",
-    ),
-    Input(
-        "a run whose part is somebody's file",
-        AGAIN,
-        prepare=copied("out", then=partial(note, "out.part")),
-        says="out.part: is a file",
+    *(
+        Input(f"a run that is {what}, {words[0]}", words, prepare=copied("out", then=how), **ends)
+        for what, how, words, ends in (
+            ("damaged", damaged, AGAIN, {"says": "is damaged"}),
+            ("damaged", damaged, REPORT, {"says": "is damaged"}),
+            ("edited", edited, AGAIN, {"says": "2 cells ended", "codes": (0,), "writes": ("out",)}),
+            ("edited", edited, REPORT, {"says": "is not what was written"}),
+        )
     ),
     Input(
         "a run again",
         AGAIN,
         prepare=copied("out"),
         codes=(0,),
-        writes=("out", "out.part"),
+        writes=("out",),
         says="2 cells ended",
     ),
     Input(
@@ -206,7 +196,7 @@ OURS = (
         SCENE,
         prepare=lambda here: (here / "out").mkdir(),
         codes=(0,),
-        writes=("out", "out.part"),
+        writes=("out",),
         says="2 cells ended",
     ),
     Input(
@@ -234,12 +224,6 @@ OURS = (
         says="made by crosscheck run",
     ),
     Input(
-        "lessons into a run",
-        (*OUT["lesson"], "out"),
-        prepare=copied("out"),
-        says="made by crosscheck run",
-    ),
-    Input(
         "a run into where the current folder is",
         (*RUN, "--out", "../here"),
         SCENE,
@@ -248,58 +232,21 @@ OURS = (
 )
 
 NO_RUN: dict[str, tuple[tuple[str, ...], dict[str, str | bytes], str]] = {
-    "resume: nothing there": (("run", "--resume", "out"), {}, "no run is there"),
-    "resume: an empty name": (("run", "--resume", ""), {}, ""),
-    "resume: a file": (("run", "--resume", "two.toml"), SCENE, "two.toml"),
-    "resume: a folder without a journal": (
-        ("run", "--resume", "out"),
-        {"out/a.txt": "mine"},
-        "out",
-    ),
-    "resume: an empty journal": (("run", "--resume", "out"), {"out/journal.jsonl": ""}, "out"),
-    "resume: a journal without a header": (
-        ("run", "--resume", "out"),
-        {"out/journal.jsonl": "{}\n"},
-        "out",
-    ),
-    "resume: a part with a diary": (
-        ("run", "--resume", "out"),
-        {"out.part/journal.jsonl": "dear diary"},
-        "out",
-    ),
-    "resume: with scenes beside it": (
-        ("run", "slow_collision", "--resume", "out"),
-        {},
-        "takes no scenarios",
-    ),
-    "resume: with another place": (
-        ("run", "--resume", "out", "--out", "b"),
-        {},
-        "takes no scenarios",
-    ),
-    "speed --resume: somebody's part": (
-        ("speed", "free_fall", "--resume", "--out", "out"),
-        {"out.part/journal.jsonl": "dear diary\n"},
-        "out.part",
-    ),
-    "stability --resume: somebody's part": (
-        ("stability", "slow_collision", "--resume", "--out", "out"),
-        {"out.part/journal.jsonl": "[1]\n"},
-        "out.part",
-    ),
-    "report: nothing there": (("report", "out"), {}, "journal.jsonl"),
+    "run: a folder of the old format": (AGAIN, {"out/journal.jsonl": "{}"} | SCENE, "earlier"),
+    "report: a folder of the old format": (REPORT, {"out/journal.jsonl": "{}"}, "earlier"),
+    "report: nothing there": (("report", "out"), {}, "results.sqlite"),
     "report: a file": (("report", "two.toml"), SCENE, "two.toml"),
     "report: a folder of the user's": (
         ("report", "out"),
         {"out/report.html": "mine"},
-        "journal.jsonl",
+        "results.sqlite",
     ),
     "diff: nothing there": (("diff", "a", "b"), {}, "a"),
     "diff: two files": (("diff", "a", "b"), {"a": "1", "b": "2"}, "a"),
     "diff: a folder of the user's": (
         ("diff", "a", "a"),
         {"a/deviations.csv": "mine"},
-        "journal.jsonl",
+        "results.sqlite",
     ),
     "check --page: another page": (
         ("check", "plain.py", "--page", "a.html"),

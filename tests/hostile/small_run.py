@@ -4,7 +4,6 @@ copy."""
 from __future__ import annotations
 
 import atexit
-import json
 import os
 import shutil
 import subprocess
@@ -12,15 +11,12 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from tests.hostile.played import CROSSCHECK
-from tests.reports.run.journals import contents, put
 
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
 MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is
 RUN = ("run", "two.toml", "--engine", "pymunk", "--dt", "0.02", "--workers", "1")
-CELL = "CELL"  # in the words of an input: the first cell of the copy that was made for it
 Prepare = Callable[[Path], dict[str, str]]
 
 
@@ -44,14 +40,10 @@ def finished_run() -> Path:
 
 def copy(here: Path, *names: str) -> dict[str, str]:
     """Set copies of the run into a folder, as if it had been made there, with its scene file."""
-    made = finished_run()
-    lines = contents(made)
-    lines[0]["header"]["folder"] = str(here)
     for name in names:
-        shutil.copytree(made, here / name)
-        put(here / name, lines)
+        shutil.copytree(finished_run(), here / name)
     (here / "two.toml").write_text(TWO)
-    return {CELL: next(line["cell"] for line in lines if "cell" in line)}
+    return {}
 
 
 def copied(*names: str, then: Callable[[Path], object] | None = None) -> Prepare:
@@ -65,36 +57,4 @@ def _copied(
     words = copy(here, *names)
     if then is not None:
         then(here)
-    return words
-
-
-def edited(kind: str, at: tuple[Any, ...], value: Any) -> Prepare:
-    """A copy `out` of the run in which one thing in the first line of a kind is another, while its
-    sum stays; and a whole one, `before`."""
-    return partial(_edited, kind, at, value)
-
-
-def _edited(kind: str, at: tuple[Any, ...], value: Any, here: Path) -> dict[str, str]:
-    words = copy(here, "before", "out")
-    journal = here / "out" / "journal.jsonl"
-    lines = [json.loads(line) for line in journal.read_text().splitlines()]
-    inner: Any = next(line for line in lines if kind in line)
-    for key in at[:-1]:
-        inner = inner[key]
-    inner[at[-1]] = value
-    journal.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
-    return words
-
-
-def torn(change: Callable[[bytes], bytes], pattern: str = "journal.jsonl") -> Prepare:
-    """A copy `out` of the run in which the bytes of the first file of that pattern are others, and
-    a whole one."""
-    return partial(_torn, change, pattern)
-
-
-def _torn(change: Callable[[bytes], bytes], pattern: str, here: Path) -> dict[str, str]:
-    words = copy(here, "before", "out")
-    # The trajectory of the cell that CELL stands for, where there are several.
-    path = sorted((here / "out").glob(pattern.replace(CELL, words[CELL])))[0]
-    path.write_bytes(change(path.read_bytes()))
     return words

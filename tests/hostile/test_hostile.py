@@ -23,7 +23,6 @@ import pytest
 from tests.hostile import played
 from tests.hostile.command_lines import LINES
 from tests.hostile.folders import FOLDERS
-from tests.hostile.journals import JOURNALS
 from tests.hostile.places import PLACES
 from tests.hostile.played import (
     BAD,
@@ -48,7 +47,6 @@ SHOWN = 2000  # characters of what a bad one printed
 FAMILIES: dict[str, tuple[Input, ...]] = {
     "scenes": SCENES,
     "folders": FOLDERS,
-    "journals": JOURNALS,
     "places": PLACES,
     "command lines": LINES,
     "solvers": SOLVERS,

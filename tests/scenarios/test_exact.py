@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck2d.reports.run.answers import record_of
+from crosscheck2d.reports.run.comparing import record_of
 from crosscheck2d.scenarios.families.placing import box, lay_out
 from crosscheck2d.scenarios.model import Scenario, Thrust
 from crosscheck2d.scenarios.no_truth import NoTruth

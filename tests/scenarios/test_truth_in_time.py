@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from crosscheck2d.reports.commands import truth
-from crosscheck2d.reports.run.answers import record_here, record_of
-from crosscheck2d.reports.run.runner import run_all
+from crosscheck2d.reports.run.comparing import compute_record, record_of
+from crosscheck2d.reports.run.pool import run_all
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import box, lay_out
 from crosscheck2d.scenarios.model import Scenario
@@ -175,11 +175,11 @@ def test_where_time_ends_before_the_first_sample_there_is_no_answer(
 
 
 def by_processor_time(scene: str, seed: int, timeout: float) -> TruthRecord | str:
-    """`record_here` on a clock that stands still while other processes run; fails if it takes
+    """`compute_record` on a clock that stands still while other processes run; fails if it takes
     longer than `timeout`, after which its worker would be stopped."""
     with mock.patch.object(oracle_work, "monotonic", process_time):
         began = process_time()
-        record = record_here(scene, seed, timeout)
+        record = compute_record(scene, seed, timeout)
         assert process_time() - began < timeout
     return record
 
@@ -191,7 +191,7 @@ def test_an_endless_scene_is_answered_up_to_the_limit_of_time(
     """A disk in a box for 10^6 s: exit 0, and how far it got; a part of the limit is for
     following it, so short that time ends before the work that is allowed."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(truth, "record_here", by_processor_time)
+    monkeypatch.setattr(truth, "compute_record", by_processor_time)
     # on a busy machine 6 s of work take longer than 6 s
     monkeypatch.setattr(truth, "run_all", lambda tasks, workers, _: run_all(tasks, workers, 300.0))
     (tmp_path / "long.toml").write_text(LONG)

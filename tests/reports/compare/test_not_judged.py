@@ -20,8 +20,8 @@ from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
 from crosscheck2d.reports.page.findings import findings, nearest
 from crosscheck2d.reports.page.scenes import scenes_of, values
 from crosscheck2d.reports.page.summary import summarize
+from crosscheck2d.reports.run.comparing import read_scene_table
 from crosscheck2d.reports.run.diff import changed_numbers
-from crosscheck2d.reports.run.scene_tables import read_scene_table
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of

@@ -1,7 +1,5 @@
 """Verdicts: what breaks a law anywhere in a run is caught, and what is right is never accused."""
 
-# ruff: noqa: D103 - the names of the tests are facts
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

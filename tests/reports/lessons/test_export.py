@@ -160,7 +160,6 @@ def test_all_lessons_in_a_folder_lead_to_each_other(
     assert f"2 lessons with {settings} settings of their sliders: takes minutes" in done.stderr
     assert sorted(path.name for path in (tmp_path / "all").iterdir()) == [
         "index.html",
-        "made.json",
         "order.html",
         "thrust.html",
     ]
@@ -208,10 +207,7 @@ ANSWER = Shown([]).to_json()  # of a lesson that shows nothing
         (["order", "--export", "nowhere/a.html"], "nowhere/a.html: No such file or directory"),
         (["order", "--export", "/proc/a.html"], "/proc/a.html: No such file or directory"),
         (["order", "--export", ""], "name a file"),
-        (
-            ["--export", "folder"],
-            "holds other.txt, and no made.json says that crosscheck lesson made it",
-        ),
+        (["--export", "folder"], "order.html: exists and is no page of a lesson"),
         (["--export", "other.html"], "other.html: is a file"),
         (["--export", "/proc/all"], "/proc/all: "),
     ],
@@ -221,7 +217,7 @@ def test_what_cannot_be_written_is_reported_before_any_run(
 ):
     """One line, exit 2, nothing is there that was not, and no engine was asked."""
     (tmp_path / "folder").mkdir()
-    for path in (tmp_path / "folder" / "other.txt", tmp_path / "other.html"):
+    for path in (tmp_path / "folder" / "order.html", tmp_path / "other.html"):
         path.write_text("somebody's own")
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.setattr(command, "write_pages", lambda *_: pytest.fail("a run was made"))

@@ -1,7 +1,5 @@
 """A failed verdict counts as the worst value, wherever engines are ranked, and is named there."""
 
-# ruff: noqa: D103 - the names of the tests are facts
-
 from functools import cache
 from pathlib import Path
 

@@ -1,56 +1,60 @@
 """A run of two scenes, one of them a file, on two engines, made in this process and so within a
-second or two."""
+second or two; and the words of runs that are disturbed."""
 
+from contextlib import closing
 from pathlib import Path
 
-from crosscheck2d.adapters.conformance.conform import Finding
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.run.cells import Cell, scene_hash
-from crosscheck2d.reports.run.folders import RUN, open_new, part_of, replace_folder
-from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS
-from crosscheck2d.reports.run.playing import play_here
-from crosscheck2d.reports.run.results import keep_cell, keep_known_answer, keep_probes
-from crosscheck2d.reports.run.suite import begin
-from crosscheck2d.reports.run.tasks import Means, RunPlan, tasks_of
+from crosscheck2d.reports.run import suite
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.results import COMMAND, RunResults
+from crosscheck2d.reports.run.store import reading, writing
+from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.rows import Rows
 
 PLAYED = ("pymunk:shipped", "pymunk:matched")
+# 24 cells of ms
+SMALL = [
+    "run",
+    "slow_collision",
+    "near_miss",
+    "--engine",
+    "reference:exercise",
+    "--engine",
+    "pymunk",
+]
+LONG = ["run", "asteroids", "--timings", "0"]  # 24 cells of 0.4 s
+LONG += [
+    word
+    for name in ("reference:exercise", "reference:lesson", "pymunk", "box2d")
+    for word in ("--engine", name)
+]
 
 
-def make(folder: Path, scene_file: Path) -> Path:
-    """Its folder, complete but for its tables: every kind of line is in its journal."""
-    plan = RunPlan(
-        ["slow_collision", str(scene_file)],
-        {name: ENGINES[name] for name in PLAYED},
-        0,
-        [],
-        False,
-        0,
-        "made by a test",
-    )
-    scenarios = {scene: plan.scenario(scene) for scene in plan.scenes}
-    cells = [task for task in tasks_of(plan, scenarios) if isinstance(task, Cell)]
-    with open_new(folder) as journal:
-        begin(plan, journal, scenarios, len(cells))
-        for name in PLAYED:
-            finding = Finding(
-                *name.split(":"),
-                "read_copies",
-                "Does read give copies?",
-                "copies",
-                "copies",
-                0.0,
-                "keeps",
-            )
-            keep_probes(journal, plan, name, [finding])
-        keep_known_answer(journal, KNOWN_ANSWERS[0], 18808.3)
-        for cell in cells:
-            scenario, row = scenarios[cell.scene], ENGINES[cell.engine]
-            key = cell.key(scene_hash(scenario), row.source)
-            line = keep_cell(journal, scenario, Means(1), cell, key, play_here(cell, row, scenario))
-        journal.append(
-            {"timing": line["cell"], "copy": 0, "timed_s": 1.0, "cost": [0.5], "wrapping": [0.0]}
-        )
-        journal.append({"overhead": "read", "of": PLAYED[0], "scenario": "", "cost": [1e-6]})
-        journal.append({"footer": {"tasks": len(cells), "played": len(cells), "seconds": 1.0}})
-    replace_folder(part_of(folder), folder, RUN)
+def plan_of(scene_file: Path, timings: float = 0.0) -> RunPlan:
+    """The plan of the small run."""
+    rows = {name: ENGINES[name] for name in PLAYED}
+    scenes = ["slow_collision", str(scene_file)]
+    return RunPlan(scenes, rows, 0, [], False, timings, "made by a test")
+
+
+def make(folder: Path, scene_file: Path, timings: float = 0.0) -> Path:
+    """Its folder, with all rows and no tables."""
+    with writing(folder, COMMAND) as store, Progress() as progress:
+        suite.carry_out(plan_of(scene_file, timings), Means(2), store, progress)
     return folder
+
+
+def read(folder: Path) -> RunResults:
+    """The results in a folder; the file of its rows is closed, and so no trajectory can be read."""
+    with reading(folder, COMMAND) as store:
+        return RunResults.read(store)
+
+
+def cells_in(folder: Path) -> int:
+    """How many cells have a row, while another process writes."""
+    try:
+        with closing(Rows(folder / "results.sqlite", writing=False)) as rows:
+            return len(rows.keys("cell"))
+    except (OSError, ValueError):
+        return 0

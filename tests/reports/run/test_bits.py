@@ -12,11 +12,11 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES, UNASKED, told_apart
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.run import bits
-from crosscheck2d.reports.run.archive import Archive
-from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.store import reading, writing
 from crosscheck2d.reports.run.suite import carry_out
-from crosscheck2d.reports.run.tasks import Means, RunPlan
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.measured import MEASURED, TABLE
@@ -28,13 +28,13 @@ SCENE = "head_on_equal_e09"
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of two engines, of which no bits are kept."""
-    folder = tmp_path_factory.mktemp("bits")
+    folder = tmp_path_factory.mktemp("bits") / "out"
     names = ("pymunk:matched", "reference:exercise")
     plan = RunPlan(
         [SCENE], {name: ENGINES[name] for name in names}, 0, [], False, timings=0, command="test"
     )
-    with Journal(folder) as journal, Progress() as progress:
-        carry_out(plan, Means(workers=2), journal, progress)
+    with writing(folder, COMMAND) as store, Progress() as progress:
+        carry_out(plan, Means(workers=2), store, progress)
     return folder
 
 
@@ -47,7 +47,8 @@ def compared(kept: Sequence[dict[str, str]], now: Sequence[dict[str, str]]):
 def test_the_same_engine_has_the_same_bits_and_another_has_not(made: Path):
     """At the middle step size, as it plays in this process; also where both are right: the last
     place tells them apart."""
-    one, other = bits.rows_of(Archive.read(made))
+    with reading(made, COMMAND) as store:
+        one, other = bits.rows_of(RunResults.read(store))
     scenario = open_scene(SCENE, 0)
     dt = scenario.dt(scenario.middle_substeps)
     again = play_once(ENGINES["pymunk:matched"].make, "pymunk:matched", scenario, dt).trajectory
@@ -95,19 +96,19 @@ def test_an_engine_is_kept_in_every_scene():
 @pytest.mark.slow
 def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """One hash of the kept table is changed: exit status 1, and the engine is named; else 0. An
-    engine of which no bits are kept is named, too. A resumed run compares again."""
-    kept, again = tmp_path / "kept.csv", ("run", "--resume", "out")
+    engine of which no bits are kept is named, too."""
+    kept = tmp_path / "kept.csv"
     monkeypatch.setattr(bits, "KEPT", kept)
     kept.write_text(bits.written([], {"system": "Linux"}))
     words = ("run", SCENE, "--engine", "pymunk:matched", "--timings", "0", "--bits", "--out", "out")
     empty = crosscheck(*words, cwd=tmp_path)
     here = (tmp_path / "out" / "bits.csv").read_text()
     kept.write_text(here)
-    same = crosscheck(*again, cwd=tmp_path)
+    same = crosscheck(*words, cwd=tmp_path)
     *about, line = here.splitlines()
     hashes = " ".join([line.rsplit(" ", 3)[0], "0000 0000 0000"])
     kept.write_text("\n".join([*about, hashes]).replace(line.split(",")[5], "0" * 16) + "\n")
-    other = crosscheck(*again, cwd=tmp_path)
+    other = crosscheck(*words, cwd=tmp_path)
 
     assert (empty.returncode, same.returncode, other.returncode) == (1, 0, 1)
     assert "No bits are kept of pymunk:matched" in empty.stdout
@@ -117,11 +118,12 @@ def test_a_run_names_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_random_scenes_of_another_seed_are_not_compared(made: Path):
     """The kept bits are those of seed 0."""
-    archive = Archive.read(made)
-    seeded = replace(archive, records=[record | {"seed": 1} for record in archive.records])
+    with reading(made, COMMAND) as store:
+        results = RunResults.read(store)
+        seeded = replace(results, records=[record | {"seed": 1} for record in results.records])
 
-    assert len(bits.rows_of(archive)) == 2
-    assert bits.rows_of(seeded) == []
+        assert len(bits.rows_of(results)) == 2
+        assert bits.rows_of(seeded) == []
 
 
 @pytest.mark.long

@@ -2,13 +2,16 @@
 
 import re
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from tests.reports.run.sweeps import LONG, assert_nothing_lost, begun, ended_in, undisturbed
+from crosscheck2d.reports.run.cluster import NoScheduler, connect
+from tests.reports.run.small_runs import LONG, cells_in
+from tests.reports.run.test_disturbed import again, assert_nothing_lost, begun, undisturbed
 from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, wait_for
 
 pytest.importorskip("distributed")
@@ -21,14 +24,14 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return undisturbed(LONG, tmp_path_factory.mktemp("long"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_machine_that_dies_takes_no_cell_along(long: Path, tmp_path: Path):
     """Two dask workers, of which one is killed in the middle of the run: the other plays its cells,
     too."""
     with cluster(tmp_path) as (scheduler, machines):
         run = begun(*LONG, "--scheduler", scheduler, cwd=tmp_path, cells=3)
         machines[0].kill()
-        had = ended_in(tmp_path / "out.part")
+        had = cells_in(tmp_path / "out")
         _, said = run.communicate(timeout=200)
 
     assert 3 <= had < 24
@@ -36,7 +39,7 @@ def test_a_machine_that_dies_takes_no_cell_along(long: Path, tmp_path: Path):
     assert_nothing_lost(tmp_path / "out", long)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_here(
     long: Path, tmp_path: Path
 ):
@@ -46,10 +49,17 @@ def test_a_scheduler_that_goes_is_one_clear_message_and_the_run_can_be_resumed_h
     _, said = run.communicate(timeout=200)
 
     assert run.returncode == 1
-    assert "the scheduler has gone" in said
+    sentence, *_ = said[said.index("the scheduler has gone") :].splitlines()
+    assert sentence.startswith("the scheduler has gone. Kept: ")
     assert "Traceback" not in said
-    assert crosscheck("run", "--resume", "out", cwd=tmp_path).returncode == 0
+    again(LONG, tmp_path)
     assert_nothing_lost(tmp_path / "out", long)
+
+
+def test_without_the_extra_it_is_one_sentence(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(NoScheduler, match="it needs the package distributed, which is not"):
+        connect("tcp://foo:1")
 
 
 @pytest.mark.parametrize(

@@ -14,17 +14,17 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.commands.diff import show_difference
-from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
-from crosscheck2d.reports.run.cells import digest
 from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
-from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.plan import Means, RunPlan
+from crosscheck2d.reports.run.results import COMMAND, RunResults
+from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.run.suite import carry_out
-from crosscheck2d.reports.run.tables import seal_of
-from crosscheck2d.reports.run.tasks import Means, RunPlan
+from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.reports.terminal.progress import Progress
-from tests.reports.run.journals import contents, put
+from tests.reports.run.small_runs import read
+from tests.reports.run.stored import change_cells, change_plan, change_timings, put_table
 
 PLAN = RunPlan(
     ["slow_collision", "near_miss"],
@@ -39,10 +39,9 @@ PLAN = RunPlan(
 
 def run(folder: Path, workers: int) -> Path:
     """A run of `PLAN`, with its tables."""
-    folder.mkdir()
-    with Journal(folder) as journal, Progress() as progress:
-        carry_out(PLAN, Means(workers), journal, progress)
-        make_report(folder, progress.say, LESSONS)
+    with writing(folder, COMMAND) as store, Progress() as progress:
+        carry_out(PLAN, Means(workers), store, progress)
+        make_report(RunResults.read(store), progress.say)
     return folder
 
 
@@ -58,24 +57,9 @@ def after(before: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(before, tmp_path / "after"))
 
 
-def edit(folder: Path, change: Callable[[dict], None]) -> None:
-    """Change every line of a journal."""
-    lines = contents(folder)
-    for line in lines:
-        change(line)
-    put(folder, lines)
-
-
-def elsewhere(line: dict) -> None:
-    """Another machine in the header."""
-    if "header" in line:
-        line["header"]["machine"].update(processor="abacus")
-
-
-def put_table(table: pd.DataFrame, folder: Path) -> None:
-    """Other numbers, as another run would have written them."""
-    table.to_csv(folder / "deviations.csv", index=False)
-    seal_of(folder).write_text(digest((folder / "deviations.csv").read_bytes()))
+def elsewhere(plan: dict) -> None:
+    """Another machine in the plan."""
+    plan["machine"].update(processor="abacus")
 
 
 def exit_of(before: Path, after: Path) -> object:
@@ -91,20 +75,15 @@ def test_the_numbers_do_not_depend_on_workers_or_order(
 ):
     """One worker instead of two, and the cells in any order: deviations.csv is the same byte for
     byte."""
-    in_order = suite.tasks_of
+    run_all = suite.run_all
 
-    def shuffled(*words):
-        tasks = list(in_order(*words).items())
-        random.Random(4).shuffle(tasks)
-        return dict(tasks)
+    def shuffled(tasks, *words):
+        order = list(tasks.items())
+        random.Random(4).shuffle(order)
+        return run_all(dict(order), *words)
 
-    monkeypatch.setattr(suite, "tasks_of", shuffled)
+    monkeypatch.setattr(suite, "run_all", shuffled)
     again = run(tmp_path / "again", workers=1)
-    cells = [
-        [line["cell"] for line in contents(folder) if "cell" in line] for folder in (before, again)
-    ]
-
-    assert cells[0] != cells[1]
     assert (again / "deviations.csv").read_bytes() == (before / "deviations.csv").read_bytes()
     changed = difference(before, again)
     assert (changed.numbers, changed.statuses) == ([], [])
@@ -161,13 +140,8 @@ def test_where_versions_differ_the_metric_says_what_is_worse(
     """A larger error is worse, a smaller better, but for rounding; the deviation of two engines is
     neither; and there is a warning."""
 
-    def other_version(line: dict) -> None:
-        if "cell" in line:
-            line["cell"] = line["cell"][::-1]
-        if "header" in line:
-            line["header"]["versions"]["pymunk"] = "8.0"
-
-    edit(after, other_version)
+    change_cells(after, lambda cell: cell.update(cell=cell["cell"][::-1]))
+    change_plan(after, lambda plan: plan["versions"].update(pymunk="8.0"))
     table = pd.read_csv(after / "deviations.csv")
     table.loc[(table.metric == "position_max") & (table.value > 1e-6), "value"] *= factor
     put_table(table, after)
@@ -182,7 +156,7 @@ def test_a_verdict_that_fails_now_is_worse_and_one_that_passes_still_is_neither(
     before: Path, after: Path
 ):
     """And the other way round it is better."""
-    edit(after, elsewhere)
+    change_plan(after, elsewhere)
     table = pd.read_csv(after / "deviations.csv")
     rows = table.index[table.metric == "tunnelled"]
     table.loc[rows[0], "value"] = 1.0
@@ -213,7 +187,7 @@ def test_a_difference_within_rounding_is_neither_worse_nor_better(
 ):
     """Where the bits may differ: on another machine. An error of rounding may grow to many times
     itself."""
-    edit(after, elsewhere)
+    change_plan(after, elsewhere)
     table = pd.read_csv(after / "deviations.csv")
     rows = (table.metric == "position_max") & (table.versus == "truth")
     table.loc[rows, "value"] += moved
@@ -252,22 +226,21 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     What is the same but for rounding is still said to be so."""
     before = Path(shutil.copytree(before, after.parent / "before"))
     for folder in (before, after):
-        edit(folder, rounds_of([1.0] * 9))
+        change_timings(folder, rounds_of([1.0] * 9))
     timed = {one.engine: one.n for one in difference(before, after).timings}
 
-    theirs = {
-        line["cell"]
-        for line in contents(after)
-        if "cell" in line and line["scenario"] == "near_miss"
-    }
+    theirs = {one["cell"] for one in read(after).records if one["scenario"] == "near_miss"}
 
-    def edited(line: dict) -> None:
-        if line.get("cell") in theirs:
-            line.update(scene_hash="0" * 16, cell=line["cell"][::-1], status="unsupported")
+    def edited(cell: dict) -> None:
+        if cell["cell"] in theirs:
+            cell.update(scene_hash="0" * 16, cell=cell["cell"][::-1], status="unsupported")
+
+    def renamed(line: dict) -> None:
         if line.get("timing") in theirs:
             line.update(timing=line["timing"][::-1])
 
-    edit(after, edited)
+    change_cells(after, edited)
+    change_timings(after, renamed)
     table = pd.read_csv(after / "deviations.csv")
     table.loc[table.metric == "position_max", "value"] *= 2
     put_table(table, after)
@@ -284,24 +257,36 @@ def test_an_edited_scene_is_named_and_nothing_in_it_is_called_worse_or_better(
     assert "near_miss: edited between the runs" in capsys.readouterr().out
 
 
-def test_a_cell_that_fails_now_or_is_gone_is_worse(before: Path, after: Path):
-    """One crashed, one missing: two changes, exit 1; the other way round they are better or
-    nothing."""
-    cells = [line for line in contents(after) if "cell" in line]
-    put(after, [line for line in contents(after) if line.get("cell") != cells[0]["cell"]])
-    edit(
-        after,
-        lambda line: (
-            line.update(status="crashed") if line.get("cell") == cells[1]["cell"] else None
-        ),
+def test_a_cell_that_fails_now_is_worse_and_the_other_way_round_better(before: Path, after: Path):
+    first = read(after).records[0]["cell"]
+    change_cells(
+        after, lambda cell: cell.update(status="crashed") if cell["cell"] == first else None
     )
 
-    assert sorted((one.after, one.verdict) for one in difference(before, after).statuses) == [
-        ("crashed", "worse"),
-        ("not played", "worse"),
+    assert [(one.after, one.verdict) for one in difference(before, after).statuses] == [
+        ("crashed", "worse")
     ]
     assert exit_of(before, after) == 1
     assert [one.verdict for one in difference(after, before).statuses] == ["better"]
+
+
+def test_cells_that_only_one_run_has_are_named_and_not_worse(
+    before: Path, after: Path, capsys: pytest.CaptureFixture[str]
+):
+    def without_shipped(plan: dict) -> None:
+        shipped = {one["cell"] for one in read(before).records if one["profile"] == "shipped"}
+        cells = plan["tasks"]["cell"]
+        plan["tasks"]["cell"] = [task for task in cells if task[0] not in shipped]
+
+    change_plan(after, without_shipped)
+    cells = len(read(before).records) // 2
+
+    assert exit_of(before, after) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert (
+        f"only in {before}: {cells} cells of pymunk:shipped, in slow_collision and near_miss"
+        in (said.replace("- ", "-"))
+    )
 
 
 def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
@@ -318,10 +303,11 @@ def rounds_of(costs: list[float], again: float = 1.0) -> Callable[[dict], None]:
 def test_times_of_a_busy_machine_are_not_compared(before: Path, after: Path):
     """An engine that reads 1.5 against itself: a warning, and no verdict; one that reads 1.05 is
     compared."""
-    edit(after, rounds_of([2.0] * 9, again=1.5))
+    change_timings(after, rounds_of([2.0] * 9, again=1.5))
     busy = difference(before, after)
-    edit(after, rounds_of([2.0] * 9, again=1.05))
-    edit(quiet := Path(shutil.copytree(before, after.parent / "quiet")), rounds_of([1.0] * 9))
+    change_timings(after, rounds_of([2.0] * 9, again=1.05))
+    quiet = Path(shutil.copytree(before, after.parent / "quiet"))
+    change_timings(quiet, rounds_of([1.0] * 9))
     quieter = difference(quiet, after)
 
     assert busy.timings == []
@@ -335,10 +321,10 @@ def test_timings_are_judged_on_one_machine_only(
 ):
     """All twice as slow: worse; on another machine there is a warning instead."""
     before = Path(shutil.copytree(before, after.parent / "before"))
-    edit(before, rounds_of([1.0] * 9))
-    edit(after, rounds_of([2.0] * 9))
+    change_timings(before, rounds_of([1.0] * 9))
+    change_timings(after, rounds_of([2.0] * 9))
     if machine == "other":
-        edit(after, elsewhere)
+        change_plan(after, elsewhere)
     changed = difference(before, after)
 
     assert {one.verdict for one in changed.timings} == verdicts
@@ -397,14 +383,9 @@ def test_a_scene_that_is_not_judged_any_more_is_worse(before: Path, after: Path)
     assert exit_of(before, after) == 1
 
 
-def test_what_diff_advises_about_a_table_that_was_edited_works(before: Path, after: Path):
-    """Nothing of somebody's is written over by `report`, so the table has to go first."""
-    whole = (after / "deviations.csv").read_bytes()
-    (after / "deviations.csv").write_bytes(whole + b"mine")
-    with pytest.raises(ValueError, match="delete it, and make it again: crosscheck report"):
-        difference(before, after)
-    (after / "deviations.csv").unlink()
-    make_report(after, print, LESSONS)
+def test_a_run_without_tables_is_one_sentence(before: Path, after: Path):
+    with writing(after, COMMAND) as store:
+        store.rows.delete("run", "comparisons")
 
-    assert (after / "deviations.csv").read_bytes() == whole
-    assert not difference(before, after).worse
+    with pytest.raises(Unusable, match="make them: crosscheck report"):
+        difference(before, after)

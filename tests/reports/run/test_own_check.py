@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import html
-import json
 from pathlib import Path
 from typing import cast
 
@@ -13,11 +12,13 @@ import pytest
 from crosscheck2d.adapters.host.engine import row_of_file
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
-from crosscheck2d.reports.run.archive import LINES
-from crosscheck2d.reports.run.journal import JOURNAL, Journal
-from crosscheck2d.reports.run.results import keep_check
-from crosscheck2d.reports.run.tasks import Check, RunPlan
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.plan import Check, Means, RunPlan, RunTask
+from crosscheck2d.reports.run.pool import Failure
+from crosscheck2d.reports.run.results import COMMAND
+from crosscheck2d.reports.run.store import writing
+from crosscheck2d.reports.run.suite import Suite
+from crosscheck2d.reports.terminal.progress import Progress
+from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import MUTANTS
 
@@ -25,25 +26,28 @@ from tests.solvers.mutants import MUTANTS
 
 
 def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
-    """Kept with its key; that of another text, or none at all, is said to be so, and has no key."""
+    """That of another text, or none at all, is said to be so, and is made again."""
     path = FAULTY.write(tmp_path)
     name = f"{path}:own"
     plan = cast(RunPlan, type("Plan", (), {"engines": {name: row_of_file(path)}}))
     right = checked(path)
     later = Check(True, ["No fault found."], [], "another text")
-    with Journal(tmp_path) as journal:
+    rows = []
+    with writing(tmp_path / "out", COMMAND) as store, Progress() as progress:
+        progress.start(3, 3)
+        suite = Suite(plan, Means(1), store, {}, progress)
         for result in (right, later, Failure("timeout", "was stopped")):
-            keep_check(journal, plan, name, result)
-    kept = [json.loads(line) for line in (tmp_path / JOURNAL).read_text().splitlines()]
+            suite.keep(RunTask("check", "key", name), result)
+            rows.append(store.get("check", "key").value)
 
     assert FAULTY.cause in right.says[0]
-    assert kept[0]["checked"] == {"passed": False, "says": right.says, "shown": right.shown}
+    about = {"passed": False, "outside": False}
+    assert rows[0] == {"says": right.says, "shown": right.shown} | about
     assert any(line.startswith("exercise: ") for line in right.shown[0])
-    assert [bool(line["key"]) for line in kept] == [True, False, False]
-    assert [line["checked"]["passed"] for line in kept] == [False] * 3
-    assert "was saved" in kept[1]["checked"]["says"][0]
-    assert "was stopped" in kept[2]["checked"]["says"][0]
-    assert all({*line, *line["checked"]} >= {*LINES["checked"]} for line in kept)
+    assert [row["outside"] for row in rows] == [False, True, True]
+    assert [row["passed"] for row in rows] == [False] * 3
+    assert "was saved" in rows[1]["says"][0]
+    assert "was stopped" in rows[2]["says"][0]
 
 
 def test_only_solvers_files_are_checked():
@@ -91,8 +95,8 @@ def test_a_run_says_what_check_says(tmp_path: Path):
     done = crosscheck("run", *words, cwd=tmp_path)
     page = (tmp_path / "beside" / "report.html").read_text()
     rows = list(csv.DictReader((tmp_path / "beside" / "runs.csv").read_text().splitlines()))
-    again = crosscheck("run", "--resume", "beside", cwd=tmp_path)
-    journal = (tmp_path / "beside" / JOURNAL).read_text()
+    before = read(tmp_path / "beside").header["seconds"]
+    again = crosscheck("run", *words, cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert FAULTY.cause in first
@@ -102,5 +106,4 @@ def test_a_run_says_what_check_says(tmp_path: Path):
     assert f"crosscheck check {path.name}" in page
     assert {row["status"] for row in rows if row["engine"] == path.name} == {"ok"}
     assert again.returncode == 0, again.stderr
-    assert journal.count('"checked"') == 1
-    assert json.loads(journal.splitlines()[-1])["footer"]["played"] == 0
+    assert read(tmp_path / "beside").header["seconds"] == before  # nothing was done

@@ -21,12 +21,13 @@ from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.check.command import make_page, scenes_of
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.run import suite
-from crosscheck2d.reports.run.archive import Archive, trajectory_file
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_here
-from crosscheck2d.reports.run.trajectories import load_trajectory
+from crosscheck2d.reports.run.results import COMMAND, RunResults
+from crosscheck2d.reports.run.store import reading
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.check.marked import marks_of
+from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
 from tests.solvers.mutants import CORRECT
 
@@ -172,13 +173,13 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
 def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """`run --resume` then plays the new text, to the same bits as a run of it alone."""
+    """The same command then plays the new text, to the same bits as a run of it alone."""
     path = place(tmp_path, file, 1)
     meanwhile(monkeypatch, lambda: place(tmp_path, file, 2))
     assert crosscheck(*WORDS, "--engine", path.name, "--out", "out", cwd=tmp_path).returncode == 0
     old = flight(tmp_path / "out")
     monkeypatch.undo()
-    assert crosscheck("run", "--resume", "out", cwd=tmp_path).returncode == 0
+    assert crosscheck(*WORDS, "--engine", path.name, "--out", "out", cwd=tmp_path).returncode == 0
     assert crosscheck(*WORDS, "--engine", path.name, "--out", "fresh", cwd=tmp_path).returncode == 0
 
     assert len(old[0]) == 1
@@ -191,16 +192,14 @@ def test_a_file_that_is_saved_during_a_run_is_kept_as_what_was_played(
 def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
 ):
-    """All of it was read; to go on with such a run is refused in a sentence, for nobody knows what
-    would be played."""
+    """All of it was read; the same command again is refused in a sentence."""
     path = place(tmp_path, file, 1)
     meanwhile(monkeypatch, path.unlink)
-    done = crosscheck(
-        *WORDS, "--engine", path.name, "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path
-    )
+    words = *WORDS, "--engine", path.name, "--engine", "pymunk:matched", "--out", "out"
+    done = crosscheck(*words, cwd=tmp_path)
     monkeypatch.undo()
-    statuses = {record["status"] for record in Archive.read(tmp_path / "out").records}
-    again = crosscheck("run", "--resume", "out", cwd=tmp_path)
+    statuses = {record["status"] for record in read(tmp_path / "out").records}
+    again = crosscheck(*words, cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert statuses == {"ok"}
@@ -210,19 +209,21 @@ def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
 
 def meanwhile(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> None:
     """When a run has begun, before any cell is played, `act`."""
-    begin = suite.begin
+    begin = suite.Suite.run
 
-    def begin_and_act(*given) -> None:
-        begin(*given)
+    def act_and_begin(*given) -> None:
         act()
+        begin(*given)
 
-    monkeypatch.setattr(suite, "begin", begin_and_act)
+    monkeypatch.setattr(suite.Suite, "run", act_and_begin)
 
 
 def flight(out: Path) -> tuple[list[str], list[bytes]]:
-    """The keys of the cells in a run's journal, and the positions that it has of each."""
-    keys = [record["cell"] for record in Archive.read(out).records]
-    return keys, [load_trajectory(trajectory_file(out, key)).position.tobytes() for key in keys]
+    """The keys of the cells of a run, and the positions that it has of each."""
+    with reading(out, COMMAND) as store:
+        results = RunResults.read(store)
+        positions = [results.trajectory(record).position for record in results.records]
+    return [record["cell"] for record in results.records], [one.tobytes() for one in positions]
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import timing_pass
-from crosscheck2d.reports.run.archive import Archive
+from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.stepping import Spent, binding_of
 from crosscheck2d.reports.run.timing import WARM_UP, Timed, interleaved, noise_of
 from crosscheck2d.reports.run.timing_pass import (
@@ -26,7 +26,7 @@ from crosscheck2d.reports.run.timing_pass import (
     timed_scenes,
 )
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
-from tests.reports.run.journals import contents
+from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # each times a run
@@ -43,8 +43,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def timing_lines(folder: Path) -> list[dict]:
-    """Those of the journal."""
-    return [line for line in contents(folder / "out") if "timing" in line or "overhead" in line]
+    """Those of its row."""
+    return read(folder / "out").timing.get("lines", [])
 
 
 def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: Path):
@@ -56,29 +56,38 @@ def test_every_cell_that_was_played_is_timed_and_its_binding_beside_it(folder: P
     assert len(table) == 2 * steps
     assert (table[["cost_us_per_s", "binding_us_per_s", "read_us"]] > 0).all(axis=None)
     assert table.again_us_per_s.notna().sum() == 2
-    assert noise_floor(Archive.read(folder / "out")).pairs == 2
+    assert noise_floor(read(folder / "out")).pairs == 2
 
 
-def test_a_report_has_the_times_again_and_a_resumed_run_takes_none(folder: Path):
-    """The same bytes; the journal has no more timings than before."""
+def test_times_are_used_again_with_their_date_and_taken_again_on_demand(folder: Path):
+    """A report and a second run have the same bytes; `report --timings` has other times."""
     path, before = folder / "out" / TABLE, timing_lines(folder)
     written = path.read_bytes()
     path.unlink()
     crosscheck("report", "out", cwd=folder)
     again = path.read_bytes()
-    crosscheck("run", "--resume", "out", cwd=folder)
+    done = crosscheck("run", *RUN, cwd=folder)
 
     assert again == path.read_bytes() == written
     assert timing_lines(folder) == before
+    taken = read(folder / "out").timing["taken"]
+    assert f"The times are of {taken}. To take them again: crosscheck report " in done.stdout
+    assert crosscheck("report", "out", "--timings", "10", cwd=folder).returncode == 0
+    assert timing_lines(folder) != before
 
 
 def test_without_a_second_nothing_is_timed(tmp_path: Path):
     """The table has its columns and no row, and the page says why."""
-    crosscheck("run", *RUN, "--timings", "0", cwd=tmp_path)
+    done = crosscheck("run", *RUN, "--timings", "0", cwd=tmp_path)
+    take = f"crosscheck report {tmp_path / 'out'} --timings 12"
 
     assert pd.read_csv(tmp_path / "out" / TABLE).empty
     assert timing_lines(tmp_path) == []
-    assert "took no times (--timings 0)" in (tmp_path / "out" / "report.html").read_text()
+    assert f"No times were taken. To take them: {take}" in done.stdout
+    assert (
+        f"No times were taken. To take them: {take}"
+        in (tmp_path / "out" / "report.html").read_text()
+    )
 
 
 def test_scenes_that_need_different_things_are_timed_else_the_first_played():
@@ -181,11 +190,13 @@ def test_a_call_counts_once_for_many_steps_and_for_each_step_with_a_force():
 def test_a_clock_that_reads_an_engine_otherwise_the_second_time_is_busy():
     """Half of the pairs are off by 12 %: busy; by 8 %: not; no pair: not known, so busy."""
 
-    def with_pairs(*ratios: float) -> Archive:
-        timings = {
-            str(k): {0: {"cost": [1.0]}, 1: {"cost": [ratio]}} for k, ratio in enumerate(ratios)
-        }
-        return Archive(Path(), {}, [], {}, [], {}, timings, {}, 0.0, True)
+    def with_pairs(*ratios: float) -> RunResults:
+        lines = [
+            {"timing": str(k), "copy": copy, "cost": [cost]}
+            for k, ratio in enumerate(ratios)
+            for copy, cost in enumerate((1.0, ratio))
+        ]
+        return RunResults(None, {}, [], {}, [], {}, {"lines": lines}, True)
 
     assert is_busy(with_pairs(0.88, 1.0, 1.12, 1.12))
     assert not is_busy(with_pairs(0.92, 1.0, 1.08, 1.08))

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow  # starts worker processes six times
         (["no_such_scene"], "scenario 'no_such_scene' is not known"),
         (["free_fall", "--engine", "pymonk"], "did you mean pymunk"),
         (["free_fall", "--out", "README.md"], "is a file"),
-        (["free_fall", "--out", "tests"], "and no made.json says that crosscheck speed made it"),
+        (["free_fall", "--out", "tests"], "which crosscheck did not make"),
     ],
 )
 def test_bad_input_is_one_clear_sentence(

@@ -10,15 +10,14 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import read_row
-from crosscheck2d.reports.run.journal import Journal
+from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure
-from crosscheck2d.reports.speed.command import kept_of
+from crosscheck2d.reports.speed.command import SPEED, kept_of
 from crosscheck2d.reports.speed.effort import QUICK
 from crosscheck2d.reports.speed.kept import Kept
 from crosscheck2d.reports.speed.measure import done
 from crosscheck2d.reports.speed.plan import SpeedPlan
 from crosscheck2d.reports.terminal import progress as terminal
-from crosscheck2d.reports.terminal.exits import FolderTaken
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.terminal.command_line import crosscheck
@@ -51,45 +50,33 @@ HEADER: dict[str, Any] = {
 
 
 def test_what_has_ended_is_not_measured_again(tmp_path: Path):
-    """A journal of the same plan gives back every number, infinities too; one of another plan is
-    not lost to it."""
-    rows = [FAILED]
-    with Journal(tmp_path) as journal:
-        Kept(journal, HEADER, resume=False).add(TASK, rows)
-    with Journal(tmp_path) as journal:
-        again = Kept(journal, HEADER, resume=True)
-        with Progress() as progress:
-            found = dict(done({TASK: fails}, 1, progress, "error", kept=again))
+    """Of the same plan every number is used again, infinities too; of another plan none, and
+    nothing of either is lost."""
+    with writing(tmp_path / "out", SPEED) as store, Progress() as progress:
+        Kept(store, HEADER).add(TASK, [FAILED])
+        again = Kept(store, HEADER)
+        found = dict(done({TASK: fails}, 1, progress, "error", kept=again))
+        other = Kept(store, HEADER | {"seed": 1})
 
-        assert len(again) == 1
         assert found[TASK][0]["error_radii"] == np.inf
         assert np.isnan(found[TASK][0]["change_radii"])
-    with Journal(tmp_path) as journal:
-        with pytest.raises(
-            FolderTaken, match="holds 1 results of an interrupted run of something else"
-        ):
-            Kept(journal, HEADER | {"seed": 1}, resume=True)
-        with pytest.raises(FolderTaken, match="ask again with --resume"):
-            Kept(journal, HEADER, resume=False)
-    with Journal(tmp_path) as journal:  # nothing was lost by asking
-        assert len(Kept(journal, HEADER, resume=True)) == 1
+        assert TASK not in other
+        other.add(TASK, [])
+        assert (again[TASK][0]["status"], other[TASK]) == ("error", [])
 
 
-def test_what_was_measured_of_a_solver_that_was_saved_since_is_of_something_else(tmp_path: Path):
-    """Its rows would stand beside those of another text under one name."""
+def test_what_was_measured_of_a_solver_that_was_saved_since_is_measured_again(tmp_path: Path):
     solver = tmp_path / "solver.js"
     solver.write_text("function integrate(sphere, dt) {}")
     plan = SpeedPlan(("slow_collision",), [f"{solver}:own"], QUICK, 0, 1, whole=False)
     header: dict[str, Any] = {key: HEADER[key] for key in ("seed", "versions", "machine")}
     read_row(f"{solver}:own")
-    with Journal(tmp_path) as journal:
-        kept_of(plan, header, journal, resume=False).add(TASK, [FAILED])
-    with Journal(tmp_path) as journal:
-        assert len(kept_of(plan, header, journal, resume=True)) == 1
+    with writing(tmp_path / "out", SPEED) as store:
+        kept_of(plan, header, store).add(TASK, [FAILED])
+        assert TASK in kept_of(plan, header, store)
         solver.write_text("function integrate(sphere, dt) { }")
         read_row(f"{solver}:own")
-        with pytest.raises(FolderTaken, match="of something else"):
-            kept_of(plan, header, journal, resume=True)
+        assert TASK not in kept_of(plan, header, store)
 
 
 def fails() -> None:
@@ -113,26 +100,20 @@ def test_a_log_gets_a_line_now_and_then(
 
 
 @pytest.mark.slow
-def test_an_interrupt_keeps_what_has_ended_and_resume_goes_on(
+def test_an_interrupted_measurement_is_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Ctrl-C where the times begin: exit 130. With --resume no error is looked for a second time;
-    else none is lost."""
+    """Ctrl-C where the times begin: exit 130; the same command looks for no error a second time."""
     words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
     with monkeypatch.context() as patch:
         patch.setattr(measure.Measuring, "measure_times", interrupted)
         first = crosscheck(*words, cwd=tmp_path)
-    unasked = crosscheck(*words, cwd=tmp_path)
     monkeypatch.setattr(ladder, "errors_of", fails)
-    second = crosscheck(*words, "--resume", cwd=tmp_path)
+    second = crosscheck(*words, cwd=tmp_path)
 
     assert first.returncode == 130
-    assert "ask again with --resume" in first.stderr
-    assert unasked.returncode == 2
-    assert "holds 2 results of an interrupted run" in unasked.stderr
+    assert "give the same command again" in first.stderr
     assert second.returncode == 0, second.stderr
-    # a ladder, and what its error is made of
-    assert "Kept from the interrupted run: 2 tasks." in second.stderr
     assert len(pd.read_csv(tmp_path / "out" / "speed_errors.csv")) == len(
         QUICK.ladder(scenario("free_fall"))
     )

@@ -17,17 +17,15 @@ from crosscheck2d.adapters.engines import ENGINES, read_row
 from crosscheck2d.adapters.host.engine import TEMPLATES
 from crosscheck2d.reports import cli
 from crosscheck2d.reports.page.links import PAGES
-from crosscheck2d.reports.run.folders import RUN, begun
-from crosscheck2d.reports.run.journal import JOURNAL
+from crosscheck2d.reports.run.store import reading, writing
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.command import write_files
+from crosscheck2d.reports.stability.command import STABILITY, write_files
 from crosscheck2d.reports.stability.limits import QUICK
 from crosscheck2d.reports.stability.maps import MAPS
 from crosscheck2d.reports.stability.results import (
     COLUMNS,
     StabilityPlan,
     Task,
-    done_before,
     expected,
     read,
     tasks_of,
@@ -35,7 +33,6 @@ from crosscheck2d.reports.stability.results import (
 from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.page.browsing import opened
-from tests.reports.run.journals import contents, put
 from tests.reports.terminal.command_line import crosscheck
 
 pytestmark = pytest.mark.slow  # measures, and draws what it measured, for half a minute
@@ -81,10 +78,10 @@ def test_the_table_of_limits_is_a_file(results: Path):
 
 def test_the_first_failing_run_is_kept(results: Path):
     """A replay for each limit, none where nothing failed."""
+    with reading(results, STABILITY) as store:
+        limits = read(store).limits
     found = {
-        (limit.case, limit.engine): limit.replay != ""
-        for limit in read(results).limits
-        if limit.case in CASES
+        (limit.case, limit.engine): limit.replay != "" for limit in limits if limit.case in CASES
     }
 
     assert found["slow_collision", "box2d:shipped"]
@@ -107,66 +104,51 @@ def test_what_a_run_takes_is_said_before_it(tmp_path: Path):
     assert "2 searches (1 case, 2 engines): about 1 minute in" in done.stderr
 
 
-def test_the_same_journal_gives_the_same_table(
+def test_the_same_rows_give_the_same_files(
     results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Table and page are made from what the journal holds, and from the scene file that it
-    names."""
+    """Table and page are made from the rows, and from the scene file that they name."""
     monkeypatch.chdir(ROOT / "tests" / "data")
     again = tmp_path / "again"
     shutil.copytree(results, again)
-    write_files(again)
+    (again / "limits.csv").unlink()
+    with writing(again, STABILITY) as store:
+        write_files(store)
 
     assert (again / "limits.csv").read_bytes() == (results / "limits.csv").read_bytes()
 
 
-def test_what_has_ended_is_not_played_again(results: Path, monkeypatch: pytest.MonkeyPatch):
-    """Of an interrupted run of the same versions all is kept; of another version nothing."""
-    monkeypatch.chdir(ROOT / "tests" / "data")  # where its scene file is
-    plan = StabilityPlan(
-        ["slow_collision", "grazing"],
-        ["dt_and_speed"],
-        [],
-        ["box2d:shipped", "pymunk:matched"],
-        "quick",
-        1,
-        "",
-    )
-    had, done = done_before(results, plan)
-
-    kept = {(task.name, task.engine) for task in done}
-    assert ("slow_collision", "box2d:shipped") in kept
-    assert ("dt_and_speed", "pymunk:matched") in kept
-    assert all(task.name != "grazing" for task in done)
-    assert set(done) < set(tasks_of(plan))
-    assert Task("limit", "slow_collision", "box2d:shipped", "full") not in done
-    header, *others = contents(results)
-    header["header"]["versions"]["pymunk"] = "6"
-    other = results.parent / "other"
-    other.mkdir()
-    assert done_before(put(other, [header, *others]), plan) == (had, set())
-
-
-def test_what_an_interrupted_run_has_found_is_not_lost_by_asking_for_something_else(
-    results: Path, tmp_path: Path
+def test_a_task_has_another_key_where_anything_that_decides_it_is_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Without --resume, or with it for other cases, it is refused, and the journal stays as it
-    was."""
-    part = tmp_path / "out.part"
-    shutil.copytree(results, part)
-    begun(part, RUN, tmp_path / "out")
-    before = (part / JOURNAL).read_bytes()
-    engines = ("--engine", "box2d:shipped", "--engine", "pymunk:matched")
-    again = crosscheck("stability", "slow_collision", *engines, "--out", "out", cwd=tmp_path)
-    other = crosscheck("stability", "spin", *engines, "--out", "out", "--resume", cwd=tmp_path)
+    """Another form, version or scene file."""
+    monkeypatch.chdir(tmp_path)
+    plan = StabilityPlan(["slow_collision"], [], [], ["box2d:shipped"], "quick", 1, "")
+    tasks = [
+        Task("limit", name, "box2d:shipped", form)
+        for name in ("slow_collision", "two.toml:speed")
+        for form in ("quick", "full")
+    ]
+    keys = set()
+    for text in ("first", "second"):
+        Path("two.toml").write_text(text)
+        keys |= {plan.key(task) for task in tasks}
+    assert len(keys) == 6
 
-    assert (again.returncode, other.returncode) == (2, 2)
-    assert (
-        "out.part holds 10 results of an interrupted run: to go on with it, ask again with --resume"
-        in again.stderr
-    )
-    assert "interrupted run of something else" in other.stderr
-    assert (part / JOURNAL).read_bytes() == before
+    monkeypatch.setattr(StabilityPlan, "versions", {"pymunk": "6"})
+    assert not keys & {plan.key(task) for task in tasks}
+
+
+def test_what_has_a_row_is_not_played_again(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(Task, "__call__", None)  # nothing can be played
+    shutil.copytree(results, tmp_path / "out")
+    words = ("slow_collision", "--engine", "pymunk:matched", "--engine", "box2d:shipped")
+    done = crosscheck("stability", *words, "--out", "out", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert set(pd.read_csv(tmp_path / "out" / "limits.csv").case) == {"slow_collision"}
 
 
 @pytest.mark.parametrize(

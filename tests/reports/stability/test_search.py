@@ -19,9 +19,7 @@ from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.causes import CauseKind
 from crosscheck2d.reports.compare.verdicts import Verdict
 from crosscheck2d.reports.page.replay import pack_layers
-from crosscheck2d.reports.run.journal import plain
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_gas import gas
 from crosscheck2d.reports.stability.explain import explained
@@ -264,13 +262,13 @@ def test_a_worker_that_dies_is_a_row_of_the_table():
     assert "SIGABRT" in row["event"]
 
 
-def test_a_limit_comes_back_from_the_journal_as_it_was():
+def test_a_limit_comes_back_from_its_row_as_it_was():
     """Through JSON, where what is not a number is text."""
     for found in (
         limit_of(case(lambda x, _: x / 17, UP)),
         limit_of(case(lambda _x, _run: 2.0, UP)),
     ):
-        again = limit_from(json.loads(json.dumps(plain(asdict(found)))))
+        again = limit_from(json.loads(json.dumps(asdict(found))))
         assert repr(again) == repr(found)
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,12 +9,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.table import COLUMNS
+from crosscheck2d.reports.compare.verdicts import VERDICTS
+from crosscheck2d.reports.lessons.catalogue import LESSONS
+from crosscheck2d.reports.run import arguments
+from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
-from tests.reports.terminal.command_line import crosscheck, forked, process
+from tests.reports.run.small_runs import read
+from tests.reports.terminal.command_line import CROSSCHECK, crosscheck, forked, process
 
 SCENES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 SMALL = [
@@ -57,31 +61,49 @@ def test_help_loads_no_number_library():
     )
 
 
-def test_list_explains_every_engine_scenario_and_metric(tmp_path: Path):
-    """Every name of the three tables is in the list, with a line."""
+def test_list_explains_everything_that_has_a_name(tmp_path: Path):
     listed = crosscheck("list", cwd=tmp_path).stdout
 
-    for name in (*ENGINES, *SCENARIOS, *METRICS):
+    for name in (*ENGINES, *SCENARIOS, *METRICS, *VERDICTS, *CASES, *LESSONS):
         assert name in listed
 
 
+def test_what_reads_only_the_beginning_of_a_list_ends_it_silently(tmp_path: Path):
+    words = f"{CROSSCHECK} list | head -1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True)
+
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"{len(ENGINES | FETCHED)} engines\n"
+
+
+def test_a_run_that_names_its_engines_fetches_no_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(arguments, "fetch", lambda: pytest.fail("fetched"))
+    monkeypatch.setattr(arguments, "missing", lambda _: arguments.ABSENT)
+    words = ("run", "slow_collision", "--engine", "pymunk", "--timings", "0", "--out", "out")
+
+    assert crosscheck(*words, cwd=tmp_path).returncode == 0
+
+
 def test_a_run_writes_its_files(small_run: Path):
-    """Tables, journal, machine, page, and a trajectory a cell."""
+    """Rows, tables, and the page."""
     runs = pd.read_csv(small_run / "runs.csv", keep_default_na=False)
     deviations = pd.read_csv(small_run / "deviations.csv")
-    lines = [json.loads(line) for line in (small_run / "journal.jsonl").read_text().splitlines()]
+    results = read(small_run)
 
     assert list(deviations.columns) == list(COLUMNS)
     assert len(runs) == 2 * 4
     assert set(runs.status) == {"ok"}
-    assert {path.stem for path in (small_run / "trajectories").iterdir()} == set(runs.cell)
-    assert "header" in lines[0]
-    assert lines[-1]["footer"]["tasks"] == 8 + 5  # and the conformance of five engines
-    assert json.loads((small_run / "machine.json").read_text())["seed"] == 0
+    assert {record["cell"] for record in results.records} == set(runs.cell)
+    # and the conformance of five engines
+    assert sum(map(len, results.header["tasks"].values())) == 8 + 5
+    assert results.header["seed"] == 0
+    assert results.complete
     assert (small_run / "report.html").stat().st_size < 8e6
 
 
-def test_tables_are_made_again_from_the_journal(small_run: Path):
+def test_tables_are_made_again_from_the_rows(small_run: Path):
     """`report` gives the same bytes."""
     names = ("deviations.csv", "runs.csv")
     before = {name: (small_run / name).read_bytes() for name in names}
@@ -139,7 +161,7 @@ def test_a_scene_nobody_here_wrote_is_played(tmp_path: Path):
         (["list", "engine"], "did you mean engines"),
         (["truth", "asteroid"], "scenario 'asteroid' is not known; did you mean asteroids"),
         (["truth", "nowhere.toml"], "nowhere.toml"),
-        (["report", "nowhere"], "nowhere: has no journal.jsonl"),
+        (["report", "nowhere"], "nowhere: has no results.sqlite"),
         (["fly"], "fly"),
     ],
 )
@@ -304,12 +326,12 @@ def test_a_folder_that_holds_something_else_is_left_alone(small_run: Path, tmp_p
         (
             SMALL,
             "limits.csv",
-            "holds limits.csv, and no made.json says that crosscheck run made it",
+            "holds limits.csv, which crosscheck did not make",
         ),
         (
             ["stability", "slow_collision"],
             "runs.csv",
-            "holds runs.csv, and no made.json says that crosscheck stability made",
+            "holds runs.csv, which crosscheck did not make",
         ),
     ],
 )
@@ -336,40 +358,6 @@ def test_an_earlier_run_is_replaced_as_a_whole(small_run: Path):
     assert again.returncode == 0
     assert set(pd.read_csv(small_run / "runs.csv").scenario) == {"near_miss"}
     assert [path.name for path in small_run.parent.iterdir()] == ["here"]
-
-
-@pytest.mark.slow
-def test_a_trajectory_that_is_gone_is_a_failure_of_its_cell(small_run: Path, tmp_path: Path):
-    """Deleted or torn files are errors with a reason in runs.csv; where nothing is left, exit 1."""
-    copy = tmp_path / "copy"
-    shutil.copytree(small_run, copy)
-    one, *others = sorted((copy / "trajectories").iterdir())
-    one.write_bytes(one.read_bytes()[:100])
-    some = crosscheck("report", "copy", cwd=tmp_path)
-    runs = pd.read_csv(copy / "runs.csv")
-    for path in others:
-        path.unlink()
-
-    assert some.returncode in (0, 1)  # 1 if it was the only cell of its engine
-    assert runs[runs.status == "error"].reason.str.contains("is not what was written").tolist() == [
-        True
-    ]
-    assert crosscheck("report", "copy", cwd=tmp_path).returncode == 1
-    assert set(pd.read_csv(copy / "runs.csv").status) == {"error"}
-
-
-@pytest.mark.slow
-def test_a_scene_that_was_changed_after_it_was_played_is_not_reported(tmp_path: Path):
-    """Trajectories are judged by the scene they were played from, or not at all."""
-    crosscheck(
-        "run", SCENES / "two.toml", "--engine", "pymunk:matched", "--out", "out", cwd=tmp_path
-    )
-    [stored] = (tmp_path / "out" / "scenes").iterdir()
-    stored.write_text(stored.read_text().replace("mass = 2.0", "mass = 3.0"))
-    done = crosscheck("report", "out", cwd=tmp_path)
-
-    assert done.returncode == 2
-    assert "two-disks has changed since it was played" in done.stderr
 
 
 def test_the_folder_one_is_in_is_not_replaced(tmp_path: Path):

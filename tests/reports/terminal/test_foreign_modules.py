@@ -4,6 +4,7 @@ imported."""
 from __future__ import annotations
 
 import ast
+import multiprocessing
 import os
 import shutil
 import subprocess
@@ -19,11 +20,10 @@ import pytest
 from crosscheck2d.adapters import safe_path
 from crosscheck2d.adapters.host.file import SolverFailed, read_solver
 from crosscheck2d.adapters.host.process import SolverProcess
-from crosscheck2d.reports.run import worker
+from crosscheck2d.reports.run import pool
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_here
-from crosscheck2d.reports.run.runner import run_all
-from crosscheck2d.reports.run.worker_process import Failure
+from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.reports.run.control_engines import Controlled, row
 from tests.reports.terminal.command_line import CROSSCHECK
@@ -94,6 +94,21 @@ def in_a_worker() -> Any:
     return ended
 
 
+def start_unsafely(connection: Any, folder: str, memory: int) -> Any:
+    """A worker as multiprocessing starts one."""
+    process = multiprocessing.get_context("spawn").Process(
+        target=pool.serve, args=(connection, folder, memory, False)
+    )
+    process.start()
+    return process
+
+
+@pytest.fixture(autouse=True)
+def spawned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers are new interpreters, as on macOS and Windows: a fork imports nothing."""
+    monkeypatch.setattr(pool, "CONTEXT", multiprocessing.get_context("spawn"))
+
+
 @pytest.mark.parametrize("entry", [[], [""]])
 def test_a_worker_imports_nothing_of_the_folder_it_is_started_in(
     ran, monkeypatch: pytest.MonkeyPatch, entry: list[str]
@@ -110,9 +125,7 @@ def test_without_the_safe_path_a_worker_is_caught_and_its_cell_is_no_result(
 ):
     """The negative control: the traps work; and what came of it is said to lie outside the
     engine."""
-    monkeypatch.setattr(
-        worker, "python", lambda statements: [sys.executable, "-c", f"import sys; {statements}"]
-    )
+    monkeypatch.setattr(pool, "start_process", start_unsafely)
     ended = in_a_worker()
 
     assert ran() != ""

@@ -17,13 +17,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from crosscheck2d.reports.commands.run import what_is_kept
-from crosscheck2d.reports.run.folders import RUN, begun, replace_folder
-from crosscheck2d.reports.run.made import Made, put_made
+from crosscheck2d.reports.run.results import COMMAND
+from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.terminal.counts import counted
-from crosscheck2d.reports.terminal.exits import STATUS, Stopped, broken_off, stoppable
-from tests.reports.run.sweeps import ended_in
-from tests.reports.run.test_kills import alive
+from tests.reports.run.small_runs import cells_in
+from tests.reports.run.test_disturbed import alive
 from tests.reports.terminal.command_line import crosscheck, wait_for
 from tests.reports.terminal.stopping import AT_MOST, Command, assert_ended, busyness
 
@@ -110,7 +108,10 @@ def place(done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path / "cache"))
     (tmp_path / "two.toml").write_text(FILE)
     shutil.copytree(done, tmp_path / "done")
-    shutil.rmtree(tmp_path / "done" / "compared")
+    with writing(tmp_path / "done", COMMAND) as store:
+        for kind in ("truth", "comparison"):
+            for key in store.rows.keys(kind):
+                store.rows.delete(kind, key)
     return tmp_path
 
 
@@ -135,18 +136,17 @@ def test_a_command_ends_at_any_stage_though_compiled_code_never_returns(
 @pytest.mark.slow
 @pytest.mark.parametrize("how", TERM)
 def test_what_was_played_is_kept_and_gone_on_with(place: Path, done: Path, how: int):
-    """Signalled to stop while it compares: the sentence counts the cells, and --resume gives the
-    bytes of a whole run."""
+    """Signalled to stop while it compares: the sentence counts the cells, and the same command
+    gives the bytes of a whole run."""
     command = Command(
         *TWO, cwd=place, stalled="crosscheck2d.reports.compare.comparison:_measure"
     ).stalled()
-    had = ended_in(place / "out.part")
     ended = command.stop(how)
-    resumed = crosscheck("run", "--resume", "out", cwd=place)
+    had = cells_in(place / "out")
+    resumed = crosscheck(*TWO, cwd=place)
 
     assert_ended(ended, how)
-    assert {signal.SIGTERM: "Terminated.", signal.SIGINT: "Interrupted."}[how] in ended.said
-    assert f"Kept: {counted(ended_in(place / 'out.part') or had, 'finished cell')}." in ended.said
+    assert f"Interrupted. Kept: {counted(had, 'finished cell')}." in ended.said
     assert resumed.returncode == 0, resumed.stderr
     assert (place / "out" / "deviations.csv").read_bytes() == (done / "deviations.csv").read_bytes()
 
@@ -237,7 +237,7 @@ def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
     rows = table[table.note.str.startswith("not judged", na=False)]
     report = crosscheck("report", "out", cwd=place)
     truth = Command("truth", "two.toml", "--timeout", "2", cwd=place, stalled=TRUTH)
-    later = crosscheck("run", "--resume", "out", "--timeout", "60", cwd=place)
+    later = crosscheck(*TWO, "--timeout", "60", cwd=place)
 
     assert said in complained
     assert set(rows.scenario) == {"two"}
@@ -249,75 +249,6 @@ def test_what_takes_too_long_is_said_and_the_other_scene_is_judged(place: Path):
     assert "two: the exact answer took longer than 2 s (--timeout)\n" in truth.errors.read_text()
     assert later.returncode == 0
     assert "not judged" not in (place / "out" / "deviations.csv").read_text()
-
-
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("number", STATUS)
-def test_a_command_is_signalled_until_it_ends(number: int):
-    """What is raised in a destructor is lost: a second later it is raised again, and not once it
-    has been heard."""
-
-    class Deaf:
-        def __del__(self) -> None:
-            signal.raise_signal(number)
-
-    before = signal.getsignal(number), signal.getsignal(signal.SIGALRM)
-    signal.signal(number, signal.default_int_handler)
-    with stoppable() as listening:
-        try:
-            lost = Deaf()
-            del lost
-            signal.pause()
-        except Stopped as stopped:
-            status = stopped.status
-    signal.signal(number, before[0])
-
-    assert listening.status == status == STATUS[number]
-    assert signal.getsignal(signal.SIGALRM) == before[1]
-    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
-
-
-def test_a_second_ctrl_c_does_not_cut_the_sentence_off(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-):
-    """Impatience while it is said what is kept: it is said, and the status is that of the first
-    signal."""
-
-    def kept() -> str:
-        signal.raise_signal(signal.SIGINT)
-        return "All is kept."
-
-    with pytest.raises(SystemExit) as end, broken_off(tmp_path, kept):
-        signal.raise_signal(signal.SIGTERM)
-
-    assert end.value.code == 143
-    assert "Terminated. All is kept." in capsys.readouterr().err
-
-
-def test_a_finished_run_takes_its_place_whole_whenever_it_is_signalled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    """SIGTERM between the two renames: the old run is gone, the new one is there, and it is said
-    that all is done."""
-    made, target, rename = tmp_path / "out.part", tmp_path / "out", Path.rename
-    for folder, text in ((made, "new"), (target, "old")):
-        folder.mkdir()
-        (folder / "journal.jsonl").write_text(text)
-    begun(made, RUN, target)
-    put_made(target, Made(RUN.command, True, {}))
-
-    def rename_and_tell(path: Path, to: Path) -> Path:
-        signal.raise_signal(signal.SIGTERM)
-        return rename(path, to)
-
-    monkeypatch.setattr(Path, "rename", rename_and_tell)
-    with pytest.raises(SystemExit) as end, broken_off(made, lambda: what_is_kept(target)):
-        replace_folder(made, target, RUN)
-
-    assert end.value.code == 143
-    assert [path.name for path in tmp_path.iterdir()] == ["out"]
-    assert (target / "journal.jsonl").read_text() == "new"
-    assert f"Terminated. All is done: {target}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,26 +1,32 @@
 """Cells in worker processes: what aborts, hangs, raises or eats takes nothing along, and says where
 it was."""
 
-import subprocess
+import multiprocessing
+import os
 import sys
+import time
+from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 from unittest import mock
 
 import pytest
 
+from crosscheck2d.adapters.engine import NotStarted
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.run import playing, worker
+from crosscheck2d.reports.run import playing, pool
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import CellResult, play_cell, play_here
-from crosscheck2d.reports.run.runner import NoScheduler, cluster, run_all
+from crosscheck2d.reports.run.pool import Failure, affordable, run_all
 from crosscheck2d.reports.run.trajectories import from_trail, load_trajectory, packed
-from crosscheck2d.reports.run.worker_process import Failure
 from crosscheck2d.scenarios.catalogue import scenario
-from tests.forks import FRESH, Forked
+from tests.conftest import START_PROCESS
+from tests.forks import start_worker
 from tests.reports.run.control_engines import (
     CONTROLS,
     FATAL,
@@ -48,15 +54,22 @@ def cells(rows: dict[str, EngineRow]) -> dict[str, partial]:
     }
 
 
-@pytest.fixture(scope="module", params=["forked", pytest.param("fresh", marks=pytest.mark.slow)])
+@pytest.fixture(
+    scope="module",
+    params=[
+        "forkserver",
+        *(pytest.param(how, marks=pytest.mark.slow) for how in ("fork", "spawn")),
+    ],
+)
 def ended(request: pytest.FixtureRequest) -> dict[str, CellResult | Failure]:
-    """How 24 good cells ended and nine bad ones among them, on two workers: forked here, and each
-    an interpreter of its own, as users have it."""
+    """How 24 good cells ended and nine bad ones among them, on two workers."""
     mixed = {**dict(list(GOOD.items())[:12]), **CONTROLS, **dict(list(GOOD.items())[12:])}
     tasks = cells(mixed)
     # by itself, for the others may need long on a busy machine
     hang = {"hangs:control": tasks.pop("hangs:control")}
-    with mock.patch.object(worker, "start", FRESH if request.param == "fresh" else Forked):
+    context = multiprocessing.get_context(request.param)
+    start = start_worker if request.param == "forkserver" else START_PROCESS
+    with mock.patch.multiple(pool, start_process=start, CONTEXT=context):
         results = [
             *run_all(tasks, workers=2, memory=500_000_000),
             *run_all(hang, workers=1, timeout=3.0),
@@ -89,8 +102,8 @@ def test_every_good_cell_is_kept(ended):
         ("devours", "error", "MemoryError: took more than 500 MB (--memory)"),
         ("turnstonan", "diverged", f"of disk 0 is not finite at {FATAL / 60:g} s"),
         ("prints", "ok", ""),
-        ("leaves", "crashed", "was killed 3 times"),
-        ("iskilled", "crashed", "was killed 3 times"),
+        ("leaves", "crashed", "was killed 2 times"),
+        ("iskilled", "crashed", "was killed 2 times"),
     ],
 )
 def test_a_bad_cell_says_how_it_ended_and_where(ended, engine: str, status: str, said: str):
@@ -138,17 +151,6 @@ def impatient(*words: Any) -> CellResult:
     """In the worker: play, with little time to load."""
     playing.LOADING = 3.0
     return play_here(*words)
-
-
-def test_a_worker_imports_no_tables_and_no_compiler_to_play_a_cell():
-    """A worker starts in half of the time without them."""
-    code = (
-        "import sys, crosscheck2d.reports.run.playing\n"
-        "print([name for name in ('pandas', 'pydantic', 'numba') if name in sys.modules])"
-    )
-
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
 
 
 def test_a_worker_that_is_killed_from_outside_is_no_fault_of_its_cell(
@@ -203,25 +205,104 @@ def test_no_engine_remembers_what_it_played(name: str):
     assert not ENGINES[name].leaves_state
 
 
+def fails() -> None:
+    raise RuntimeError("no such luck")
+
+
+def devours() -> bytes:
+    return bytes(10**10)
+
+
+def has_no_process() -> None:
+    raise NotStarted("no process")
+
+
+def gives_a_function() -> Callable[[], None]:
+    return lambda: None
+
+
+def not_importable() -> Any:
+    """A task of a module that no other process can import."""
+    module = sys.modules["only_here"] = ModuleType("only_here")
+    exec("def task(): pass", module.__dict__)
+    return module.task
+
+
 @pytest.mark.parametrize(
-    ("address", "said"),
+    ("task", "outside", "reason"),
     [
-        ("foo", "--scheduler foo: is no address; one is like tcp://192.168.0.7:8786"),
-        (
-            "tcp://foo:1",
-            ("--scheduler tcp://foo:1: it needs the package distributed, which is not installed"),
-        ),
+        (fails, False, "RuntimeError: no such luck"),
+        (devours, True, "MemoryError: took more than 900 MB (--memory)"),
+        (has_no_process, True, "NotStarted: no process"),
+        (gives_a_function, True, "its result cannot be sent back: "),
+        (lambda: None, True, "it cannot be sent to a worker: "),
+        (not_importable(), True, "the worker cannot read its task: ModuleNotFoundError: "),
     ],
 )
-def test_a_cluster_without_its_extra_is_one_clear_sentence(
-    monkeypatch: pytest.MonkeyPatch, address: str, said: str
+def test_a_failure_has_its_reason_and_whether_that_is_outside_the_task(
+    task: Any, outside: bool, reason: str
 ):
-    """What is wrong with the address is said first; else what is missing, and how to get it."""
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(NoScheduler) as refusal:
-        cluster(address)
+    [(_, ended)] = run_all({"one": task}, workers=1, memory=900_000_000)
 
-    assert str(refusal.value).startswith(said)
+    assert (ended.status, ended.outside) == ("error", outside)
+    assert ended.reason.startswith(reason)
+
+
+@pytest.mark.usefixtures("fresh_workers")
+def test_a_worker_that_does_not_start_is_not_the_fault_of_its_task(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(pool, "serve", ends_at_once)
+    [(_, ended)] = run_all({"one": fails}, workers=1)
+
+    assert ended == Failure("crashed", "its worker could not start: exit status 3", outside=True)
+
+
+def ends_at_once(*_: object) -> None:
+    os._exit(3)
+
+
+def test_workers_are_limited_by_memory_and_open_files(monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.setattr(pool.psutil, "virtual_memory", lambda: SimpleNamespace(total=10**9))
+    monkeypatch.setattr(pool.system, "most_files", lambda: 1024)
+    assert (affordable(1000), affordable(2)) == (2, 2)
+    assert capsys.readouterr().err == (
+        "1000 workers are more than can start here (memory of 1000 MB, each needs 400):"
+        " 2 are started\n"
+    )
+
+    monkeypatch.setattr(pool.system, "most_files", lambda: 8)
+    with pytest.raises(SystemExit) as end:
+        affordable(1)
+    assert end.value.code == 2
+    assert capsys.readouterr().err == (
+        "at most 8 files may be open, and a run needs 64: ulimit -n 1024\n"
+    )
+
+
+def waits() -> str:
+    time.sleep(1.0)
+    return "ended"
+
+
+def test_a_clock_that_jumps_stops_no_task(monkeypatch: pytest.MonkeyPatch):
+    """The time of the day is set a year ahead, and back, while a task runs."""
+    now = time.time()
+    monkeypatch.setattr(
+        time, "time", lambda: now + 3e7 * (1 if time.monotonic() % 0.2 < 0.1 else -1)
+    )
+
+    assert dict(run_all({"one": waits}, workers=1, timeout=30.0)) == {"one": "ended"}
+
+
+def test_urgent_tasks_start_before_the_others():
+    """They may be added meanwhile."""
+    urgent: deque[Any] = deque()
+    order = []
+    for key, _ in run_all({k: os.getpid for k in range(4)}, workers=1, urgent=urgent):
+        if not order:
+            urgent.append(("urgent", os.getpid))
+        order.append(key)
+
+    assert order.index("urgent") <= 2
 
 
 def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):

@@ -1,0 +1,283 @@
+"""The folder of a command's results: its rows in one SQLite file, and the files that are made from
+them. What has a row is not done again.
+
+results.sqlite   the rows, each with a key: a hash of all that decides it
+other files      exports, written whole and renamed; the digest of each is a row, so that no file of
+                 another origin is ever overwritten or deleted
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from crosscheck2d.adapters.system import BINARY, lock
+from crosscheck2d.reports.terminal.exits import FolderTaken
+from crosscheck2d.reports.terminal.exits import say as warn
+from crosscheck2d.reports.terminal.foreign_text import encoded, whole
+from crosscheck2d.scenarios.regular import all_of
+from crosscheck2d.scenarios.rows import Row, Rows, digest_of
+
+FILE, LOCK = "results.sqlite", ".crosscheck.lock"
+OWN = re.compile(
+    rf"{re.escape(FILE)}(-journal)?|{re.escape(LOCK)}|\.crosscheck-\d+(-export)?\.part"
+)
+OLD = "journal.jsonl"  # of versions before the store
+EXPORT = "export"  # the kind of the row of a file: the digests that it may have
+MOVE_IT = "move it to another folder, or delete it"
+
+_locks: set[int] = set()  # open files of this process; a fork must not hold its locks
+
+
+class Store:
+    """The rows of a folder. Use `writing` or `reading` to open one.
+
+    Attributes:
+        fresh: whether rows that were there before are ignored.
+    """
+
+    def __init__(self, folder: Path, rows: Rows, fresh: bool = False) -> None:
+        self.folder, self.rows, self.fresh = folder, rows, fresh
+        self.written: set[tuple[str, str]] = set()
+        self.warned: set[tuple[str, str]] = set()
+
+    def put(self, kind: str, key: str, value: Any, blob: bytes = b"") -> Row:
+        """Write a row, or replace it: it is there wholly or not at all. Raises `OSError`."""
+        digest = self.rows.put(kind, key, value, blob)
+        self.written.add((kind, key))
+        return Row(value, blob, digest)
+
+    def get(self, kind: str, key: str) -> Row | None:
+        """The row that the task with this key need not make again; None if there is none. One that
+        is damaged is named once. Raises `OSError` or `Damaged`."""
+        if self.fresh and (kind, key) not in self.written:
+            return None
+
+        def name(sentence: str) -> None:
+            if (kind, key) not in self.warned:
+                warn(sentence)
+            self.warned.add((kind, key))
+
+        return self.rows.get(kind, key, name)
+
+    def export(self, name: str, data: str | bytes) -> None:
+        """Write a file of the folder, whole or not at all.
+
+        Raises:
+            FolderTaken: there is a file that was not written here, or was changed since.
+            OSError: it cannot be written.
+        """
+        path = self.folder / name
+        data = encoded(data) if isinstance(data, str) else data
+        digest = digest_of(data)
+        if path.is_symlink() or (os.path.lexists(path) and not self.is_ours(name)):
+            raise FolderTaken(f"{path}: {changed(path)}; {MOVE_IT}")
+        before = [digest_of(all_of(path))] if path.exists() else []
+        if before == [digest]:
+            return
+        self.rows.put(EXPORT, name, [*before, digest])
+        path.parent.mkdir(exist_ok=True)
+        with whole(path) as file:
+            file.write(data)
+
+    @contextmanager
+    def exporting(self, name: str) -> Iterator[Path]:
+        """Context with a path to write to, whose file becomes the export at its end."""
+        part = self.folder / f".crosscheck-{os.getpid()}-export.part"
+        try:
+            yield part
+            self.export(name, part.read_bytes())
+        finally:
+            part.unlink(missing_ok=True)
+
+    def is_ours(self, name: str) -> bool:
+        """Whether a file has bytes that were exported under its name."""
+        row = self.rows.get(EXPORT, name)
+        try:
+            return row is not None and digest_of(all_of(self.folder / name)) in row.value
+        except OSError:
+            return False
+
+    def delete_exports(self, folder: str, used: Mapping[str, Any]) -> None:
+        """Delete the exports in a folder below this one that are not `used`."""
+        names = [name for name in self.rows.keys(EXPORT) if name.startswith(f"{folder}/")]
+        unused = [name for name in names if name not in used]
+        for name in unused:
+            if self.is_ours(name):
+                (self.folder / name).unlink()
+        if not used:
+            with suppress(OSError):  # it is not there, or somebody has put something into it
+                (self.folder / folder).rmdir()
+        for name in unused:
+            self.rows.delete(EXPORT, name)
+
+    def refuse_foreign(self, option: str) -> None:
+        """Raise `FolderTaken` if the folder holds anything but the rows and their exports."""
+        exports = set(self.rows.keys(EXPORT))
+        folders = {name.partition("/")[0] for name in exports if "/" in name}
+        for path in files_below(self.folder, folders):
+            name = path.relative_to(self.folder).as_posix()
+            if OWN.fullmatch(path.name):
+                if path.suffix == ".part":  # of a command that was killed
+                    path.unlink()
+            elif name not in exports or not self.is_ours(name):
+                raise FolderTaken(
+                    f"{option}{self.folder}: holds {name}, which"
+                    f" {changed(path) if name in exports else 'crosscheck did not make'};"
+                    f" name another folder, or move it elsewhere"
+                )
+
+
+def changed(path: Path) -> str:
+    """Why a file may not be overwritten."""
+    return "is a link" if path.is_symlink() else "is not as crosscheck left it"
+
+
+def files_below(folder: Path, folders: set[str]) -> Iterator[Path]:
+    """All entries of a folder but `folders`, and all entries of those; links are not followed."""
+    for path in sorted(folder.iterdir()):
+        if path.name in folders and path.is_dir() and not path.is_symlink():
+            yield from sorted(path.iterdir())
+        else:
+            yield path
+
+
+@contextmanager
+def writing(
+    out: Path, command: str, fresh: bool = False, option: str = "--out "
+) -> Iterator[Store]:
+    """Context of the only process that writes into the folder `out` for `command`, which makes it.
+
+    Raises:
+        FolderTaken: the folder is used by another process, or holds something else.
+        Damaged: the file of its rows is damaged.
+        OSError: it cannot be made, written or locked.
+    """
+    folder = place_of(out, option)
+    refuse_place(folder, option)
+    new = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder, option):
+        try:
+            if not (folder / FILE).exists():
+                refuse_nonempty(folder, option)
+            rows = Rows(folder / FILE)
+        except BaseException:
+            with suppress(OSError):
+                (folder / LOCK).unlink()
+                if new:
+                    folder.rmdir()
+            raise
+        try:
+            store = Store(folder, rows, fresh)
+            made_by = rows.get("folder", "command")
+            if made_by is not None and made_by.value != command:
+                raise FolderTaken(
+                    f"{option}{out}: was made by {made_by.value}, not by {command}; name another"
+                    " folder"
+                )
+            if made_by is None:
+                rows.put("folder", "command", command)
+            store.refuse_foreign(option)
+            yield store
+        finally:
+            rows.close()
+
+
+@contextmanager
+def reading(folder: Path, command: str) -> Iterator[Store]:
+    """Context in which the rows of `command` in a folder are read, while another process may write;
+    raises as `writing`."""
+    if not (folder / FILE).is_file():
+        raise FolderTaken(without_store(folder, command))
+    rows = Rows(folder / FILE, writing=False)
+    try:
+        made_by = rows.get("folder", "command")
+        if made_by is None or made_by.value != command:
+            raise FolderTaken(without_store(folder, command))
+        yield Store(folder, rows)
+    finally:
+        rows.close()
+
+
+def without_store(folder: Path, command: str) -> str:
+    """Why a folder cannot be read."""
+    if (folder / OLD).exists():
+        return of_old_format(folder)
+    return f"{folder}: has no {FILE} of {command}, so it is not the folder of one"
+
+
+def of_old_format(folder: Path) -> str:
+    """A sentence on the folder of an earlier version."""
+    return (
+        f"{folder}: was made by an earlier version of crosscheck, which kept {OLD}; name another"
+        " folder, or delete it"
+    )
+
+
+def refuse_nonempty(folder: Path, option: str) -> None:
+    """Raise `FolderTaken` if a folder without rows holds anything."""
+    inside = sorted(path.name for path in folder.iterdir() if not OWN.fullmatch(path.name))
+    if OLD in inside:
+        raise FolderTaken(f"{option}{of_old_format(folder)}")
+    if inside:
+        raise FolderTaken(
+            f"{option}{folder}: holds {inside[0]}, which crosscheck did not make; name another"
+            " folder, or move it elsewhere"
+        )
+
+
+def place_of(out: Path, option: str = "--out ") -> Path:
+    """The folder that `out` names, with links resolved; raises `FolderTaken` for a link to
+    nothing."""
+    # Path.resolve raises RuntimeError, not OSError, for a link to itself
+    if out.is_symlink() and not out.exists():
+        raise FolderTaken(f"{option}{out}: is a link to nothing; name a folder")
+    return Path(os.path.realpath(out))
+
+
+def refuse_place(folder: Path, option: str) -> None:
+    """Raise `FolderTaken` unless results may go into this folder, or one that can be made here."""
+    if folder == Path.cwd() or folder in Path.cwd().parents:
+        raise FolderTaken(
+            f"{option}{folder}: is the current folder, or above it; name another folder, or go"
+            " elsewhere"
+        )
+    if folder.exists() and not folder.is_dir():
+        raise FolderTaken(f"{option}{folder}: is a file; name a folder that does not exist yet")
+
+
+@contextmanager
+def locked(folder: Path, option: str) -> Iterator[None]:
+    """Context in which no other process writes into the folder. The lock ends with the process."""
+    file = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | BINARY, 0o644)
+    _locks.add(file)
+    try:
+        try:
+            lock(file)
+        except BlockingIOError:
+            raise FolderTaken(
+                f"{option}{folder} is being written by another crosscheck; wait for it, or name"
+                " another folder"
+            ) from None
+        yield
+    finally:
+        _locks.discard(file)
+        with suppress(OSError):
+            os.close(file)
+
+
+def _close_locks() -> None:
+    """In a fork: the lock is its parent's alone."""
+    for file in _locks:
+        with suppress(OSError):
+            os.close(file)
+    _locks.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_close_locks)
