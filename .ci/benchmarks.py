@@ -25,7 +25,7 @@ ROUNDS, BUDGET, PATIENCE = 25, 1.0, 10.0
 def make() -> None:
     """Measure all, keep the figures, draw the picture."""
     crosscheck = Path(sys.executable).parent / "crosscheck"
-    subprocess.run([crosscheck, "speed", "--full", "--resume", "--out", OUT], check=True)
+    subprocess.run([crosscheck, "speed", "--full", "--out", OUT], check=True)
     figures.keep(OUT)
     write_picture(figures.PICTURE, figures.read())
     paths = (figures.KEPT, figures.ORDERS, figures.EXPLAINED, figures.PICTURE)
