@@ -463,8 +463,19 @@ def option_sections(results: Results) -> list[Section]:
     """The cost and the effect of each option that the scenes do not need."""
     if results.options.empty:
         return []
-    table = table_of(
-        results.options,
+    scenes = results.plan.option_scenes
+    says = (
+        "One option at a time is changed in the matched profile, at the middle dt of"
+        f" {len(scenes)} scenes: {', '.join(scenes)}."
+    )
+    parts = [options_table(results.options)]
+    return [Section("Options that a scene does not need", says, parts, True, "options")]
+
+
+def options_table(options: pd.DataFrame) -> Table:
+    """A row for each option in each scene, also one that failed there."""
+    return table_of(
+        options,
         name_of,
         {
             "change": "change",
@@ -479,12 +490,6 @@ def option_sections(results: Results) -> list[Section]:
         corner="Engine",
         caption="An error of 0 has no ratio.",
     )
-    scenes = results.plan.option_scenes
-    says = (
-        "One option at a time is changed in the matched profile, at the middle dt of"
-        f" {len(scenes)} scenes: {', '.join(scenes)}."
-    )
-    return [Section("Options that a scene does not need", says, [table], True, "options")]
 
 
 def sweep_sections(results: Results) -> list[Section]:
@@ -514,8 +519,19 @@ def sweep_sections(results: Results) -> list[Section]:
     )
     words = {"x": "time / time as matched", "y": "error / error as matched", "unit": ""}
     chart = chart_of(lines, "error against cost of sweeps", "Pooled", caption, **words)
-    table = table_of(
-        results.sweeps,
+    says = (
+        "There are two ways to reduce an error at a higher cost: more iterations or substeps at one"
+        " dt, or a smaller dt. Where a line of iterations is level, these cost time and do not"
+        " reduce the error."
+    )
+    title = "More work in a step, or more steps"
+    return [Section(title, says, [chart, sweeps_table(results.sweeps)], True, "sweeps")]
+
+
+def sweeps_table(sweeps: pd.DataFrame) -> Table:
+    """A row for each point of a sweep and of its engine, also one that failed."""
+    return table_of(
+        sweeps,
         "scenario",
         {
             "engine": name_of,
@@ -529,13 +545,6 @@ def sweep_sections(results: Results) -> list[Section]:
         sortable=True,
         corner="Scene",
     )
-    says = (
-        "There are two ways to reduce an error at a higher cost: more iterations or substeps at one"
-        " dt, or a smaller dt. Where a line of iterations is level, these cost time and do not"
-        " reduce the error."
-    )
-    title = "More work in a step, or more steps"
-    return [Section(title, says, [chart, table], True, "sweeps")]
 
 
 def interval_of_seeds(row: Row) -> str:
@@ -572,7 +581,19 @@ def size_sections(results: Results) -> list[Section]:
         index=names,
         dtype=object,
     )
-    grown = table_of(
+    parts: list[Part] = [chart, Table(steps, corner="µs a step"), growth_table(growth)]
+    pile = results.pile
+    if len(pile):
+        columns: Columns = {"awake, µs": PLAIN, "with sleeping, µs": "sleeping"}
+        n = int(pile.n.iloc[0])
+        parts.append(table_of(pile, "name", columns, corner=f"A settled pile of {n} disks"))
+    says = tables.end_of_all_pairs(costs)
+    return [Section("How the cost grows", says, parts, id="sizes")]
+
+
+def growth_table(growth: pd.DataFrame) -> Table:
+    """A row for each engine, also one that was stopped at the fewest disks."""
+    return table_of(
         growth,
         name_of,
         {
@@ -586,14 +607,6 @@ def size_sections(results: Results) -> list[Section]:
             "then": "stopped",
         },
     )
-    parts: list[Part] = [chart, Table(steps, corner="µs a step"), grown]
-    pile = results.pile
-    if len(pile):
-        columns: Columns = {"awake, µs": PLAIN, "with sleeping, µs": "sleeping"}
-        n = int(pile.n.iloc[0])
-        parts.append(table_of(pile, "name", columns, corner=f"A settled pile of {n} disks"))
-    says = tables.end_of_all_pairs(costs)
-    return [Section("How the cost grows", says, parts, id="sizes")]
 
 
 def quartiles(row: Row) -> str:
@@ -704,9 +717,14 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part
         caption="Order: the p of error ∝ dtᵖ, with its 95 % interval. Cost: µs per simulated second"
         " at the largest dt that reaches this accuracy.",
     )
-    every = table_of(
+    return [chart, table, points_table(points)]
+
+
+def points_table(points: pd.DataFrame) -> Table:
+    """A row for each engine and dt, also without a time, or failed."""
+    return table_of(
         points,
-        "name",
+        name_of,
         {
             "dt, s": "dt_s",
             "error, radii": "error",
@@ -722,4 +740,3 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part
         sortable=True,
         corner="Engine",
     )
-    return [chart, table, every]

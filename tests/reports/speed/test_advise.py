@@ -356,13 +356,13 @@ def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Pa
 def test_an_engine_whose_disk_is_through_the_floor_is_not_advised(name: str):
     """Up to 0.319 s, where it lands, all keep the error."""
     scene = str(SCENES / f"{name}.toml")
-    names = ("reference:exercise", "reference:coulomb", "box2d_v3:matched")
+    names = ("reference:exercise", "reference:coulomb", "pymunk:matched")
     dt = open_scene(scene, 0).dt
     with Progress() as progress:
         inquiry = Inquiry(scene, 0, 2, progress)
         ladders = [[Attempt(name, PLAIN, k, dt(k), 0.01) for k in (1, 2)] for name in names]
         able, unable, _ = inquiry.confirmed(ladders, "trajectory", inf)
 
-    assert [(one.name, one.substeps) for one in able] == [("box2d_v3:matched", 2)]
+    assert [(one.name, one.substeps) for one in able] == [("pymunk:matched", 2)]
     assert {one.name for one in unable} == {"reference:exercise", "reference:coulomb"}
     assert all(one.reason.startswith("tunnels at 0.467 s (dt 16.7 ms); tunnels") for one in unable)

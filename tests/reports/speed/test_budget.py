@@ -26,7 +26,8 @@ from crosscheck2d.adapters.mechanisms.table import (
     mechanisms_of,
 )
 from crosscheck2d.reports.compare import scales
-from crosscheck2d.reports.speed import budget, budget_tables, explained
+from crosscheck2d.reports.page.kit import Table, Text
+from crosscheck2d.reports.speed import budget, explained, page
 from crosscheck2d.reports.speed.budget import (
     ALL,
     INTERPLAY,
@@ -41,7 +42,7 @@ from crosscheck2d.reports.speed.budget import (
 )
 from crosscheck2d.reports.speed.plan import middle
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
-from crosscheck2d.scenarios.model import Array, State
+from crosscheck2d.scenarios.model import State
 
 FLOAT64 = 2.0**-53
 BUILT_IN = [name for name in MECHANISMS if name in ENGINES]
@@ -181,18 +182,17 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(
         "error: RuntimeError: no <b>such</b> thing",
     )
     table = pd.DataFrame([row], columns=budget.COLUMNS)
-    assert budget_tables.of_scene(table, "free_fall").notes == {"reference:exercise": row["note"]}
-    assert [cell.value for cell in budget_tables.overview(table).rows["reference:exercise"]] == [
-        0,
-        0,
-        0,
-        0,
-    ]
+    numbers, notes = page.contributions(table).opens["budget of free_fall"]
+    assert isinstance(numbers, Table)
+    assert isinstance(notes, Text)
+    assert numbers.frame.loc["reference:exercise"].isna().all()
+    assert notes.items == [f"reference:exercise has not played it: {row['note']}"]
+    assert page.overview(table).frame.loc["reference:exercise"].to_list() == [0, 0, 0, 0]
 
 
-def test_tables_have_the_largest_part_and_bars_by_decades():
-    """Bars: full at a radius, empty at a millionth; a part that is nothing for anybody has no
-    column."""
+def test_tables_have_the_largest_part_and_no_column_for_nothing():
+    """A part that is nothing for anybody has no column; the overview counts the scene for the
+    largest part."""
     rows = pd.DataFrame(
         [
             row
@@ -200,17 +200,17 @@ def test_tables_have_the_largest_part_and_bars_by_decades():
             for row in budget_of("slow_collision", 0, name, 4)
         ]
     )
-    table, overview = budget_tables.of_scene(rows, "slow_collision"), budget_tables.overview(rows)
-    bars: Array = np.array(
-        [budget_tables.cell(value).bar for value in (2.0, 1.0, 1e-3, 1e-6, 1e-9, 0.0, np.nan)]
-    )
+    numbers, notes = page.contributions(rows).opens["budget of slow_collision"]
+    largest = page.overview(rows).frame
 
-    assert bars == pytest.approx([1, 1, 0.5, 0, 0, 0, 0])
-    assert FLIGHT not in table.columns
-    assert table.columns[:2] == [TOTAL, RESIDUAL]
-    assert dict(zip(overview.columns, overview.rows["pymunk:shipped"]))[RESTITUTION].value == 1
-    assert dict(zip(overview.columns, overview.rows["box2d:matched"]))[TIME].value == 1
-    assert dict(zip(overview.columns, overview.rows["box2d:matched"]))["explained"].value == 1
+    assert isinstance(numbers, Table)
+    assert isinstance(notes, Text)
+    assert FLIGHT not in numbers.frame.columns
+    assert [*numbers.frame.columns[:2]] == [TOTAL, RESIDUAL]
+    assert notes.items == []
+    assert largest.loc["pymunk:shipped", RESTITUTION] == 1
+    assert largest.loc["box2d:matched", TIME] == 1
+    assert largest.loc["box2d:matched", "explained"] == 1
 
 
 def left_over(scene: str, name: str) -> float:

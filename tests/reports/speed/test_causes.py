@@ -137,7 +137,7 @@ def test_a_cause_is_judged_over_the_whole_scene(tmp_path: Path):
         "velocity = [40.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
         "[[wall]]\nstart = [5.07, -2.0]\nend = [5.07, 2.0]\n"
     )
-    assert cause(path, "pymunk:matched", tmp_path, 4).startswith(f"{LATE}: without it 0 of")
+    assert cause(path, "pymunk:shipped", tmp_path, 4).startswith(f"{LATE}: without it 0 of")
 
 
 def test_where_no_setting_helps_what_was_tried_is_named(tmp_path: Path):

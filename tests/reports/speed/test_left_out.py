@@ -1,16 +1,16 @@
-"""A scene or engine without a value is shown as such in tables and charts, and not left out of them
-in silence."""
+"""A scene or engine without a value is shown as such in the tables of the page, and not left out of
+them in silence."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 import pytest
 
 from crosscheck2d.reports.compare.order import ORDER
 from crosscheck2d.reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
-from crosscheck2d.reports.speed import charts, tables, versus
+from crosscheck2d.reports.page.kit import Table
+from crosscheck2d.reports.speed import page, tables, versus
 from crosscheck2d.reports.speed.measure import SIZE, Measured
 from crosscheck2d.reports.speed.plan import PLAIN, SCENE
 
@@ -76,8 +76,17 @@ def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
     assert tables.pooled_reached(reached[1:4], reached[1:4]).iloc[0].lost  # two of three
 
 
-def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_edge():
-    """The one is accurate, and must not look failed."""
+def rows_of(table: Table) -> list[dict[str, str]]:
+    """What a table shows: heading -> text, a row each."""
+    heads = [head.text for head in table.heads]
+    return [
+        {"": label.text} | dict(zip(heads, (cell.text for cell in cells)))
+        for _, label, cells in table.rows
+    ]
+
+
+def test_a_point_that_was_not_timed_has_its_error_and_a_failed_one_how_it_failed():
+    """The one is accurate, and must not look failed; neither is drawn as if it had a cost."""
     table = pd.DataFrame(
         [
             point(),
@@ -85,13 +94,14 @@ def test_a_point_that_was_not_timed_stands_at_its_error_and_a_failed_one_at_the_
             point(step_size=2, cost=np.nan, error=np.inf),
         ]
     )
-    figure = go.Figure(charts.speed(table))
-    edge = [trace for trace in figure.data if trace.mode == "markers"][-1]
+    timed, untimed, failed = rows_of(page.points_table(table))
+    (drawn,) = [line for line in page.drawn_lines(table) if not line.faint]
 
-    assert edge.y[0] == pytest.approx(0.05)
-    assert edge.y[1] > 0.1
-    assert "not timed" in edge.text[0]
-    assert "failed in 1 of 1" in edge.text[1]
+    assert (timed["error, radii"], timed["cost, µs/s"], timed["failed"]) == ("0.1", "1", "")
+    assert (untimed["error, radii"], untimed["failed"]) == ("0.05", "")
+    assert untimed["cost, µs/s"] == page.number(np.nan)
+    assert failed["failed"] == "1 of 1: error: no"
+    assert [*drawn.y] == [0.1]
 
 
 def sweep(value: str, step_size: int, **more: object) -> dict:
@@ -99,26 +109,27 @@ def sweep(value: str, step_size: int, **more: object) -> dict:
     return point(step_size=step_size, profile="matched+iterations", change=value, dt_s=0.1) | more
 
 
-def test_a_sweep_that_fails_most_scenes_stays_on_the_pooled_chart():
-    """At the edge: a ratio of infinity. It was not drawn at all."""
-    rows = [
-        row | {"scenario": scene}
-        for scene in ("one", "two")
-        for row in (
-            point(step_size=2),
-            sweep("1", 0),
-            sweep("9", 1, cost=np.nan, error=np.inf, failed=1),
-        )
-    ]
-    pool = tables.pooled_sweeps(pd.DataFrame(rows))
-    edge = next(
-        trace
-        for trace in go.Figure(charts.sweeps(pool, relative=True)).data
-        if trace.mode == "markers"
+def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
+    """With how it failed. It was not shown at all."""
+    found = pd.DataFrame(
+        [
+            row | {"scenario": scene}
+            for scene in ("one", "two")
+            for row in (
+                point(step_size=2),
+                sweep("1", 0),
+                sweep("9", 1, cost=np.nan, error=np.inf, failed=1, status="error", reason="no"),
+            )
+        ]
     )
+    pool = tables.pooled_sweeps(found)
+    lost = [row for row in rows_of(page.sweeps_table(found)) if row["failed"]]
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
-    assert "failed in 2 of 2" in edge.text[0]
+    assert [(row[""], row["value"], row["failed"]) for row in lost] == [
+        ("one", "9", "error: no"),
+        ("two", "9", "error: no"),
+    ]
 
 
 def test_a_scene_without_a_ratio_is_named():
@@ -138,8 +149,8 @@ def test_a_scene_without_a_ratio_is_named():
     assert set(tables.pooled_sweeps(found)["of"]) == {1}
 
 
-def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
-    """Beyond every ratio that there is."""
+def test_a_change_that_fails_has_its_row_with_how_it_failed():
+    """And the change that did not has its ratios."""
     table = pd.DataFrame(
         {
             "scenario": ["one", "two"],
@@ -147,6 +158,7 @@ def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
             "profile": "matched",
             "change": "no rotation",
             "status": ["ok", "error"],
+            "reason": ["", "no"],
             "error_ratio": [1.5, np.inf],
             "cost_ratio": [1.0, np.nan],
             "error_radii": [0.1, np.inf],
@@ -158,14 +170,13 @@ def test_a_change_that_fails_stands_at_the_right_edge_of_its_chart():
             "best": 1.0,
         }
     )
-    for ratio in ("error_ratio", "cost_ratio"):
-        figure = go.Figure(charts.options(table, ratio, ""))
-        trace = figure.data[-1]
-        assert trace.x[1] > 1.5
-        assert FAILED in figure.layout.xaxis.ticktext
+    ok, failed = rows_of(page.options_table(table))
+
+    assert (ok["scene"], ok["error, × unchanged"], ok["failed"]) == ("one", "1.5", "")
+    assert (failed["scene"], failed["failed"]) == ("two", "error: no")
 
 
-def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
+def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_reason():
     """It has no cost at any size, and had no row."""
     sample = {
         "kind": SIZE,
@@ -181,10 +192,13 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_cross():
     )
     costs = tables.sizes(measured)
     growth = tables.growth(costs, measured.stopped)
-    names = [trace.name for trace in go.Figure(charts.sizes(costs, growth)).data]
+    rows = rows_of(page.growth_table(growth))
 
     assert growth.set_index("engine").stopped.to_dict() == {"pymunk": "", "box2d": "3: refused: no"}
-    assert names == ["pymunk:matched", "box2d:matched"]
+    assert [(row[""], row["then"]) for row in rows] == [
+        ("pymunk:matched", ""),
+        ("box2d:matched", "3: refused: no"),
+    ]
 
 
 def test_an_order_tells_how_many_steps_failed():
@@ -266,4 +280,21 @@ def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
 
 def test_where_no_timing_ended_there_is_a_table_without_times():
     """An engine that fails while it is timed takes those of its scene along; the errors stay."""
-    assert tables.times(Measured(), SCENE).empty
+    error = {
+        "kind": SCENE,
+        "scenario": "one",
+        "engine": "pymunk",
+        "profile": "matched",
+        "change": PLAIN,
+        "dt_s": 0.4,
+        "substeps": 1,
+        "until_s": 1.0,
+        "duration_s": 1.0,
+        "status": "ok",
+        "reason": "",
+        "error_radii": 0.1,
+    }
+    (row,) = tables.points(Measured(errors=pd.DataFrame([error])), 0).to_dict("records")
+
+    assert row["error"] == 0.1
+    assert np.isnan(row["cost"])
