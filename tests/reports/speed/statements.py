@@ -57,9 +57,9 @@ def caption(kept: pd.DataFrame) -> str:
         f" their error {by}"
         f"{' (below 1: the error grows)' if falls.min(axis=None) < 1 else ''}"
         f"{', where not too many scenes fail' if falls.isna().any(axis=None) else ''}. These come"
-        f" within a millionth of a radius of the exact answer in {min(reached)} to {max(reached)} of"
-        f" {of(rows.note.iloc[0])[1]} scenes. The two engines that take each collision at its own"
-        f" time do so in {got['reference:ordered']} (`reference:ordered`) and"
+        f" within a millionth of a radius of the exact answer in {min(reached)} to {max(reached)}"
+        f" of {of(rows.note.iloc[0])[1]} scenes. The two engines that take each collision at its"
+        f" own time do so in {got['reference:ordered']} (`reference:ordered`) and"
         f" {got['event_driven:float64']} (event-driven; it fails in {lost})."
     )
 
