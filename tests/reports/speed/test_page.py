@@ -17,9 +17,11 @@ from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.pareto import ACCURACIES, FAILED, UNREACHABLE
 from crosscheck2d.reports.compare.pooling import said_of_pool
+from crosscheck2d.reports.run.arguments import opening
 from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.speed import figures
 from crosscheck2d.reports.speed.budget import budget_of
+from crosscheck2d.reports.speed.command import SPEED, write_all
 from crosscheck2d.reports.speed.effort import QUICK
 from crosscheck2d.reports.speed.explained import cuts
 from crosscheck2d.reports.speed.measure import Measured, Measuring
@@ -84,7 +86,8 @@ def results(measured: Measured) -> Results:
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
     """A row a round for every engine, dt and copy; a row a seed for every engine and dt."""
-    results.write(tmp_path)
+    with opening(tmp_path, SPEED) as store:
+        write_all(store, results, about("crosscheck speed", 0) | SAID)
     samples, errors = (
         pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors")
     )
