@@ -8,13 +8,3 @@ from crosscheck2d.reports.run import bits
 
 TABLE = bits.read(bits.KEPT.read_text("utf-8"))
 MEASURED = frozenset(TABLE.engine + ":" + TABLE.profile)
-# Scenes younger than the tables of reports/speed, until .ci/benchmarks.py makes them again.
-NOT_YET_TIMED = frozenset(
-    {
-        "free_fall_without_spin",
-        "off_centre_without_spin",
-        "heavy_on_light",
-        "ball_on_supported_ball",
-        "two_disks_and_a_wall",
-    }
-)

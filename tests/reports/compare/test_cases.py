@@ -143,8 +143,10 @@ def test_the_group_that_departs_more_is_the_value(
 
 
 def test_apex_heights_say_who_bounces_higher():
-    """Percent a bounce: pymunk keeps its apex, Box2D 3.1 loses 1.2 % in all."""
-    assert read("apex_change", "higher", "pymunk:matched").value == pytest.approx(0, abs=1e-9)
+    """Percent a bounce: as shipped pymunk keeps its apex, matched it comes higher by what it is
+    moved out of the floor; Box2D 3.1 loses 1.2 % in all."""
+    assert read("apex_change", "higher", "pymunk:shipped", 1).value == pytest.approx(0, abs=1e-9)
+    assert read("apex_change", "higher", "pymunk:matched").value == pytest.approx(0.18, abs=0.01)
     assert read("apex_change", "higher", "event_driven:float64").value == pytest.approx(0, abs=1e-9)
     lost = read("apex_change", "higher", "box2d_v3:matched")
     assert -0.3 < lost.value < -0.2
@@ -201,10 +203,10 @@ def test_no_apex_is_read_off_a_tilted_floor():
     assert METRICS["apex_change"].of(beside(scenario, run, None, None)) is None
 
 
-@pytest.mark.parametrize("rung", [0, 1, 2])
+@pytest.mark.parametrize("rung", [1, 2])
 def test_velocities_half_a_step_off_create_no_energy(rung: int):
     """Of pymunk, whose apex stays; the lesson's solver, which comes higher, is the control."""
-    assert read("energy_created", "higher", "pymunk:matched", rung).value < 1e-13
+    assert read("energy_created", "higher", "pymunk:shipped", rung).value < 1e-13
     assert read("energy_created", "higher", "reference:lesson", rung).value > 0.02
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer, mean_squared_error_of
+from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KnownAnswer
 
 
 @pytest.mark.parametrize(
@@ -21,11 +21,3 @@ def test_a_published_number_comes_out_digit_for_digit(known: KnownAnswer):
     does both."""
     # Published with six significant digits; both sides sum the same doubles in another order.
     assert f"{known.reproduce():.6g}" == f"{known.published_J2:.6g}"
-
-
-@pytest.mark.parametrize("dt", [1e-2, 1e-3])
-def test_no_setting_of_pymunk_changes_the_ode_column(dt: float):
-    """As shipped it gives the same number: it is the order of operations, not a setting."""
-    assert mean_squared_error_of("pymunk:shipped", dt) == mean_squared_error_of(
-        "pymunk:matched", dt
-    )
