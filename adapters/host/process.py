@@ -119,7 +119,7 @@ class SolverProcess:
         self.order = solver.order | {"folder": str(self.copies) if self.copies else None}
         digest = hashlib.sha256(json.dumps(self.order).encode()).hexdigest()
         self.key = os.getpid(), digest
-        hello = self.open()
+        hello = self.connect()
         if "failed" in hello:
             self.end()
             raise failure_in(hello["failed"])
@@ -130,7 +130,7 @@ class SolverProcess:
         if self.kind == "javascript":
             self.versions["mini-racer"] = version("mini-racer")
 
-    def open(self) -> Any:
+    def connect(self) -> Any:
         """Start a process, or reuse a waiting one, and send it the guest; returns its first answer.
 
         The process itself stops a file that does not load in time. If it does not answer at all, it

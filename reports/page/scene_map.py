@@ -9,6 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from crosscheck2d.adapters.engines import OWN
+from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.verdicts import VERDICTS
@@ -202,6 +203,8 @@ def remarks(scene: SceneScores) -> list[Part]:
         told.append(f"No exact answer: {scenario.without_truth}.")
     elif truth.reason:
         told.append(f"The exact answer ends at {style.number(truth.horizon)} s: {truth.reason}.")
+    if note := off_grid_note(scenario):
+        told.append(f"{note[0].upper()}{note[1:].removesuffix('.')}.")
     if note := fast_note(comparison):
         told.append(note)
     by_reason: dict[str, list[str]] = {}

@@ -159,7 +159,7 @@ def writing(
     """
     folder = place_of(out, option)
     refuse_place(folder, option)
-    new = not folder.exists()
+    new, unlocked = not folder.exists(), not (folder / LOCK).exists()
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder, option):
         try:
@@ -168,7 +168,8 @@ def writing(
             rows = Rows(folder / FILE)
         except BaseException:
             with suppress(OSError):
-                (folder / LOCK).unlink()
+                if unlocked:
+                    (folder / LOCK).unlink()
                 if new:
                     folder.rmdir()
             raise

@@ -21,7 +21,6 @@ from crosscheck2d.reports.compare.causes import (
     unknown,
 )
 from crosscheck2d.reports.compare.faces import ALONG, first_on_line
-from crosscheck2d.reports.stability.cases_collisions import BULLETS
 from crosscheck2d.reports.stability.limits import Limit
 from crosscheck2d.reports.stability.predicates import REFUSED, judge
 from crosscheck2d.reports.stability.predicates_usable import GHOST
@@ -94,6 +93,7 @@ PIECES = "the walls of one floor act as several; join them into one wall"
 FLOAT32 = "positions are float32, too coarse so far from the origin"
 TOO_LARGE = f"{ACTS_AT_END}, and the step is too large for that"
 UNSWEPT, EIGHTHS = "disks are not swept against each other", "in steps of an eighth"
+BULLETS = "box2d_v3:matched+bullets"
 INTERVENTIONS = {
     "joined": Intervention("*", "*", PIECES, "on a floor of one wall", joined),
     "at_home": Intervention("box2d*", "offset", FLOAT32, "at the origin", at_home),
@@ -104,12 +104,7 @@ INTERVENTIONS = {
     # threshold depend on the step, too.
     "finer_matter": Intervention("matter:*", "[!d]*", None, EIGHTHS, finer),
     "finer": Intervention("*", "[!d]*", TOO_LARGE, EIGHTHS, finer),
-    **{
-        f"{bullets.partition(':')[0]}_swept": Intervention(
-            bullets.removesuffix("+bullets"), "*", UNSWEPT, f"as {bullets}", engine=bullets
-        )
-        for bullets in BULLETS
-    },
+    "swept": Intervention("box2d_v3:matched", "*", UNSWEPT, f"as {BULLETS}", engine=BULLETS),
 }
 """In the order in which they are tried: changes of one thing only come first, a finer step comes
 later. The settings of the engine come after `FIRST`.

@@ -256,6 +256,8 @@ def growth_limit(share: float) -> float:
 
 DETECTING = "reference:* pymunk:*"
 SWEEPING = f"{DETECTING} box2d_v3:matched"
+# what moves is no bullet
+UNSWEPT = "box2d*:shipped planck:shipped matter:* rapier2d:*"
 UNFOUND = "reference:exercise reference:lesson"
 ROUGH = (
     "friction_in_bounce strong_friction spin_in_bounce friction_mass_ratio slide_to_roll"
@@ -274,8 +276,8 @@ REASONS = (
     Reason("grazing", DETECTING, "discrete", 1 - sqrt(1 - 0.01), "+bullets"),
     # a length unit of half a radius, 1/64 s
     Reason("tunnelling_thin_wall", "rapier2d:matched", "speed_cap", 400 * 0.5 / 64),
-    Reason("tunnelling_*", "*", "no_bullet"),
-    Reason("grazing", "*", "chord"),
+    Reason("tunnelling_*", UNSWEPT, "no_bullet"),
+    Reason("grazing", f"{UNSWEPT} box2d_v3:matched", "chord"),
     # One disk, or two.
     Reason(
         "bounce_drift",

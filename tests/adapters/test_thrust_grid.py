@@ -93,5 +93,5 @@ def test_the_page_and_the_terminal_say_so(tmp_path: Path, stop: float, noted: bo
     page = (tmp_path / "mine" / "report.html").read_text("utf-8")
 
     assert done.returncode == 0, done.stderr
-    assert ("a thrust starts or stops inside a step" in " ".join(done.stdout.split())) == noted
-    assert ("a thrust starts or stops inside a step" in page) == noted
+    assert ("thrust starts or stops inside a step" in " ".join(done.stdout.split())) == noted
+    assert ("thrust starts or stops inside a step" in page) == noted

@@ -274,8 +274,8 @@ def test_a_limit_comes_back_from_its_row_as_it_was():
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     """A prediction outside the bracket, or a variant that gets no farther, tests nothing."""
-    slow = LimitSearch(CASES["tunnelling_head_on"], "box2d:matched", QUICK).limit()
-    free = LimitSearch(CASES["tunnelling_head_on"], "box2d:matched+bullets", QUICK).limit()
+    slow = LimitSearch(CASES["tunnelling_head_on"], "box2d_v3:matched", QUICK).limit()
+    free = LimitSearch(CASES["tunnelling_head_on"], "box2d_v3:matched+bullets", QUICK).limit()
     elsewhere = replace(slow, works_at=3.9, fails_at=4.0)
     [both, _], [alone], [wrong, _] = (
         explained([slow, free]),
@@ -284,7 +284,7 @@ def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
     )
 
     assert [limit.cause and limit.cause.shown for limit in (both, alone, wrong)] == [
-        "predicts 2; box2d:matched+bullets gets farther",
+        "predicts 2; box2d_v3:matched+bullets gets farther",
         "predicts 2",
         "",
     ]

@@ -107,8 +107,12 @@ def without_encoding(source: str) -> list[int]:
             node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         )
         owner = node.func.value if isinstance(node.func, ast.Attribute) else None
-        if isinstance(owner, ast.Name) and owner.id in ("os", "webbrowser") and called == "open":
-            continue  # a descriptor, a page
+        if (
+            isinstance(owner, ast.Name)
+            and owner.id in ("os", "webbrowser", "Image")
+            and called == "open"
+        ):
+            continue  # a descriptor, a page, a picture
         given = {word.arg: word.value for word in node.keywords}
         modes = [
             mode.value for mode in (*node.args, *given.values()) if isinstance(mode, ast.Constant)
