@@ -216,7 +216,12 @@ def test_limits_are_the_kept_ones_and_equal_cells_are_one(summary: Summary):
 
     assert [cell.text for cell in rows["A column stands"]][:2] == ["4", "9"]
     assert rows["Slow disks bounce"][1].notes[0].text == "shipped 1"
-    assert rows["A ball keeps its height"][0].css == "best"
+    assert [c.css for c in rows["A ball keeps its height"]][:3] == [
+        "",
+        "",
+        "",
+    ]  # within a factor of 2
+    assert [c.css for c in rows["Fast disks meet head-on"]][:2] == ["", "best"]
 
 
 def test_the_chart_of_sizes_has_every_kept_engine_of_the_table(summary: Summary):
