@@ -84,10 +84,10 @@ def test_a_probe_begins_with_the_file_as_it_was_written(
     the process does not load it anew, it throws. None of the processes is left."""
     row = row_of_file(template(tmp_path, kind, *COUNTS[kind]))
     started: list[psutil.Process] = []
-    begin, start = SolverProcess.begin, SolverProcess.start
+    begin, connect = SolverProcess.begin, SolverProcess.connect
 
-    def noted(process: SolverProcess, settings: dict[str, str]) -> None:
-        begin(process, settings)
+    def noted(process: SolverProcess) -> None:
+        begin(process)
         assert process.process is not None
         started.append(psutil.Process(process.process.pid))
 
@@ -98,12 +98,12 @@ def test_a_probe_begins_with_the_file_as_it_was_written(
 
     first = []
 
-    def not_anew(process: SolverProcess, settings: dict[str, str]) -> Any:
-        if not (first and process.take()):
-            first.append(start(process, settings))
+    def not_anew(process: SolverProcess) -> Any:
+        if not (first and process.reuse()):
+            first.append(connect(process))
         return first[0]
 
-    monkeypatch.setattr(SolverProcess, "start", not_anew)
+    monkeypatch.setattr(SolverProcess, "connect", not_anew)
     assert missed(row)
 
 

@@ -64,7 +64,7 @@ def printed(folder: Path, first: str, number: int) -> int:
     done = subprocess.run(
         [sys.executable, "outer.py"],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT / ".ci" / "types")},
         capture_output=True,
         text=True,
         check=True,

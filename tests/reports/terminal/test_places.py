@@ -50,8 +50,8 @@ def test_an_outlet_takes_all_and_remembers_the_first_fault():
         ),
         pytest.param(
             "$C list engines | head -0; exit ${PIPESTATUS[0]}",
-            1,
-            REFUSED + "Broken pipe",
+            0,
+            "",
             marks=pytest.mark.slow,
         ),
         pytest.param("$C list engines >/dev/null", 0, "", marks=pytest.mark.long),
@@ -98,7 +98,7 @@ def test_what_was_computed_is_kept_whatever_becomes_of_the_streams(tmp_path: Pat
     assert done.returncode == (0 if stream == "2>/dev/full" else 1)
     assert b"Traceback" not in done.stderr
     assert set(pd.read_csv(tmp_path / "out" / "runs.csv").status) == {"ok"}
-    assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+    assert (tmp_path / "out" / "report.html").stat().st_size > 50_000
     assert shell("$C report out", tmp_path).returncode == 0
 
 
