@@ -163,9 +163,9 @@ def test_the_share_that_is_drawn_is_of_all_runs_as_the_text_counts_them():
     """The search itself stops at the first run that fails, which made every share 1."""
     values = [SEEN["a fast disk meets another"].value(place) for place in HARSHNESS]
     place = values.index(4.0)
-    shown = LESSON.at(at("tunnelling_head_on", "box2d:matched", place))
+    shown = LESSON.at(at("tunnelling_head_on", "pymunk:matched", place))
     failed, runs = re.search(r"(\d+) of (\d+) runs fail", shown.steps["Here"]).groups()
-    x, y = shown.x("box2d:matched", 1), shown.y("box2d:matched", 1)
+    x, y = shown.x("pymunk:matched", 1), shown.y("pymunk:matched", 1)
 
-    assert (failed, runs) == ("15", "32")  # half of the phases, by geometry: 2 R missed in each 4 R
+    assert (failed, runs) == ("16", "32")  # half of the phases, by geometry: 2 R missed in each 4 R
     assert y[np.isclose(x, 4.0)].tolist() == [int(failed) / int(runs)]
