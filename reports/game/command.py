@@ -56,6 +56,7 @@ def own_rows(names: Sequence[str]) -> tuple[dict[str, EngineRow], float]:
         rows[name] = row_of_file(path, PATIENCE, collected=True)
         with closing(cast(GuestEngine, rows[name].make())) as engine:
             try:
+                assert engine.process  # it is started, and its restitution known
                 restitutions.append(engine.own_restitution)
                 engine.load(field_scenario(asteroids=1, restitution=restitutions[-1]).scene, FRAME)
             except Exception as error:  # somebody's solver may raise anything

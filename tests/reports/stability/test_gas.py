@@ -184,7 +184,7 @@ def test_without_walls_momentum_stays_to_rounding_in_every_engine_and_a_leak_is_
 
 @pytest.mark.slow
 def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
-    """At packing 0.6 an engine that detects at the end of a step has a fifteenth too few collisions; in
+    """At packing 0.6 an engine that detects at the end of a step has a tenth too few collisions; in
     order within it, not."""
     scenario = CASES["thermometer"].scene(0.6, 0)
     late, in_order = (
@@ -195,7 +195,7 @@ def test_finding_collisions_late_costs_a_dense_gas_its_rate_and_its_pressure():
     rate = counted(one, collisions.j >= 0, np.ones(len(collisions))).mean() / ought.rate
     pressure = counted(one, collisions.j < 0, collisions.impulse).mean() / ought.force
 
-    assert rate == pytest.approx(0.93, abs=0.02)
+    assert rate == pytest.approx(0.9, abs=0.02)
     assert pressure == pytest.approx(0.9, abs=0.02)
     assert late.id in ("rate", "pressure")
     assert late.failed
