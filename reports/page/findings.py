@@ -87,6 +87,8 @@ def own_sentence(name: str, summary: Summary) -> str:
     errors = {scene: error for scene, error in errors.items() if not np.isnan(error)}
     lost = sorted((s for s in errors if errors[s] > LOST), key=lambda s: -errors[s])
     refused = sum(name in scene.refused for scene in summary.scenes)
+    if not errors:  # the reason that nothing was played is printed beside it
+        return f"{name.removesuffix(OWN)} is not ranked among the engines: it played no scene."
     near = f"{len(errors) - len(lost)} of {counted(len(errors), 'scene')}"
     told = f"{name.removesuffix(OWN)} is within a radius of the exact answer in {near}"
     if lost:

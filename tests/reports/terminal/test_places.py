@@ -162,7 +162,7 @@ def test_a_run_with_names_in_other_bytes_is_whole_everywhere(
     assert table.engine.nunique() == 2
     assert set(pd.read_csv(out / "runs.csv").status) == {"ok"}
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert (Path(__file__).parents[3] / "reports" / "page" / "page.js").read_text(
+    assert (Path(__file__).parents[3] / "reports" / "page" / "kit.js").read_text(
         encoding="utf-8"
     ) in page
     assert "own" in page
