@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from time import process_time, sleep
-from typing import IO, Any
+from typing import IO
 
 KERNEL = sys.platform == "linux" and os.environ.get("CROSSCHECK_SYSTEM") != "portable"
 LIMITED_BY = "the kernel" if KERNEL else "a thread that watches the process"
@@ -98,11 +98,6 @@ def watch(is_time: Callable[[], bool], status: int) -> None:
         os._exit(status)
 
     threading.Thread(target=look, daemon=True).start()
-
-
-def own_group() -> dict[str, Any]:
-    """Arguments of `subprocess.Popen` for a process that `end_all` will end."""
-    return {"start_new_session": True} if KERNEL else {}
 
 
 def end_all(pid: int) -> None:

@@ -191,7 +191,7 @@ class SolverProcess:
             env=how.environment,
             cwd="/" if os.name == "posix" else None,
             bufsize=0,
-            **system.own_group(),
+            start_new_session=True,  # the guest ends its group with itself, and no other process
         )
         assert self.process.stdout is not None
         self.level, self.pieces = level, system.Pieces(self.process.stdout)
