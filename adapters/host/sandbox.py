@@ -109,13 +109,17 @@ def start(
     level: Level, kind: str, packages: Sequence[str], copies: Path | None, jit: bool
 ) -> Start:
     """How to start a guest; copies: a folder that it may write, for compiled code."""
-    files = files_of((*NEEDED[kind], *packages))
+    portable = not KERNEL or os.environ.get("CROSSCHECK_SYSTEM") == "portable"
+    # without the kernel's limits the guest watches its own memory with psutil
+    files = files_of((*NEEDED[kind], *packages, *(["psutil"] if portable else [])))
     inner = level == Level.BUBBLEWRAP
     environment = dict(QUIET) | ({} if jit else {"NUMBA_DISABLE_JIT": "1"})
     if copies is not None:
         environment["NUMBA_CACHE_DIR"] = str(copies / "compiled")
-    if "SYSTEMROOT" in os.environ:  # Windows starts no Python without it
-        environment["SYSTEMROOT"] = os.environ["SYSTEMROOT"]
+    # Windows starts no Python without the first; the second says how the guest is limited
+    for name in ("SYSTEMROOT", "CROSSCHECK_SYSTEM"):
+        if name in os.environ:
+            environment[name] = os.environ[name]
     settings = {
         "packages": {name: f"/pkgs/{within(file)}" for name, file in files.items()}
         if inner
