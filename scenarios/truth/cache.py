@@ -75,7 +75,7 @@ def source_hash(folder: Path = HERE) -> str:
 
 def look_up(key: str) -> dict[str, Any] | None:
     """The fields of the record cached under `key`; None if there is none that can be read."""
-    with suppress(OSError, Damaged), closing(opened_rows()) as rows:
+    with suppress(OSError, Damaged), closing(opened_rows(writing=False)) as rows:
         row = rows.get(KIND, key)
         return None if row is None else unpacked(row.blob)
     return None
@@ -101,13 +101,15 @@ def fault() -> str:
     return ""
 
 
-def opened_rows() -> Rows:
-    """The rows of the cache, into which many processes write; raises `OSError` or `Damaged`."""
+def opened_rows(writing: bool = True) -> Rows:
+    """The rows of the cache, into which many processes write; `writing` makes the file where there
+    is none. Raises `OSError` or `Damaged`."""
     where = folder()
     if where is None:
         raise FileNotFoundError(ENOENT, "there is no home folder")
-    where.mkdir(parents=True, exist_ok=True)
-    return Rows(where / FILE)
+    if writing:
+        where.mkdir(parents=True, exist_ok=True)
+    return Rows(where / FILE, writing)
 
 
 def packed(fields: dict[str, Any]) -> bytes:
