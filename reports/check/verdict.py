@@ -199,8 +199,8 @@ def check_file(path: Path, seed: int = 0, packages: Sequence[str] = ()) -> FileC
 
     seed: of the numbers of its questions; packages: what it may import beside numpy.
     """
-    began = perf_counter()
     use_seed(seed)
+    began = perf_counter()
     return replace(check_of(path, packages), seconds=perf_counter() - began)
 
 
