@@ -19,7 +19,7 @@ def about(command: str, seed: int) -> dict[str, Any]:
     return {
         "command": command,
         "seed": seed,
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "versions": {
             **versions(),
             "Python": platform.python_version(),

@@ -237,7 +237,7 @@ def take_timings(
             if isinstance(result, Failure):
                 progress.done("timing", result.status, result.reason)
             elif result:
-                taken = datetime.now(UTC).isoformat(timespec="seconds")
+                taken = datetime.now(UTC).isoformat(timespec="milliseconds")
                 store.put("timing", key, {"taken": taken, "lines": result})
                 progress.done("timing")
             else:
