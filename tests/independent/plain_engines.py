@@ -93,9 +93,15 @@ def play_pymunk(scenario: Scenario, dt: float, asked: dict[str, Any]) -> Samples
             body.velocity = tuple(scene.velocity[i].tolist())
             body.angular_velocity = float(scene.angular_velocity[i])
         body.position, body.angle = tuple(scene.position[i].tolist()), float(scene.angle[i])
-        disk = pymunk.Circle(body, float(scene.radius[i]))
+        if scene.static[i]:  # a shape beside the origin of the static body; `body` is only read
+            disk = pymunk.Circle(
+                space.static_body, float(scene.radius[i]), tuple(scene.position[i].tolist())
+            )
+        else:
+            disk = pymunk.Circle(body, float(scene.radius[i]))
+            space.add(body)
         disk.elasticity, disk.friction = elasticity, friction
-        space.add(body, disk)
+        space.add(disk)
         bodies.append(body)
     for start, end in scene.walls.tolist():
         wall = pymunk.Segment(space.static_body, start, end, 0)

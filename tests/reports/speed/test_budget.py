@@ -142,7 +142,7 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
     """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's
     error."""
-    scenes = ("head_on_equal_e09", "wall_to_wall")
+    scenes = ("head_on_unequal_e09", "wall_to_wall")
     rows = pd.DataFrame(
         [row for scene in scenes for name in BUILT_IN for row in budget_of(scene, 0, name, 4)]
     )

@@ -331,6 +331,7 @@ def test_the_page_opens_every_scene_and_asks_nothing_of_anywhere(
     assert tab.locator("main svg").count() == 3  # pooled, sweeps, sizes
     for scene in SCENES:
         tab.locator(f"#{scene} button.open").click()
+        tab.locator(f"#{scene} + tr.opened svg").wait_for()  # a row is unpacked after the click
     assert tab.locator("main svg").count() == 3 + len(SCENES)
     assert (
         tab.get_by_text("where the exact answer ends").count() == 1
