@@ -100,7 +100,8 @@ class Parameters(NamedTuple):
     memory: int = 1  # steps for which a lost contact keeps its impulses
     skin: float = 0.0  # m, skin of the walls
     carried: bool = False  # of `soften`: contact points turn with their disks
-    hertz: float = 30.0  # of `soften`: the stiffness of a contact
+    hertz: float = 30.0  # of `soften`: the stiffness of a contact of two free disks
+    static_hertz: float = 30.0  # half of that of a contact with a wall or a static disk
     damping: float = 10.0  # its damping ratio
     correction_speed: float = 0.0  # m/s, cap of the position correction
     share_capped: bool = False  # whether it caps the share of `soften`, not the whole
@@ -404,7 +405,8 @@ def soften(
             target = -gap / h
         elif biased and on.correction_speed > 0.0:
             rigid = contact.j < 0 or disks.mass[contact.i] == inf or disks.mass[contact.j] == inf
-            omega = 2.0 * pi * min(on.hertz, 0.125 / h) * (2.0 if rigid else 1.0)
+            stiffness = 2.0 * min(on.static_hertz, 0.125 / h) if rigid else min(on.hertz, 0.125 / h)
+            omega = 2.0 * pi * stiffness
             stiff = 2.0 * on.damping + h * omega
             memory = 1.0 / (1.0 + h * omega * stiff)
             share = 1.0 - memory

@@ -249,6 +249,7 @@ def _box2d_v3(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) 
         "margin": 0.02 * reported["length unit in m"],
         "carried": True,
         "hertz": chosen["hertz"],
+        "static_hertz": chosen["hertz"],
         "damping": chosen["damping_ratio"],
     }
     correction = {"correction_speed": chosen["push_speed"], "share_capped": True}
@@ -289,6 +290,7 @@ def _rapier(reported: Mapping[str, Any], scene: Scene, _dt: float, name: str) ->
         "margin": reported["prediction distance in m"],
         "carried": True,
         "rub_biased": False,
+        # contact_natural_frequency leaves the stiffness of contacts with static bodies as it is
         "hertz": 30.0 if name.endswith(":shipped") else 120.0,
         "damping": 10.0,
     }
