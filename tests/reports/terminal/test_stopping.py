@@ -15,6 +15,7 @@ from itertools import product
 from pathlib import Path
 
 import pandas as pd
+import psutil
 import pytest
 
 from crosscheck2d.reports.run.results import COMMAND
@@ -269,19 +270,19 @@ def test_a_solver_that_loops_ends_with_whoever_asked_it(tmp_path: Path, name: st
         f"SolverProcess(read_solver(Path({str(tmp_path / name)!r}))).do('ask', {question}, 60.0)"
     )
     asking = subprocess.Popen([sys.executable, "-c", asks], stderr=subprocess.DEVNULL)
-    wait_for(lambda: asked_by(asking.pid) and busy(asked_by(asking.pid)[0]))
-    (solver,) = asked_by(asking.pid)
+    wait_for(lambda: any(busy(pid) for pid in asked_by(asking.pid)))
+    processes = asked_by(asking.pid)  # of the file, and of the sandbox around it
     asking.kill()
     asking.wait()
     killed = time.monotonic()
-    wait_for(lambda: not alive(solver))
+    wait_for(lambda: not any(alive(pid) for pid in processes))
 
     assert time.monotonic() - killed < 2.0 * busyness()
 
 
 def asked_by(parent: int) -> list[int]:
-    """The processes that a process has started."""
-    return [int(pid) for pid in Path(f"/proc/{parent}/task/{parent}/children").read_text().split()]
+    """The processes that a process has started, and all that these have."""
+    return [child.pid for child in psutil.Process(parent).children(recursive=True)]
 
 
 def busy(pid: int) -> bool:
