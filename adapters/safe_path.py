@@ -78,14 +78,6 @@ def python(statements: str) -> list[str]:
     return [sys.executable, "-P", os.path.abspath(__file__), statements]
 
 
-def path_of_this() -> str:
-    """PYTHONPATH for a process that finds the same modules as this one."""
-    program = os.path.realpath(PROGRAM)
-    return os.pathsep.join(
-        folder for folder in sys.path if folder and os.path.realpath(folder) != program
-    )
-
-
 if __name__ == "__main__":  # in the new Python of `python`
     keep_path_safe()
     sys.meta_path.insert(0, OwnPackages())

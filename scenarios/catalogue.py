@@ -40,8 +40,3 @@ def scenario(name: str, seed: int = 0) -> Scenario:
         KeyError: no scenario has that name.
     """
     return SCENARIOS[name](seed=seed) if name in RANDOM else SCENARIOS[name]()
-
-
-def family_of(name: str) -> str:
-    """The heading of a scenario; "" if it is not in the catalogue."""
-    return next((heading for heading, family in FAMILIES.items() if name in family), "")

@@ -24,11 +24,6 @@ def fast_note(comparison: Comparison) -> str:
     return " ".join([*passing(comparison), *capped(comparison.runs, fastest)])
 
 
-def can_pass(comparison: Comparison) -> bool:
-    """Whether in the coarsest step a disk can pass through another, or through a wall."""
-    return bool(passing(comparison))
-
-
 def passing(comparison: Comparison) -> list[str]:
     """At most one sentence: the coarsest step size at which a disk can pass through another or a
     wall, and one at which it cannot."""

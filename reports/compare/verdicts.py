@@ -145,11 +145,6 @@ def failures(table: pd.DataFrame) -> dict[tuple[str, float], str]:
     return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
 
 
-def failures_at(table: pd.DataFrame, dt: float) -> dict[str, str]:
-    """The same at one step size, by `engine:profile`."""
-    return {name: words for (name, _), words in failures(table[table.dt_s == dt]).items()}
-
-
 def fails(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of deviations.csv of failed verdicts."""
     return table[

@@ -4,7 +4,6 @@ file."""
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -58,8 +57,3 @@ def whole(path: Path) -> Iterator[BinaryIO]:
     except BaseException:
         part.unlink(missing_ok=True)
         raise
-
-
-def is_part(path: Path) -> bool:
-    """Whether `path` is a file that `whole` left when it was killed."""
-    return re.fullmatch(r"\.crosscheck-\d+\.part", path.name) is not None
