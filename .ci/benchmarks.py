@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES
@@ -20,6 +21,7 @@ from crosscheck2d.reports.speed.tables import summed_up
 OUT = Path("reports/out/speed")
 # the fastest of many short samples: CI machines are seldom alone
 ROUNDS, BUDGET, PATIENCE = 25, 1.0, 10.0
+ORDERED, GROWTH = "reference:ordered", 3.0
 
 
 def make() -> None:
@@ -57,7 +59,19 @@ def check() -> list[str]:
     kept, now = figures.ratios(figures.read()), figures.ratios(fresh)
     for (name, n), ratio in now.items():
         print(f"{name:22} {n:5} disks  {ratio:8.3g}  kept {kept.get((name, n), float('nan')):8.3g}")
-    return figures.drifted(kept, now)
+    return figures.drifted(kept, now) + growth()
+
+
+def growth() -> list[str]:
+    """Whether a step of many disks has become dear a disk: if each collision asks all pairs again,
+    it costs 26 times as much; the medians, as few steps have many collisions."""
+    counts = 100, 10_000
+    gases = [sizes.RunningGas(ENGINES[ORDERED].make(), sizes.gas(n, 0)) for n in counts]
+    rounds = [[gas().seconds / gas.steps / n for n, gas in zip(counts, gases)] for _ in range(40)]
+    few, many = np.median(rounds, axis=0)
+    said = f"{ORDERED}: a disk among {counts[1]} costs {many / few:.3g} of one among {counts[0]}"
+    print(said)
+    return [f"{said}; allowed is {GROWTH:g}"] if many > GROWTH * few else []
 
 
 if __name__ == "__main__":

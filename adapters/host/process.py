@@ -117,7 +117,7 @@ class SolverProcess:
         compiles = compiled and kept is not None and self.kind == "python"
         self.copies = kept_copies(solver, kept) if compiles and kept else None
         self.order = solver.order | {"folder": str(self.copies) if self.copies else None}
-        digest = hashlib.sha256(json.dumps(self.order).encode()).hexdigest()
+        digest = hashlib.sha256(json.dumps([levels(), self.order]).encode()).hexdigest()
         self.key = os.getpid(), digest
         hello = self.connect()
         if "failed" in hello:
@@ -170,7 +170,8 @@ class SolverProcess:
                 hello = self.receive(STARTING)
                 able = set(hello.get("can", ())) if isinstance(hello, dict) else {"speak"}
                 if able <= ALLOWED[level]:
-                    _levels[:] = _levels if trusted else [level]
+                    if not trusted:
+                        _working[levels()] = level
                     return
                 reason = f"at level {level} a guest could {', '.join(sorted(able))}"
             except (OSError, SolverFailed, TypeError) as fault:
@@ -330,12 +331,13 @@ class SolverProcess:
             self.process = None
 
 
-_levels: list[Level] = []
+_working: dict[tuple[Level, ...], Level] = {}
 
 
-def levels_here() -> list[Level]:
+def levels_here() -> Sequence[Level]:
     """The levels to try, the best first; after the first start the one that works."""
-    return list(_levels or levels())
+    possible = levels()
+    return [_working[possible]] if possible in _working else possible
 
 
 def protection() -> Level:

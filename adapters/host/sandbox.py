@@ -18,8 +18,8 @@ from pathlib import Path
 from shutil import which
 from typing import NamedTuple
 
+from crosscheck2d.adapters import system
 from crosscheck2d.adapters.safe_path import PACKAGE, TESTS
-from crosscheck2d.adapters.system import KERNEL
 
 GUEST = Path(__file__).parent / "guest"
 SYSTEM = Path(__file__).parents[1] / "system.py"
@@ -58,16 +58,16 @@ class Start(NamedTuple):
     environment: dict[str, str]
 
 
-def levels() -> list[Level]:
+def levels() -> tuple[Level, ...]:
     """The levels that may work here, the best first. CROSSCHECK_SANDBOX names the best that is
     tried, for tests."""
     possible = [Level.NONE]
-    if KERNEL and os.geteuid() == 0 and readable_by_others(os.__file__):
+    if system.KERNEL and os.geteuid() == 0 and readable_by_others(os.__file__):
         possible.insert(0, Level.USER)
-    if KERNEL and bubblewrap():
+    if system.KERNEL and bubblewrap():
         possible.insert(0, Level.BUBBLEWRAP)
     best = Level(os.environ.get("CROSSCHECK_SANDBOX", possible[0]))
-    return [level for level in possible if [*Level].index(level) >= [*Level].index(best)]
+    return tuple(level for level in possible if [*Level].index(level) >= [*Level].index(best))
 
 
 def readable_by_others(file: str) -> bool:
@@ -109,9 +109,8 @@ def start(
     level: Level, kind: str, packages: Sequence[str], copies: Path | None, jit: bool
 ) -> Start:
     """How to start a guest; copies: a folder that it may write, for compiled code."""
-    portable = not KERNEL or os.environ.get("CROSSCHECK_SYSTEM") == "portable"
     # without the kernel's limits the guest watches its own memory with psutil
-    files = files_of((*NEEDED[kind], *packages, *(["psutil"] if portable else [])))
+    files = files_of((*NEEDED[kind], *packages, *([] if system.KERNEL else ["psutil"])))
     inner = level == Level.BUBBLEWRAP
     environment = dict(QUIET) | ({} if jit else {"NUMBA_DISABLE_JIT": "1"})
     if copies is not None:

@@ -12,7 +12,6 @@ from pathlib import Path
 import psutil
 import pytest
 
-from crosscheck2d.adapters.host import process as host_process
 from crosscheck2d.adapters.host.file import SolverFailed, SolverText
 from crosscheck2d.adapters.host.process import SolverProcess
 from crosscheck2d.adapters.host.sandbox import Level, bubblewrap, levels
@@ -63,7 +62,6 @@ def values(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[object, .
 @pytest.fixture
 def at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """The level of a test, also in its guests' parent."""
-    monkeypatch.setattr(host_process, "_levels", [])
     monkeypatch.setenv("CROSSCHECK_SANDBOX", request.param)
     return str(request.param)
 

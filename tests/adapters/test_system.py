@@ -71,6 +71,12 @@ main()
 """
 
 
+def choose_branch(monkeypatch: pytest.MonkeyPatch, branch: str) -> None:
+    """Which branch this process and its guests take, "kernel" or "portable"."""
+    monkeypatch.setenv("CROSSCHECK_SYSTEM", branch)
+    monkeypatch.setattr(system, "KERNEL", branch == "kernel")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("platform", ["win32", pytest.param("darwin", marks=pytest.mark.long)])
 def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform: str):
@@ -164,8 +170,7 @@ def test_a_solver_that_takes_all_memory_in_one_call_into_c_is_ended(
     """No thread of it runs meanwhile, so that its parent ends it, before it has what it wants."""
     file = tmp_path / "solver.py"
     file.write_text("x = bytearray(10**10)\ndef integrate(s, dt): pass\n")
-    monkeypatch.setenv("CROSSCHECK_SYSTEM", "portable")
-    monkeypatch.setattr(system, "KERNEL", False)
+    choose_branch(monkeypatch, "portable")
     with pytest.raises(SolverFailed) as failed:
         SolverProcess(read_solver(file))
 
@@ -183,7 +188,7 @@ def test_an_endless_function_is_stopped_as_such(
         "def integrate(s, dt):\n    while True:\n        pass\n\n"
         "def sphereSphereCollisionHandling(a, b):\n    pass\n"
     )
-    monkeypatch.setenv("CROSSCHECK_SYSTEM", system_is)
+    choose_branch(monkeypatch, system_is)
     ball = [0.0] * 9 + [1.0, 1.0, 1.0]
     question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
     with SolverProcess(read_solver(file)) as solver:
@@ -326,7 +331,7 @@ def test_a_thread_ends_a_solver_that_takes_all_memory(
         "held = []\n\ndef integrate(s, dt):\n    while True:\n        held.append(bytearray(10**8))"
         "\n\ndef sphereSphereCollisionHandling(a, b):\n    pass\n"
     )
-    monkeypatch.setenv("CROSSCHECK_SYSTEM", "portable")
+    choose_branch(monkeypatch, "portable")
     ball = [0.0] * 9 + [1.0, 1.0, 1.0]
     question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
     with SolverProcess(read_solver(file)) as solver, pytest.raises(SolverFailed) as failed:

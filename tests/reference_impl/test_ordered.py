@@ -11,7 +11,6 @@ import pytest
 from crosscheck2d.adapters.event_driven.events import EventEngine
 from crosscheck2d.adapters.reference import Reference
 from crosscheck2d.reference_impl import neighbours, ordered
-from crosscheck2d.reports.speed.sizes import RunningGas, gas
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.placing import box
 from crosscheck2d.scenarios.model import Scenario, Scene
@@ -173,17 +172,6 @@ def falling(height=1.0, e=0.5, gravity=-10.0):
         gravity=[0.0, gravity],
         walls=[[[-3.0, 0.0], [3.0, 0.0]]],
     )
-
-
-@pytest.mark.slow
-def test_a_step_of_many_disks_costs_at_most_twice_as_much_a_disk():
-    """10 000 disks against 100, in turns: the medians, as few steps have many collisions. If each
-    collision asks all pairs again it is 26 times as much."""
-    sizes = 100, 10_000
-    running = [RunningGas(Reference(ordered), gas(n, 0)) for n in sizes]
-    rounds = [[g().seconds / g.steps / n for n, g in zip(sizes, running)] for _ in range(40)]
-    few, many = np.median(rounds, axis=0)
-    assert many < 2 * few
 
 
 def test_a_ball_that_bounces_ever_lower_comes_to_rest_when_it_should_and_carries_its_weight():

@@ -67,8 +67,8 @@ def printed(folder: Path, first: str, number: int) -> int:
         env={**os.environ, "PYTHONPATH": str(ROOT / ".ci" / "types")},
         capture_output=True,
         text=True,
-        check=True,
     )
+    assert done.returncode == 0, done.stderr
     return int(done.stdout)
 
 

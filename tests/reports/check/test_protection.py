@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
 
 import pytest
 
-from crosscheck2d.adapters.host import process as host_process
 from tests.reports.terminal.command_line import crosscheck
 
 PY = (Path(__file__).parents[2] / "solvers/correct/plain.py").read_text()
@@ -21,21 +19,6 @@ def group(tmp_path: Path) -> Path:
     (tmp_path / "class").mkdir()
     (tmp_path / "class" / "anna.py").write_text(f"import pydantic\n{PY}")
     return tmp_path
-
-
-@pytest.fixture
-def no_sandbox(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Nothing protects the machine; no process of another test is reused, in a sandbox or not."""
-
-    def end_waiting() -> None:
-        while host_process.waiting:
-            host_process.end(host_process.waiting.popitem()[1].process)
-
-    monkeypatch.setenv("CROSSCHECK_SANDBOX", "none")
-    monkeypatch.setattr(host_process, "_levels", [])
-    end_waiting()
-    yield
-    end_waiting()
 
 
 def marks(group: Path, *words: str) -> dict[str, str]:
@@ -67,9 +50,11 @@ def test_a_package_has_to_be_installed_and_none_of_this_program(name: str, group
     assert f"--package {name}: is not installed, or is a part of this program" in done.stderr
 
 
-@pytest.mark.usefixtures("no_sandbox")
-def test_without_a_sandbox_a_folder_of_python_needs_consent(group: Path):
+def test_without_a_sandbox_a_folder_of_python_needs_consent(
+    group: Path, monkeypatch: pytest.MonkeyPatch
+):
     """A folder of JavaScript needs none: V8 has no files and no network."""
+    monkeypatch.setenv("CROSSCHECK_SANDBOX", "none")
     done = crosscheck("check", "class", cwd=group)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "--unprotected" in done.stderr
