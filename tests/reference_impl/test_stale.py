@@ -64,7 +64,8 @@ def printed(folder: Path, first: str, number: int) -> int:
     done = subprocess.run(
         [sys.executable, "outer.py"],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT / ".ci" / "types")},
+        # a command that ran in this process before may have set PYTHONSAFEPATH
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (folder, ROOT / ".ci/types")))},
         capture_output=True,
         text=True,
     )
