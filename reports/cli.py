@@ -549,14 +549,77 @@ def new_engine(
             help="The file to write: NAME.js in JavaScript, NAME.py in Python.",
         ),
     ],
+    source: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            parser=place,
+            help="Your ball code, which is copied into it. The other options say what it is like.",
+        ),
+    ] = None,
+    fields: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help='Of a ball: x, y, vx, vy, radius, mass, as "x y dx dy r m" or "pos.x ...".',
+        ),
+    ] = None,
+    move: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CALL",
+            help="Moves a ball: NAME, .METHOD or a call with ball, dt, width, height.",
+        ),
+    ] = None,
+    collide: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CALL", help="Collides two balls: NAME, .METHOD or a call with a and b."
+        ),
+    ] = None,
+    step: Annotated[
+        str | None,
+        typer.Option(metavar="CALL", help="Moves and collides all balls: NAME or a call with dt."),
+    ] = None,
+    ball: Annotated[
+        str | None,
+        typer.Option(
+            metavar="EXPRESSION", help='Makes a ball from x, y, vx, vy, r, m: "new Ball(x, y, r)".'
+        ),
+    ] = None,
+    balls: Annotated[
+        str | None, typer.Option(metavar="NAME", help="The list of all balls, if --step uses one.")
+    ] = None,
+    box: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help='Width and height of its box: "canvas.width H".'),
+    ] = None,
+    gravity: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Its gravity, positive if down.")
+    ] = None,
+    restitution: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|NUMBER", help="Its restitution. Default: 1."),
+    ] = None,
+    per_frame: Annotated[
+        float | None,
+        typer.Option(metavar="N", help="Its speeds are per frame, with N frames a second."),
+    ] = None,
+    pixels: Annotated[float | None, typer.Option(metavar="N", help="Its pixels in 1 m.")] = None,
+    y_down: Annotated[bool, typer.Option("--y-down", help="Its y points down.")] = False,
 ) -> None:
     """Write an engine to begin with, in a file of your own.
 
     It works as it is. Put your own engine in its place, and judge it with --engine NAME.
     """
-    from crosscheck2d.reports.commands.new_engine import write_engine
+    from crosscheck2d.reports.commands.new_engine import Hints, write_engine
 
-    write_engine(name)
+    hints = Hints(
+        *(fields, move, collide, step, ball, balls, box, gravity, restitution),
+        *(per_frame, pixels, y_down, source),
+    )
+    write_engine(name, hints)
 
 
 @app.command(name="new-solver")

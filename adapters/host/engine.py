@@ -36,6 +36,7 @@ from crosscheck2d.scenarios.model import Array, Scene, State
 
 HERE = Path(__file__).parent
 TEMPLATES = {"javascript": HERE / "template.js", "python": HERE / "template.py"}
+AROUND = {"javascript": HERE / "ball.js.j2", "python": HERE / "ball.py.j2"}  # a ball code
 EXERCISES = {"javascript": HERE / "exercise.js", "python": HERE / "exercise.py"}
 STEP_LIMIT = 30.0  # s that one call for several steps may take; twice that for a package
 CREATE_LIMIT = 10.0  # s that `create` may take

@@ -14,6 +14,7 @@ ENGINE = ("create", "step", "read")
 # Names of the exercise: those that an engine may also use, and those that it does not.
 SHARED = ("integrate", "advance", "initScene")
 EXERCISE = ("sphereSphereCollisionHandling", "performSimStep", "projectObjects")
+CLASS = re.compile(r"^class\s+(\w+)(.*?)(?=^class\s|\Z)", re.MULTILINE | re.DOTALL)
 HOW = "crosscheck new-engine NAME.js (or NAME.py) writes an engine that works"
 
 
@@ -46,10 +47,11 @@ def holder_of(solver: SolverText) -> str | None:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             return None
         return next((c.name for c in classes if {*ENGINE} <= {*names_of(c.body)}), None)
-    code = code_of(solver.text)
-    methods = re.findall(r"^\s+(?:static\s+)?(\w+)\s*\(", code, re.MULTILINE)
-    name = re.search(r"^class\s+(\w+)", code, re.MULTILINE)
-    return name[1] if name and {*ENGINE} <= {*methods} else None
+    for name, body in CLASS.findall(code_of(solver.text)):
+        methods = re.findall(r"^\s+(?:static\s+)?(\w+)\s*\(", body, re.MULTILINE)
+        if {*ENGINE} <= {*methods}:
+            return str(name)
+    return None
 
 
 def must_be_either(solver: SolverText) -> None:

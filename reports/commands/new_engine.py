@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
+from typing import NamedTuple
 
-from crosscheck2d.adapters.host.engine import EXERCISES, TEMPLATES
-from crosscheck2d.adapters.host.file import KINDS
+from crosscheck2d.adapters.host.engine import AROUND, EXERCISES, TEMPLATES
+from crosscheck2d.adapters.host.file import KINDS, NotASolver, read_solver
 from crosscheck2d.reports.run.arguments import faults_of_file
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import refuse
@@ -14,31 +16,166 @@ from crosscheck2d.reports.terminal.exits import refuse
 ENGINE = """{0} is an engine that works: put yours in its place. To judge it:
 crosscheck run bouncing_ball_e09 box_billiard --engine {0} --engine pymunk --out mine
 adapters/README.md explains its functions."""
+PORTED = """{0} runs as it is{1}. To judge it:
+crosscheck run head_on_equal_e1 gas_of_100 --engine {0} --engine pymunk --out mine
+What it says to crosscheck is in the class at its end; adapters/README.md explains it."""
 SOLVER = """{0} has the two functions of the exercise, which do nothing yet. To check them:
 crosscheck check {0}"""
 
 
-def write_engine(path: Path) -> None:
-    """Write an engine that works, in the language given by the suffix."""
-    write_template(path, TEMPLATES, ENGINE)
+class Hints(NamedTuple):
+    """What a ball code calls its things; None where the hint was not given.
+
+    Attributes:
+        fields: of a ball: x, y, vx, vy, radius, mass; the last may be left out.
+        move, collide: the function of a ball and that of two: a name, a `.method` or a call.
+        step: the function that does all, in place of these two.
+        ball, balls: an expression that makes a ball; the list that the code's functions use.
+        box: the two variables with the size of its box, from 0.
+        gravity, restitution: variables; restitution may be a number.
+        per_frame: frames a second, if speeds are per frame.
+        pixels: of 1 m.
+        source: the file with the code.
+    """
+
+    fields: str | None = None
+    move: str | None = None
+    collide: str | None = None
+    step: str | None = None
+    ball: str | None = None
+    balls: str | None = None
+    box: str | None = None
+    gravity: str | None = None
+    restitution: str | None = None
+    per_frame: float | None = None
+    pixels: float | None = None
+    y_down: bool = False
+    source: Path | None = None
+
+
+FIELDS = "x y vx vy r m"
+# What a file to fill in calls them; and where ball codes keep the size of their box.
+NAMES = {"box": "width height", "gravity": "gravity", "restitution": "restitution"}
+BOXES = ("canvas.width canvas.height", "WIDTH HEIGHT", "width height", "W H")
+
+
+def write_engine(path: Path, hints: Hints = Hints()) -> None:  # noqa: B008 - a tuple
+    """Write an engine that works, in the language given by the suffix; with hints one around a
+    ball code."""
+    kind = kind_of(path)
+    if hints == Hints():
+        write_new(path, TEMPLATES[kind].read_text(encoding="utf-8"), ENGINE)
+        return
+    within = "" if hints.source else ": put your code in place of its functions"
+    write_new(path, ported(kind, hints), PORTED.replace("{1}", within))
+
+
+def ported(kind: str, hints: Hints) -> str:
+    """An engine around a ball code; exits 2 for hints that do not fit."""
+    # templates are slow to import
+    from crosscheck2d.reports.page.documents import environment
+
+    names = (hints.fields or FIELDS).split()
+    if len(names) not in (5, 6):
+        refuse([f'--fields "{hints.fields}": must be the names of x, y, vx, vy, radius and mass'])
+    fields = [name if name.startswith("[") else f".{name}" for name in names]
+    plain = all(name.isidentifier() for name in names)
+    if not plain and hints.ball is None:
+        refuse([f'--fields "{hints.fields}": --ball has to say how such a ball is made'])
+    code = code_in(hints.source, kind)
+    if code is None:
+        given = {name: value for name, value in hints._asdict().items() if value is not None}
+        hints = hints._replace(**(NAMES | given))
+    elif hints.box is None:
+        words = set(re.findall(r"[\w.]+", code))
+        hints = hints._replace(box=next((x for x in BOXES if {*x.split()} <= words), None))
+    box = (hints.box or "").split()
+    if len(box) not in (0, 2):
+        refuse([f'--box "{hints.box}": must be the names of its width and its height'])
+    for option, value in (("--pixels", hints.pixels), ("--per-frame", hints.per_frame)):
+        if value is not None and not 0 < value < 1e9:
+            refuse([f"{option} {value:g}: must be above 0"])
+    move, collide = hints.move or "move", hints.collide or "collide"
+    if hints.source is None and (hints.step or not (move + collide).isidentifier()):
+        refuse(["--step, a method or a call as --move or --collide: --from has to name the code"])
+    try:
+        restitution, variable = f"{float(hints.restitution or 1):g}", None
+    except ValueError:
+        restitution, variable = str(hints.restitution), hints.restitution
+    sized = [name for name in box if code is None or name in code]  # else they are arguments
+    settable = [x for x in (*sized, hints.gravity, variable) if x and x.isidentifier()]
+    if code is not None and kind == "javascript":
+        for name in settable:  # each scene sets it
+            code = re.sub(rf"\bconst\b(?=[^;\n]*\b{name}\s*=[^=])", "let", code)
+    dt = [] if hints.per_frame else ["dt"]
+    masses = [f"{x}{fields[5]}" if fields[5:] else "1" for x in "ab"]
+    template = AROUND[kind].read_text(encoding="utf-8")
+    return environment().overlay(autoescape=False).from_string(template).render(
+        **dict(zip(FIELDS.split(), [*fields, ""])),
+        fields=[*zip(FIELDS.split(), fields)],
+        code=code,
+        ball=hints.ball or {"javascript": "{}", "python": "SimpleNamespace()"}[kind],
+        move=move,
+        collide=collide,
+        move_call=call(move, ["ball"], dt),
+        collide_call=call(collide, ["a", "b"], []),
+        step=hints.step and call(hints.step, [], dt),
+        times_dt="" if hints.per_frame else " * dt",
+        mass_a=masses[0],
+        mass_b=masses[1],
+        restitution=restitution,
+        restitution_name=variable,
+        settable=settable,
+        sized=sized,
+        **{name: getattr(hints, name) for name in ("balls", "gravity", "per_frame", "y_down")},
+        pixels=f"{hints.pixels or 1:g}",
+        box=box,
+    )  # fmt: skip
+
+
+def call(name: str, on: list[str], rest: list[str]) -> str:
+    """The call of a function or a method; a whole call as it is."""
+    if "(" in name:
+        return name.rstrip(";")
+    if name.startswith("."):
+        return f"{on[0]}{name}({', '.join([*on[1:], *rest])})"
+    return f"{name}({', '.join([*on, *rest])})"
+
+
+def code_in(source: Path | None, kind: str) -> str | None:
+    """The code in a file; exits 2 if it cannot be read."""
+    if source is None:
+        return None
+    try:
+        solver = read_solver(source)
+    except NotASolver as refusal:
+        refuse([f"--from {refusal}"])
+    if solver.kind != kind:
+        refuse([f"--from {source}: is in another language than the file to write"])
+    return solver.text.rstrip()
 
 
 def write_solver(path: Path) -> None:
     """Write the skeleton of the exercise."""
-    write_template(path, EXERCISES, SOLVER)
+    write_new(path, EXERCISES[kind_of(path)].read_text(encoding="utf-8"), SOLVER)
 
 
-def write_template(path: Path, templates: dict[str, Path], done: str) -> None:
-    """Write a template, and print what to do next; exits 2 if it cannot be written or exists."""
+def kind_of(path: Path) -> str:
+    """The language of a file to write; exits 2 for a name that cannot be one."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         refuse([f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file"])
     if ":" in str(path):
         refuse(faults_of_file(path))
+    return kind
+
+
+def write_new(path: Path, text: str, done: str) -> None:
+    """Write a file, and print what to do next; exits 2 if it cannot be written or exists."""
     name = shlex.quote(str(path))
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(templates[kind].read_text(encoding="utf-8").replace("THIS_FILE", name))
+            file.write(text.replace("THIS_FILE", name))
     except FileExistsError:
         refuse([f"{path}: exists; name another file"])
     except OSError as fault:

@@ -3,9 +3,11 @@ of a file; and what a scene tells them."""
 
 from __future__ import annotations
 
+import shlex
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -41,12 +43,32 @@ FLY_PY = """
         return {{"position": [d[:2] for d in world], "velocity": [d[2:] for d in world]}}
 """
 LINES = 'models = "disks"\n'
+
+
+def stepping(begin: str, end: str, name: str = "fly.py") -> str:
+    """An engine whose step does otherwise with the world that it has made."""
+    if name.endswith(".js"):
+        text = f'const models = "disks";\n{FUNCTIONS_JS}'
+        text = text.replace("return world.map", f"{begin}world.map")
+        return text.replace("v }));", "v }))" + end)
+    text = f"{LINES}{dedent(FLY_PY.format(''))}".replace("return [(x", f"{begin}[(x")
+    return text.replace("in world]\n\ndef read", f"in world]{end}\n\ndef read")
+
+
 ENGINES = {
     "instance.js": f'class Mine {{\n  models = "disks";{FLY_JS}}}\n',
     "static.js": f'class Mine {{\n  static models = "disks";{STATIC_JS}}}\n',
     "functions.js": f'const models = "disks";\n{FUNCTIONS_JS}',
     "instance.py": f"class Mine:\n    {LINES}{FLY_PY.format('self, ')}",
     "static.py": f"class Mine:\n    {LINES}{FLY_PY.format('')}",
+    "second.js": f"class Ball {{ move() {{}} }}\nclass Mine {{\n  models = 'disks';{FLY_JS}}}\n",
+    "own_step.js": f'const step = () => 7;\nclass Mine {{\n  models = "disks";{FLY_JS}}}\n',
+    # a new world of another type; one whose step returns what is no world
+    "tuple.py": stepping("return (*", ",)"),
+    "object.js": stepping("const a = ", "; return { map: (f) => a.map(f) };", ".js"),
+    "hits.py": stepping("world[:] = ", "\n    return []"),
+    "hits.js": stepping("world.splice(0, 9, ...", "); return [];", ".js"),
+    "few.py": stepping("return ", "").replace(", dt, forces", ", dt").replace("scene, dt", "scene"),
     "page.js": (
         "const canvas = document.getElementById('c').getContext('2d'), t = Date.now();\n"
         "window.addEventListener('load', () => {}); requestAnimationFrame(() => 0);\n"
@@ -143,3 +165,102 @@ def test_a_file_of_another_kind_says_what_to_do(name: str, hint: str, tmp_path: 
     (tmp_path / name).write_text("x")
     with pytest.raises(NotASolver, match=hint):
         read_solver(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "begin", "end"),
+    [("lost.js", "return { moved: ", " };"), ("lost.py", "return {1: ", "}")],
+)
+def test_a_new_world_that_read_cannot_read_is_named(
+    name: str, begin: str, end: str, tmp_path: Path
+):
+    """Not played as if nothing moved."""
+    (tmp_path / name).write_text(stepping(begin, end, name))
+    scene = scenario("head_on_equal_e09")
+    run = play_once(row_of_file(tmp_path / name).make, "x:own", scene, scene.dt(1))
+    assert run.status == "error"
+    assert "moved no disk; expected is that it changes its world, or returns" in run.reason
+
+
+STRANGERS = Path(__file__).with_name("strangers")
+# What has to be said of each code; none of its lines is written by hand, or changed.
+HINTS = {
+    "canvas_per_frame.js": (
+        '--fields "x y dx dy radius mass" --move moveBall --collide resolveCollision'
+        " --per-frame 60 --pixels 100 --y-down"
+    ),
+    "class_methods.js": (
+        '--fields "pos.x pos.y vel.x vel.y r m" --ball "new Ball(x, y, r)" --move .update'
+        " --collide .collide --gravity gravity --restitution restitution --pixels 100 --y-down"
+    ),
+    "whole_step.js": (
+        '--fields "posX posY speedX speedY size weight" --step step --balls particles'
+        ' --box "xmax ymax" --gravity g'
+    ),
+    "class_per_frame.py": (
+        '--fields "x y vx vy radius mass" --ball "Ball(x, y, r)" --move .move --collide collide'
+        " --per-frame 60 --pixels 100 --y-down"
+    ),
+    "module_list.py": (
+        """--fields '["p"][0] ["p"][1] ["v"][0] ["v"][1] ["radius"] ["mass"]'"""
+        """ --ball '{"p": [x, y], "v": [vx, vy]}' --step update --balls balls --gravity GRAVITY"""
+        " --restitution E"
+    ),
+    "functions.py": (
+        '--fields "center[0] center[1] velocity[0] velocity[1] r m" --collide elastic'
+        ' --ball "Disk((x, y), (vx, vy), r, m)" --box "width height"'
+        ' --move "advance_disk(ball, dt, width, height)"'
+    ),
+}
+PLAIN = '--fields "x y u v r m" --collide hit --move go --per-frame 60 --pixels 100 --y-down'
+
+
+@pytest.mark.parametrize(
+    ("name", "hints"),
+    [*HINTS.items(), ("plain.js", PLAIN), ("plain.py", PLAIN), ("five.py", '--fields "x y u v r"')],
+)
+def test_a_ball_code_is_ported_by_hints_alone(name: str, hints: str, tmp_path: Path):
+    """Two disks that meet, and a crowd in a box, which keeps its energy."""
+    source = ("--from", str(STRANGERS / name)) if name in HINTS else ()
+    done = crosscheck("new-engine", name, *source, *shlex.split(hints), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    pair, crowd = (scenario(each) for each in ("head_on_equal_e1", "gas_of_100"))
+    make = row_of_file(tmp_path / name).make
+    runs = [play_once(make, "x:own", each, each.dt(4)) for each in (pair, crowd)]
+    assert [(run.status, run.reason) for run in runs] == [("ok", "")] * 2
+    met, gas = (run.trajectory for run in runs)
+    assert met is not None
+    assert gas is not None
+    scene, end = pair.scene, met.t[-1]
+    # equal masses exchange their velocities, a diameter apart; the collision is found at the end
+    # of a step, which is the most that a disk is late
+    np.testing.assert_allclose(met.velocity[-1], scene.velocity[::-1], atol=1e-9)
+    apart = np.sign(scene.position[:, :1] - scene.position[::-1, :1]) * 2 * scene.radius[0]
+    exchanged = (scene.position + scene.velocity * end)[::-1] + apart * [1.0, 0.0]
+    late = 2 * np.abs(scene.velocity).max() * pair.dt(4)
+    np.testing.assert_allclose(met.position[-1], exchanged, atol=late)
+    energy = np.sum(gas.velocity**2, axis=(1, 2))  # equal masses
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)  # rounding of 100 disks
+    assert np.abs(gas.velocity - gas.velocity[0]).max() > 1.0, "they collide"
+    low, high = crowd.scene.walls.min(axis=(0, 1)), crowd.scene.walls.max(axis=(0, 1))
+    assert np.all((gas.position > low) & (gas.position < high))
+
+
+@pytest.mark.parametrize(
+    ("hints", "says"),
+    [
+        ('--fields "x y"', "must be the names of x, y, vx, vy, radius and mass"),
+        ('--fields "p.x p.y v.x v.y r"', "--ball has to say how such a ball is made"),
+        ('--box "w"', "must be the names of its width and its height"),
+        ("--pixels 0", "--pixels 0: must be above 0"),
+        ("--step update", "--from has to name the code"),
+        ("--from nothing.py", "--from nothing.py"),
+        (f"--from {STRANGERS / 'whole_step.js'}", "is in another language"),
+    ],
+)
+def test_hints_that_do_not_fit_are_refused(hints: str, says: str, tmp_path: Path):
+    """In one sentence, and nothing is written."""
+    done = crosscheck("new-engine", "a.py", *shlex.split(hints), cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert says in done.stderr
+    assert not (tmp_path / "a.py").exists()

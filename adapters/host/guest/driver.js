@@ -84,9 +84,10 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     }
     globe.Date = class { static now() { return 0; } getTime() { return 0; } valueOf() { return 0; } };
     globe.performance = { now: () => 0 };
+    const remembered = new Map();  // a canvas has the size that it is given
     const nothing = new Proxy(function () {}, {
-      get: (_, name) => (name === Symbol.toPrimitive ? () => 0 : nothing), set: () => true, apply: () => nothing,
-      construct: () => nothing,
+      get: (_, name) => (name === Symbol.toPrimitive ? () => 0 : remembered.has(name) ? remembered.get(name) : nothing),
+      set: (_, name, value) => remembered.set(name, value), apply: () => nothing, construct: () => nothing,
     });
     globe.document = nothing;
     globe.addEventListener = globe.requestAnimationFrame = globe.alert = quiet;
@@ -406,6 +407,7 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     inside = "create";
     let made = ran(file.create(scene, dt), "create");
     if (typeof made === "string") throw new Refusal(made || "create returned an empty text");
+    let first = null, renews = null;  // the first reading; whether a step returns a new world
 
     function none() {
       const all = [];
@@ -451,9 +453,9 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       return value;
     }
 
-    function read(into, at) {
+    function read(into, at, from = made) {
       inside = "read";
-      const state = file.read(made);
+      const begin = at, state = file.read(from);
       if (typeof state !== "object" || state === null) {
         throw new Wrong(`read returned ${display(state)}; expected is { position, velocity${turns ? ", angle, angular_velocity" : ""} }`);
       }
@@ -465,6 +467,22 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
         into[at + 2] = velocity[i][0]; into[at + 3] = velocity[i][1];
         into[at + 4] = angle[i]; into[at + 5] = spin ? spin[i] : 0;
       }
+      first ??= into.slice(begin, at);
+    }
+
+    // A step may return a new world, which is what read can read. If it is none, the step has to have moved the disks.
+    function isWorld(result) {
+      const rows = new Numbers(WIDTH * n);
+      try { read(rows, 0, result); return true; } catch (_) { read(rows, 0); }
+      let moves = false, still = true;
+      for (let k = 0; first !== null && k < rows.length; k++) {
+        if (k % WIDTH < 2) still = still && rows[k] === first[k];
+        else if (k % WIDTH < 4) moves = moves || rows[k] !== 0;
+      }
+      if (first !== null && still && moves) {
+        throw new Wrong(`step returned ${display(result)} and moved no disk; expected is that it changes its world, or returns a new one that read can read`);
+      }
+      return false;
     }
 
     // A coordinate that has left the box goes on from the opposite edge.
@@ -484,9 +502,9 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
       step(forces) {
         inside = "step";
         const result = ran(file.step(made, dt, forces || none()), "step");
-        // a step may return a new world, of the same kind
-        if (typeof result === "object" && result !== null && getPrototypeOf(result) === getPrototypeOf(made)) {
-          made = this.made = result;
+        if (typeof result === "object" && result !== null && result !== made && renews !== false) {
+          if (renews === null) renews = isWorld(result);
+          if (renews) made = this.made = result;
         }
         if (hears) hear();
         if (wrap && typeof file.place === "function") wrapAll();

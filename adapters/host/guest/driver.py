@@ -390,6 +390,8 @@ class EngineWorld:
         self.guest, self.n, self.walls = guest, scene["n"], len(scene["walls"])
         self.dt, self.angle = scene["dt"], list(scene["angle"])
         self.steps, self.log = 0, array.array("d")
+        self.first: list[list[float]] = []  # what was read first
+        self.renews: bool | None = None  # whether a step returns a new world
         self.hears = scene["listening"] and "collisions" in guest.file
         self.world = self.call("create", Fields(**scene), self.dt)
         if isinstance(self.world, str):
@@ -398,20 +400,42 @@ class EngineWorld:
     def call(self, name: str, *arguments: Any) -> Any:
         """Call a function of the file and return its result."""
         self.guest.inside = name
-        return self.guest.file[name](*arguments)
+        function, most = self.guest.file[name], self.guest.takes[name]
+        return function(*arguments[:most])
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held; a step may return a new world."""
+        """Forces act in the first step, or in all if held; a step may return a new world, which is
+        what `read` can read."""
         for k in range(count):
             acting = forces if forces and (held or k == 0) else None
             result = self.call(
                 "step", self.world, self.dt, acting or [[0.0] * 3 for _ in range(self.n)]
             )
-            if type(result) is type(self.world):
-                self.world = result
+            plain = result is None or isinstance(result, (str, int, float))
+            if not plain and result is not self.world and self.renews is not False:
+                self.renews = self.renews or self.is_world(result)
+                self.world = result if self.renews else self.world
             if self.hears:
                 self.hear()
             self.steps += 1
+
+    def is_world(self, result: Any) -> bool:
+        """Whether `read` can read it; if not, the step has to have moved the disks."""
+        try:
+            self.rows_of(result)
+            return True
+        except Exception:
+            now, first = self.rows_of(self.world), self.first
+        if (
+            first
+            and [d[:2] for d in now] == [d[:2] for d in first]
+            and any(any(d[2:4]) for d in now)
+        ):
+            wanted = (
+                "expected is that it changes its world, or returns a new one that read can read"
+            )
+            raise wrong("step", result, wanted, " and moved no disk")
+        return False
 
     def hear(self) -> None:
         """Record the collisions of this step."""
@@ -430,13 +454,19 @@ class EngineWorld:
 
     def read(self) -> array.array[float]:
         """x, y, u, v, angle and spin of all disks."""
-        state = self.call("read", self.world)
+        rows = self.rows_of(self.world)
+        self.first = self.first or rows
+        return array.array("d", [x for disk in rows for x in disk])
+
+    def rows_of(self, world: Any) -> list[list[float]]:
+        """The same, a row for each disk."""
+        state = self.call("read", world)
         rows = [self.column(state, name, 2) for name in ("position", "velocity")]
         if self.guest.turns:
             rows += [self.column(state, name, 1) for name in ("angle", "angular_velocity")]
         else:
             rows += [[[x] for x in self.angle], [[0.0]] * self.n]
-        return array.array("d", [x for disk in zip(*rows) for values in disk for x in values])
+        return [[x for values in disk for x in values] for disk in zip(*rows)]
 
     def column(self, state: Any, name: str, width: int) -> list[list[float]]:
         """The numbers of all disks from the result of `read`."""
@@ -473,6 +503,21 @@ def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "e
     text = repr(value)
     text = text if len(text) <= SHOWN else text[:SHOWN] + " ..."
     return Failed(kind, f"{function} returned {text}{what}; {wanted}")
+
+
+def most_arguments(function: Callable[..., Any]) -> int | None:
+    """How many a function takes; None if any number, or it is not known. As in JavaScript it need
+    not take all that it is given."""
+    try:
+        kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
+    except (TypeError, ValueError):
+        return None
+    positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return (
+        None
+        if inspect.Parameter.VAR_POSITIONAL in kinds
+        else sum(map(positional.__contains__, kinds))
+    )
 
 
 # ---- a guest in Python --------------------------------------------------------------------------
@@ -513,6 +558,7 @@ class PythonGuest:
         if self.order["engine"]:
             self.world_of: Any = EngineWorld
             self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
+            self.takes = {name: most_arguments(function) for name, function in self.file.items()}
             for name, function in self.file.items():
                 if inspect.isgeneratorfunction(function) or inspect.iscoroutinefunction(function):
                     raise Failed(
@@ -530,7 +576,11 @@ class PythonGuest:
 
     def methods_of(self, holder: type, when: str) -> dict[str, Any]:
         """The functions of an engine that is a class."""
-        own = next(iter(inspect.signature(vars(holder)["create"]).parameters), "") == "self"
+        create = vars(holder)["create"]
+        own = (
+            inspect.isfunction(create)
+            and next(iter(inspect.signature(create).parameters), "") == "self"
+        )
         with self.guarded(LOAD_LIMIT, when):
             engine = holder() if own else holder
         return {

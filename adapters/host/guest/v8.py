@@ -38,14 +38,6 @@ FUNCTIONS = {
 VERBS = ", ".join(
     f'{verb}: typeof {name} === "undefined" ? null : {name}' for verb, name in FUNCTIONS.items()
 )
-# A class has the functions, of itself or of its instances.
-METHODS = """{{
-  const engine = "create" in {0} ? {0} : new {0}();
-  for (const name of ["create", "step", "read", "collisions"]) {{
-    if (typeof engine[name] === "function") globalThis[name] = engine[name].bind(engine);
-  }}
-  if (typeof models === "undefined") globalThis.models = engine.models;
-}}"""
 BIND = f"""__host("bind", {{ {VERBS},
   ufo: () => ufo, asteroids: () => asteroids,
   watch: (i, c, w) => {{
@@ -56,6 +48,14 @@ BIND = f"""__host("bind", {{ {VERBS},
     try {{ if (typeof projectObjects === "function") projectObjects = w; }} catch (_) {{}}
   }},
 }})"""
+# A class has the functions of an engine, of itself or of its instances.
+BIND_CLASS = """__host("bind", ((engine) => {{
+  const verbs = {{ models: engine.models ?? (typeof models === "undefined" ? null : models) }};
+  for (const name of ["create", "step", "read", "collisions"]) {{
+    verbs[name] = typeof engine[name] === "function" ? engine[name].bind(engine) : null;
+  }}
+  return verbs;
+}})("create" in {0} ? {0} : new {0}()))"""
 # Up to version 2 of gl-matrix vec2, mat4 ... are globals; from version 3 on they are inside an
 # object, and are taken out of it.
 TAKE_OUT = """{
@@ -99,9 +99,8 @@ class V8Guest:
                 for name, text in self.order["imported"]:
                     self.load_library(name, text)
             self.v8.eval(f"{self.order['text']}\n//# sourceURL={NAME}", timeout_sec=self.load_limit)
-            if self.order["holder"]:
-                self.v8.eval(METHODS.format(self.order["holder"]), timeout_sec=self.load_limit)
-            self.functions = json.loads(str(self.v8.eval(BIND, timeout_sec=self.load_limit)))
+            bind = BIND_CLASS.format(self.order["holder"]) if self.order["holder"] else BIND
+            self.functions = json.loads(str(self.v8.eval(bind, timeout_sec=self.load_limit)))
             self.wait_until_ready()
         except JSEvalException as error:
             raise self.failure(error, self.load_limit, "while it is loaded") from None
