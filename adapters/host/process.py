@@ -37,6 +37,7 @@ GRACE = 4.0  # s beyond what the calls of a request may take
 KINDS_OF_FAILURE = (
     *("error", "timeout", "memory", "crashed", "refused", "diverged"),
     "unavailable",  # it imports what is not there, or what a guest may not
+    "waited",  # ended by the clock, before it had its processor time
 )
 Request = tuple[str, Any, float]
 """A command of the driver, its argument, and how long it may take, s."""
@@ -213,7 +214,7 @@ class SolverProcess:
         # After a call that does not return the driver makes no other like it.
         stopped_once = max(1, len({call for each in requests for call in calls_of(each)}))
         longest = max((limit for _, _, limit in requests), default=0.0)
-        most = stopped_once * PATIENCE * 2 * longest  # each may be asked once more
+        most = stopped_once * PATIENCE * longest
         answers = self.exchange({"do": requests}, min(most + GRACE, total)).get("done")
         if not isinstance(answers, list) or len(answers) != len(requests):
             raise self.intruded()
@@ -264,9 +265,7 @@ class SolverProcess:
                 continue
             if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
                 self.end()
-                raise SolverFailed(
-                    "timeout", f"does not come back within {limit:g} s and had to be stopped"
-                )
+                raise ended_by_clock(f"does not come back within {limit:g} s and had to be stopped")
             if not chunk:
                 raise self.lost()
             received += chunk
@@ -331,6 +330,21 @@ class SolverProcess:
             self.process = None
 
 
+_late = 0
+
+
+def clock_endings() -> int:
+    """How many calls in this process the clock has ended: on an idle machine they may return."""
+    return _late
+
+
+def ended_by_clock(what: str, line: int = 0, column: int = 0) -> SolverFailed:
+    """The failure of such a call."""
+    global _late
+    _late += 1
+    return SolverFailed("timeout", what, line, column)
+
+
 _working: dict[tuple[Level, ...], Level] = {}
 
 
@@ -379,7 +393,10 @@ def failure_in(failed: Any) -> SolverFailed:
     place = [failed.get("line"), failed.get("column")]
     check(isinstance(failed.get("what"), str) and all(type(k) is int for k in place))
     check(all(0 <= k < 2**31 for k in place))
-    return SolverFailed(failed["kind"], with_hint(failed["what"]), *place)
+    what = with_hint(failed["what"])
+    if failed["kind"] == "waited":
+        return ended_by_clock(what, *place)
+    return SolverFailed(failed["kind"], what, *place)
 
 
 def is_hello(answer: Any) -> bool:

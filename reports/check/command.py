@@ -387,26 +387,39 @@ PROTECTED = {
 
 def checked(files: Sequence[Path], seed: int = 0, packages: Sequence[str] = ()) -> list[FileCheck]:
     """The checks in order, one worker per core, which can always be stopped. Files with the same
-    text are judged once."""
+    text are judged once. Those of which the clock has ended a call are asked once more at the end,
+    each alone: marks do not depend on how busy the machine is."""
     alike: dict[Hashable, list[Path]] = {}
     for file in files:
         alike.setdefault(identity_of(file), []).append(file)
+    firsts = [same[0] for same in alike.values()]
+    done = ask_all(firsts, os.cpu_count() or 1, seed, packages)
+    if late := [file for file in firsts if done[file].waited]:
+        done |= ask_all(late, 1, seed, packages)
+    for first, *others in alike.values():
+        done |= {file: named_for(file, done[first]) for file in others}
+    if len(files) > 1:
+        once = f", with {counted(len(firsts), 'different text')}: the same text is judged once"
+        say(f"checked {counted(len(files), 'submission')}{once * (len(firsts) < len(files))}")
+    return [done[file] for file in files]
+
+
+def ask_all(
+    files: Sequence[Path], workers: int, seed: int, packages: Sequence[str]
+) -> dict[Path, FileCheck]:
+    """The check of each file, `workers` at once."""
     tasks: dict[Hashable, Any] = {
-        k: partial(check_here, same[0], seed, tuple(packages)) for k, same in alike.items()
+        file: partial(check_here, file, seed, tuple(packages)) for file in files
     }
     done: dict[Path, FileCheck] = {}
-    results = run_all(tasks, min(os.cpu_count() or 1, len(tasks)), CHECKING)
+    results = run_all(tasks, min(workers, len(tasks)), CHECKING)
     with closing(results), Progress() as progress:
         progress.start(len(tasks), len(tasks), f"checking {printable(files[0].name)}")
         for key, one in results:
-            first = alike[key][0]
-            found = not_checked(first, one) if isinstance(one, Failure) else one
-            done |= {first: found} | {file: named_for(file, found) for file in alike[key][1:]}
-            progress.done(f"checked {printable(str(first.relative_to(first.parent.parent)))}")
-    if len(files) > 1:
-        once = f", with {counted(len(tasks), 'different text')}: the same text is judged once"
-        say(f"checked {counted(len(files), 'submission')}{once * (len(tasks) < len(files))}")
-    return [done[file] for file in files]
+            file = Path(str(key))
+            done[file] = not_checked(file, one) if isinstance(one, Failure) else one
+            progress.done(f"checked {printable(str(file.relative_to(file.parent.parent)))}")
+    return done
 
 
 def check_here(file: Path, seed: int, packages: Sequence[str]) -> FileCheck:

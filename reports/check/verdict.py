@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from crosscheck2d.adapters.host.file import NotASolver, SolverText, printable, read_solver
 from crosscheck2d.adapters.host.gl_matrix import lacks_gl_matrix
+from crosscheck2d.adapters.host.process import clock_endings
 from crosscheck2d.adapters.host.restitution import code_of
-from crosscheck2d.adapters.host.surface import is_engine
+from crosscheck2d.adapters.host.surface import holder_of, is_engine
 from crosscheck2d.reports.check.functions import FUNCTIONS
 from crosscheck2d.reports.check.questions import use_seed
 from crosscheck2d.reports.check.rows import SAME_AGAIN, TASKS, UNKNOWN, CheckRow, Verdict, worst
@@ -45,6 +46,7 @@ class FileCheck:
         restitution: used to judge its whole scenes; None if they cannot be judged.
         solver: the text that was checked; None if there is none.
         seconds: duration of the check.
+        waited: the clock has ended a call of it, as it may on a busy machine.
     """
 
     path: Path
@@ -53,6 +55,7 @@ class FileCheck:
     restitution: float | None = None
     solver: SolverText | None = None
     seconds: float = 0.0
+    waited: bool = False
 
     @property
     def faults(self) -> list[CheckRow]:
@@ -200,8 +203,9 @@ def check_file(path: Path, seed: int = 0, packages: Sequence[str] = ()) -> FileC
     seed: of the numbers of its questions; packages: what it may import beside numpy.
     """
     use_seed(seed)
-    began = perf_counter()
-    return replace(check_of(path, packages), seconds=perf_counter() - began)
+    began, late = perf_counter(), clock_endings()
+    check = check_of(path, packages)
+    return replace(check, seconds=perf_counter() - began, waited=clock_endings() > late)
 
 
 def check_of(path: Path, packages: Sequence[str]) -> FileCheck:
@@ -210,7 +214,7 @@ def check_of(path: Path, packages: Sequence[str]) -> FileCheck:
         return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:
         solver = replace(read_solver(path), packages=tuple(packages))
-        if is_engine(solver):
+        if is_engine(solver) or holder_of(solver):
             raise NotASolver(f"{path}: {ENGINE}; {RUN_INSTEAD} {shlex.quote(str(path))}")
         rows, restitution = examine(solver)
         if lacking := next((row.cause for row in rows if lacks_gl_matrix(row.cause)), ""):

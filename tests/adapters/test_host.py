@@ -189,8 +189,8 @@ def ask_twice(text: str) -> None:
             process.do("ask", QUESTION, 1.0)
 
 
-def test_a_sleeping_call_is_ended_by_the_clock_and_asked_once_more():
-    """Three times its limit, twice; what keeps the processor busy ends after its limit."""
+def test_a_sleeping_call_is_ended_by_the_clock():
+    """After three times its limit; what keeps the processor busy ends after its limit."""
     sleeps = PLAIN.replace(
         "def integrate(sphere, dt):\n",
         "def integrate(sphere, dt):\n    import time; time.sleep(99)\n",
@@ -198,4 +198,4 @@ def test_a_sleeping_call_is_ended_by_the_clock_and_asked_once_more():
     began = time.monotonic()
     with guest(sleeps) as process, pytest.raises(SolverFailed, match="does not come back"):
         process.do("ask", QUESTION, 0.1)
-    assert time.monotonic() - began >= 2 * 3 * 0.1
+    assert time.monotonic() - began >= 3 * 0.1

@@ -68,6 +68,13 @@ class Failed(Exception):
         self.kind, self.what, self.line, self.column = kind, what[:LONGEST], line, column
 
 
+def stopped(limit: float, spent: float, when: str) -> Failed:
+    """A call that did not return: "waited" if the clock has ended it before it had half of its
+    processor time, `spent` s, as it does on a busy machine."""
+    kind = "waited" if spent < limit / 2 else "timeout"
+    return Failed(kind, f"does not come back within {limit:g} s {when}")
+
+
 # ---- modules ------------------------------------------------------------------------------------
 
 
@@ -588,19 +595,7 @@ class PythonGuest:
         }
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer to a command; raises `Failed` after `limit` s, or if the file threw.
-
-        A question stopped by the clock before it had its processor time is asked once more."""
-        began = process_time()
-        try:
-            return self.run_once(command, argument, limit)
-        except Failed as failure:
-            if failure.kind != "timeout" or command != "ask" or process_time() - began > limit / 2:
-                raise
-        return self.run_once(command, argument, limit)
-
-    def run_once(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer to a command."""
+        """The answer to a command; raises `Failed` after `limit` s, or if the file threw."""
         self.inside = ""
         if command == "turns":
             self.turns = bool(argument)
@@ -617,8 +612,10 @@ class PythonGuest:
         """Context that turns every exception of the file into `Failed`, and stops it after
         `limit` s of processor time, or `PATIENCE` times as many by the clock."""
 
+        began = process_time()
+
         def too_late() -> Failed:
-            return Failed("timeout", f"does not come back within {limit:g} s {when}")
+            return stopped(limit, process_time() - began, when)
 
         try:
             with system().stopped_after(limit, PATIENCE * limit, too_late):
@@ -1016,7 +1013,7 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
                 answers.append({"done": guest.run(command, argument, seconds)})
         except Failed as failure:
             answers.append({"failed": vars(failure)})
-            if failure.kind in ("timeout", "memory"):
+            if failure.kind in ("timeout", "waited", "memory"):
                 endless |= dict.fromkeys([*calls, "step"], vars(failure))
     return answers
 

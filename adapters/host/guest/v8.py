@@ -12,7 +12,7 @@ from contextlib import suppress
 from time import monotonic, perf_counter, process_time, sleep
 from typing import Any
 
-from driver import PATIENCE, Failed  # type: ignore[import-not-found]
+from driver import PATIENCE, Failed, stopped  # type: ignore[import-not-found]
 from py_mini_racer import (
     JSEvalException,
     JSOOMException,
@@ -89,6 +89,7 @@ class V8Guest:
 
     def load(self) -> None:
         """Load the file into an empty V8."""
+        self.began = process_time()
         self.v8.set_hard_memory_limit(self.heap)
         self.v8.eval(DRIVER)
         try:
@@ -128,7 +129,7 @@ class V8Guest:
         if command == "turns":
             return self.v8.eval(f'__host("turns", {json.dumps(argument)})')
         code = f'__host("{command}", {json.dumps(json.dumps(argument))})'
-        began = perf_counter()
+        began, self.began = perf_counter(), process_time()
         try:
             answer = json.loads(str(self.evaluate(code, limit, may_repeat=command == "ask")))
         except JSEvalException as error:
@@ -210,7 +211,7 @@ class V8Guest:
     def failure(self, error: JSEvalException, limit: float, when: str) -> Failed:
         """The message of V8, with line and column if known."""
         if isinstance(error, JSTimeoutException):
-            return Failed("timeout", f"does not come back within {limit:g} s {when}")
+            return stopped(limit, process_time() - self.began, when)
         if isinstance(error, JSOOMException):
             return Failed("memory", f"wants more than {self.heap // 2**20} MB of memory {when}")
         first, _, rest = str(error).partition("\n")

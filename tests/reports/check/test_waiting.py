@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
-from time import process_time
+from time import process_time, sleep
 from unittest import mock
 
 import pytest
@@ -19,14 +19,17 @@ from py_mini_racer import JSTimeoutException
 from crosscheck2d.adapters.host.file import PATIENCE, NotASolver, SolverFailed, read_solver
 from crosscheck2d.adapters.host.process import GRACE, SolverProcess
 from crosscheck2d.adapters.host.sandbox import GUEST, Level, start
+from crosscheck2d.reports.check import command
 from crosscheck2d.reports.check.lines import Source
 from crosscheck2d.reports.check.rows import judged
 from crosscheck2d.reports.check.solver import with_lines
+from crosscheck2d.reports.check.verdict import FileCheck, check_file
 
 SECONDS = 16.0  # for a process that starts and is stopped late, on a busy machine
 sys.path.append(str(GUEST))
 v8 = import_module("v8")
 JS = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.js").read_text()
+PY = (Path(__file__).parents[3] / "tests" / "solvers/correct/plain.py").read_text()
 
 
 def busy(spent: float) -> Iterator[str | Exception]:
@@ -89,7 +92,7 @@ FAILED = {"failed": {"kind": "error", "what": "", "line": 0, "column": 0}}
 
 
 def test_both_functions_may_be_endless_on_a_busy_machine(tmp_path: Path):
-    """Each may have to be asked again, so that the process has the time of two."""
+    """Each may take its limit by the clock, which is `PATIENCE` times that of the processor."""
     (tmp_path / "Exercise.js").write_text(JS)
     ball = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0, 0.7, 0.8, 0.9, 1.0, 0.5]
     ask = [
@@ -104,8 +107,8 @@ def test_both_functions_may_be_endless_on_a_busy_machine(tmp_path: Path):
         process.request([("left", None, 1.0)])
     both, one, left = (call.args[1] for call in given.call_args_list)
 
-    assert both == 2 * 2 * PATIENCE + GRACE
-    assert one == left == 2 * PATIENCE + GRACE
+    assert both == 2 * PATIENCE + GRACE
+    assert one == left == PATIENCE + GRACE
 
 
 def test_a_process_that_was_stopped_fails_again_when_it_is_asked(tmp_path: Path):
@@ -117,6 +120,48 @@ def test_a_process_that_was_stopped_fails_again_when_it_is_asked(tmp_path: Path)
             process.do("left")
         row = judged("scenes", "scenes", "Does it play?", "it fails", "yes", False, "too slow")
         assert with_lines([row], Source(process, JS)) == [row]
+
+
+ENDS = {
+    "sleeps.py": "import time; time.sleep(99)",
+    "endless.py": "while True: pass",
+    "right.py": "0",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ENDS)
+def test_only_what_the_clock_has_ended_is_asked_again(name: str, tmp_path: Path):
+    """What keeps the processor busy has had its time."""
+    head = "def integrate(sphere, dt):\n"
+    (tmp_path / name).write_text(PY.replace(head, f"{head}    {ENDS[name]}\n"))
+    assert check_file(tmp_path / name).waited == (name == "sleeps.py")
+
+
+def noted_check(file: Path, *_: object) -> FileCheck:
+    """In a worker: a check that writes when it begins and ends, and of which b.py alone was ended
+    by no clock."""
+    diary = file.with_name("diary")
+    first = f"begin {file.name}" not in (diary.read_text() if diary.exists() else "")
+    for what in ("begin", "end"):
+        with diary.open("a") as note:
+            note.write(f"{what} {file.name}\n")
+        sleep(0.3)
+    return FileCheck(file, [], "first" if first else "second", waited=file.name != "b.py")
+
+
+def test_a_file_that_the_clock_has_ended_is_asked_once_more_alone_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """When nothing else runs, and once; the second check counts."""
+    monkeypatch.setattr(command, "check_here", noted_check)
+    files = [tmp_path / name for name in ("a.py", "b.py", "c.py")]
+    for file in files:
+        file.write_text(file.name)
+
+    assert [one.refused for one in command.checked(files)] == ["second", "first", "second"]
+    lines = (tmp_path / "diary").read_text().splitlines()
+    assert lines[6:] == ["begin a.py", "end a.py", "begin c.py", "end c.py"]
 
 
 @pytest.mark.slow
