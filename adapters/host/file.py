@@ -129,9 +129,13 @@ HINTS = {
 PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".xz", ".bz2")
 
 
-def read_solver(path: Path) -> SolverText:
+def read_solver(path: Path, within: Path | None = None) -> SolverText:
     """The text of `path`, and of what it imports from beside it; raises `NotASolver` with one
-    sentence."""
+    sentence.
+
+    within: in a class the student's own folder, out of which nothing is read; or the file itself,
+    if it lies beside those of others: then no module is beside it.
+    """
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         hint = (
@@ -141,6 +145,7 @@ def read_solver(path: Path) -> SolverText:
             f"{path}: ends in {path.suffix or 'nothing'}; a solver is a .js or a .py file{hint}"
         )
     data = read_bytes(path, "name an Exercise.js or a solver.py")
+    must_be_own(path, within)
     text = decoded(path, data)
     if not text.strip():
         raise NotASolver(f"{path}: is empty; save your solver into it")
@@ -149,19 +154,31 @@ def read_solver(path: Path) -> SolverText:
         raise NotASolver(f"{path}: is written in Python; give it a name that ends in .py")
     if kind == "python" and javascript and not python:
         raise NotASolver(f"{path}: is written in JavaScript; give it a name that ends in .js")
-    imported = read_imported(path, text) if kind == "python" else read_library(path, text)
+    if kind == "javascript":
+        imported = read_library(path, text)
+    else:
+        imported = {} if within == path else read_imported(path, text, within)
     return SolverText(
         path, kind, text, hashlib.sha256(data).hexdigest()[:16], tuple(sorted(imported.items()))
     )
 
 
-def read_imported(path: Path, text: str) -> dict[str, str]:
+def must_be_own(path: Path, within: Path | None) -> None:
+    """Raise `NotASolver` for a link to what is not the student's."""
+    if within is not None:
+        home = within.parent.resolve() / within.name
+        if not path.resolve().is_relative_to(home):
+            raise NotASolver(f"{path}: is a link to a file that was not handed in with it")
+
+
+def read_imported(path: Path, text: str, within: Path | None = None) -> dict[str, str]:
     """The texts of the modules that a solver of that `text` imports from its own folder; raises
     `NotASolver`."""
     itself, imported = path.resolve(), dict[str, str]()
 
     def text_of(one: Path) -> str:
         wanted = "a module that a solver imports is a file"
+        must_be_own(one, within)
         return text if one == itself else decoded(one, read_bytes(one, wanted))
 
     for file, module in modules_beside(itself.parent, text, text_of):

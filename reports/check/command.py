@@ -14,6 +14,7 @@ from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 from unicodedata import combining, normalize
 
@@ -112,12 +113,12 @@ def check(
     seed = asking.seed
     if seed is None:
         seed = secrets.randbelow(10**6) + 1 if several else 0
-    checks = checked(files, seed, asking.packages)
+    homes = {file: path if single else student_of(file, path) for file in files}
+    checks = checked(files, seed, asking.packages, homes if several else {})
     if not path.is_dir() and checks[0].refused and not single:
         refuse([checks[0].refused])
     if single and files[0].is_dir() and len(solvers_below(path)) > 1:
         say(f"{path}: holds several solvers; for a class: --format csv, or --scaffold")
-    homes = {file: path if single else student_of(file, path) for file in files}
     beside = {file: passed_over(file, home) for file, home in homes.items()}
     places = [f"{homes[file].name}/{one}" for file, others in beside.items() for one in others]
     not_read = [*others_in(path, files), *places] if several else []
@@ -385,19 +386,27 @@ PROTECTED = {
 }
 
 
-def checked(files: Sequence[Path], seed: int = 0, packages: Sequence[str] = ()) -> list[FileCheck]:
+def checked(
+    files: Sequence[Path],
+    seed: int = 0,
+    packages: Sequence[str] = (),
+    homes: Mapping[Path, Path] = MappingProxyType({}),
+) -> list[FileCheck]:
     """The checks in order, one worker per core, which can always be stopped. Files with the same
     text are judged once. Those of which the clock has ended a call are asked once more at the end,
-    each alone: marks do not depend on how busy the machine is."""
+    each alone: marks do not depend on how busy the machine is.
+
+    homes: in a class file -> its student's folder, or the file itself.
+    """
     alike: dict[Hashable, list[Path]] = {}
     for file in files:
-        alike.setdefault(identity_of(file), []).append(file)
+        alike.setdefault(identity_of(file, homes.get(file)), []).append(file)
     firsts = [same[0] for same in alike.values()]
-    done = ask_all(firsts, os.cpu_count() or 1, seed, packages)
+    done = ask_all(firsts, os.cpu_count() or 1, seed, packages, homes)
     if late := [file for file in firsts if done[file].waited]:
-        done |= ask_all(late, 1, seed, packages)
+        done |= ask_all(late, 1, seed, packages, homes)
     for first, *others in alike.values():
-        done |= {file: named_for(file, done[first]) for file in others}
+        done |= {file: named_for(file, done[first], homes.get(file)) for file in others}
     if len(files) > 1:
         once = f", with {counted(len(firsts), 'different text')}: the same text is judged once"
         say(f"checked {counted(len(files), 'submission')}{once * (len(firsts) < len(files))}")
@@ -405,11 +414,15 @@ def checked(files: Sequence[Path], seed: int = 0, packages: Sequence[str] = ()) 
 
 
 def ask_all(
-    files: Sequence[Path], workers: int, seed: int, packages: Sequence[str]
+    files: Sequence[Path],
+    workers: int,
+    seed: int,
+    packages: Sequence[str],
+    homes: Mapping[Path, Path],
 ) -> dict[Path, FileCheck]:
     """The check of each file, `workers` at once."""
     tasks: dict[Hashable, Any] = {
-        file: partial(check_here, file, seed, tuple(packages)) for file in files
+        file: partial(check_here, file, seed, tuple(packages), homes.get(file)) for file in files
     }
     done: dict[Path, FileCheck] = {}
     results = run_all(tasks, min(workers, len(tasks)), CHECKING)
@@ -422,25 +435,27 @@ def ask_all(
     return done
 
 
-def check_here(file: Path, seed: int, packages: Sequence[str]) -> FileCheck:
+def check_here(
+    file: Path, seed: int, packages: Sequence[str], within: Path | None = None
+) -> FileCheck:
     """In a worker: the check of a file."""
-    return refused_folder(file) if file.is_dir() else check_file(file, seed, packages)
+    return refused_folder(file) if file.is_dir() else check_file(file, seed, packages, within)
 
 
-def identity_of(file: Path) -> Hashable:
+def identity_of(file: Path, within: Path | None = None) -> Hashable:
     """A key that is equal for two files only if their checks must agree; for a file that is no
     solver, its path. A Python file can read its own name."""
     try:
-        solver = read_solver(file)
+        solver = read_solver(file, within)
     except NotASolver:
         return file
     name = file.name if solver.kind == "python" else ""
     return solver.kind, solver.text, solver.imported, name
 
 
-def named_for(file: Path, one: FileCheck) -> FileCheck:
+def named_for(file: Path, one: FileCheck, within: Path | None = None) -> FileCheck:
     """The check of a file with the same text, as that of this file."""
-    solver = None if one.solver is None else read_solver(file)
+    solver = None if one.solver is None else read_solver(file, within)
     refused = one.refused.replace(printable(str(one.path)), printable(str(file)))
     return replace(one, path=file, solver=solver, refused=refused)
 

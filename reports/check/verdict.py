@@ -197,23 +197,26 @@ def task_title(task: str) -> str:
     return f"Task {TASKS[task]}" if task[0] in "12" else TASKS[task][0].upper() + TASKS[task][1:]
 
 
-def check_file(path: Path, seed: int = 0, packages: Sequence[str] = ()) -> FileCheck:
+def check_file(
+    path: Path, seed: int = 0, packages: Sequence[str] = (), within: Path | None = None
+) -> FileCheck:
     """The check of one file, with its duration; a folder is refused.
 
-    seed: of the numbers of its questions; packages: what it may import beside numpy.
+    seed: of the numbers of its questions; packages: what it may import beside numpy; within: as of
+    `read_solver`.
     """
     use_seed(seed)
     began, late = perf_counter(), clock_endings()
-    check = check_of(path, packages)
+    check = check_of(path, packages, within)
     return replace(check, seconds=perf_counter() - began, waited=clock_endings() > late)
 
 
-def check_of(path: Path, packages: Sequence[str]) -> FileCheck:
+def check_of(path: Path, packages: Sequence[str], within: Path | None) -> FileCheck:
     """The check of one file, without its duration."""
     if path.is_dir():
         return FileCheck(path, [], f"{path}: {nothing_in(path)}")
     try:
-        solver = replace(read_solver(path), packages=tuple(packages))
+        solver = replace(read_solver(path, within), packages=tuple(packages))
         if is_engine(solver) or holder_of(solver):
             raise NotASolver(f"{path}: {ENGINE}; {RUN_INSTEAD} {shlex.quote(str(path))}")
         rows, restitution = examine(solver)

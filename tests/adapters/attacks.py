@@ -51,6 +51,24 @@ FORBIDDEN: dict[str, str] = {
     "own command line": "return CLASS in ' '.join(sys.orig_argv)",
     "own place": "return CLASS in os.getcwd() + __file__",
     "memory of the parent": "return open(f'/proc/{PARENT}/mem', 'rb').read(1)",
+    "memory of the supervisor": "return open(f'/proc/{os.getppid()}/mem', 'rb').read(1)",
+    "expected values in a frame": (
+        "f = sys._getframe()\n"
+        "while f:\n"
+        "    names = [n for n in f.f_locals if 'expected' in n or 'mistake' in n]\n"
+        "    if names: return names\n"
+        "    f = f.f_back"
+    ),
+    "folders of the parent in /tmp": (
+        "return [n for n in os.listdir('/tmp') if n.startswith('crosscheck')]"
+    ),
+    "watch on the class": (
+        "n = LIBC.inotify_init(); return LIBC.inotify_add_watch(n, CLASS.encode(), 0xFFF) >= 0"
+    ),
+    "file by its handle": (
+        "h = ctypes.create_string_buffer(b'\\x08\\0\\0\\0\\x01\\0\\0\\0\\x02' + bytes(19), 32)\n"
+        "return LIBC.syscall(304, os.open('/', 0), h, 0) >= 0"
+    ),
     "handles of the parent": "return os.listdir(f'/proc/{PARENT}/fd')",
     "inherited handles": (
         "for n in range(3, 64):\n"
@@ -88,6 +106,7 @@ FORBIDDEN: dict[str, str] = {
     "kill the group of the parent": "os.killpg(PARENT, 0); return True",
     "signal by F_SETOWN": "import fcntl; r, w = os.pipe(); fcntl.fcntl(r, 8, PARENT); return True",
     "tgkill": "return LIBC.syscall(234, PARENT, PARENT, 0) == 0",
+    "pidfd_send_signal": "return LIBC.syscall(424, os.pidfd_open(PARENT), 19, 0, 0) == 0",
     "prlimit of the parent": (
         "import resource; resource.prlimit(PARENT, resource.RLIMIT_CPU, (1, 1)); return True"
     ),
@@ -109,6 +128,15 @@ FORBIDDEN: dict[str, str] = {
     "unshare mounts": "return LIBC.unshare(0x00020000) == 0",
     "mount": "return LIBC.mount(b'none', b'/tmp', b'tmpfs', 0, None) == 0",
     "bpf": "return LIBC.syscall(321, 5, ctypes.create_string_buffer(128), 128) >= 0",
+    "userfaultfd": "return LIBC.syscall(323, 0) >= 0",
+    "perf_event_open": (
+        "return LIBC.syscall(298, ctypes.create_string_buffer(128), PARENT, -1, -1, 0) >= 0"
+    ),
+    "x32 call of socket": "return LIBC.syscall(0x40000000 + 41, 2, 1, 0) >= 0",
+    "input of the terminal": (
+        "import fcntl, termios\n"
+        "fcntl.ioctl(os.open('/dev/tty', 2), termios.TIOCSTI, b'x'); return True"
+    ),
     "keyctl of the session": "return LIBC.syscall(250, 11, -3, None, 0) > 0",
     "set the clock": "import time; time.clock_settime(0, 0); return True",
     "reboot": "return LIBC.reboot(0x89ABCDEF) == 0",
@@ -149,6 +177,22 @@ LEFT_BEHIND: dict[str, str] = {
     "fork bomb": (
         "for _ in range(100):\n    if os.fork() == 0:\n        os.setsid(); time.sleep(600)"
     ),
+    # what it may do to processes, segments and sockets is done to its own
+    "stop own parent, really": "os.kill(os.getppid(), signal.SIGSTOP)",
+    "kill supervisor": "os.kill(os.getppid(), signal.SIGKILL)",
+    "kill -1, really": "os.kill(-1, signal.SIGKILL)",
+    "slow down the user (setpriority)": "os.setpriority(os.PRIO_USER, 0, 19)",
+    "SysV shared memory": "LIBC.shmget(0x2026, 4096, 0o1666)",
+    "abstract unix socket": (
+        "import socket; s = socket.socket(1); s.bind('\\0crosscheck-attack'); s.listen()\n"
+        "if os.fork() == 0: time.sleep(600)"
+    ),
+    "tcp": "import socket; s = socket.create_server(('127.0.0.1', 0)); sys.s = s",
+    "io_uring": "LIBC.syscall(425, 8, ctypes.create_string_buffer(120))",
+    "thread bomb": (
+        "from threading import Thread\n"
+        "while True: Thread(target=time.sleep, args=(600,), daemon=True).start()"
+    ),
     "double fork that ignores signals": (
         "if os.fork() == 0:\n"
         "    for n in range(1, 65):\n"
@@ -179,4 +223,172 @@ FORGED: dict[str, tuple[str, str]] = {
         "",
     ),
     "escapes in an exception": ("raise ValueError('\\x1b]0;x\\x07')", "\\x1b]0;x\\x07"),
+}
+
+# In a file that is right otherwise, beside its functions, what it does in the call of one. It has
+# its right result, or is said to have failed so; in time.
+CALLED: dict[str, tuple[str, str, str]] = {
+    "nothing": ("", "", ""),
+    "patches json, os.write": (
+        "import json; json.dumps = json.loads = os.write = None",
+        "",
+        "ended",
+    ),
+    "endless print": ("", "while time.process_time() < 99: print('x' * 9999)", "come back"),
+    "reads its questions itself": (
+        "from threading import Thread\n"
+        "def steal():\n"
+        "    for n in range(3, 16):\n"
+        "        try: os.set_blocking(n, False); os.read(n, 10**6)\n"
+        "        except OSError: pass\n",
+        "steal()",
+        "SIGKILL|come back|ended",
+    ),
+    "answers twice": ("", 'WRITE(b\'{"id": "0", "done": []}\\n\')', "channel"),
+    "endless answer": (
+        "def endless():\n"
+        "    for n in range(3, 16):\n"
+        "        try:\n"
+        "            while True: os.write(n, bytes(10**6))\n"
+        "        except OSError: pass\n",
+        "endless()",
+        "channel|come back|ended its own",
+    ),
+    "failure with junk": (
+        "",
+        "driver.reply = lambda *_: [{'failed': {'kind': 1, 'what': {}, 'line': -1}}]",
+        "channel",
+    ),
+    "NaN, many numbers": ("", "driver.row_of = lambda s: [float('nan')] * 10**5", "channel"),
+    "numbers of a wrong length": ("", "driver.row_of = lambda s: [0.5] * 11", "channel"),
+    "huge integer in JSON": ("", "driver.row_of = lambda s: [10**400] * 12", "channel"),
+    "texts for numbers": ("", "driver.row_of = lambda s: ['0.5'] * 12", "channel"),
+    "truths for numbers": ("", "driver.row_of = lambda s: [True] * 12", "channel"),
+    "answer is a list": ("", "driver.PythonGuest.ask = lambda *_: []", "channel"),
+    "done holds junk": ("", "driver.reply = lambda *_: [{'done': {'states': 1}}]", "channel"),
+    "two answers": ("", "driver.reply = lambda *_: [{'done': 1}] * 2", "channel"),
+    "every line twice": (
+        "tell = driver.tell",
+        "driver.tell = lambda a, w: (tell(a, w), tell(a, w))",
+        "channel",
+    ),
+    "exception whose str hangs": (
+        "class E(Exception):\n    def __str__(self):\n        while True: pass",
+        "raise E",
+        "come back",
+    ),
+    "recursion in C": (
+        "x = []\nfor _ in range(10**6): x = [x]",
+        "repr(x)",
+        "calls itself without end|SIGSEGV",
+    ),
+    "endless loop that swallows all": (
+        "",
+        "while True:\n"
+        "        try:\n"
+        "            while True: pass\n"
+        "        except BaseException: pass",
+        "come back",
+    ),
+    "endless loop in C": ("", "sum(iter(int, 1))", "come back"),
+    "cancels its timers": (
+        "",
+        "signal.setitimer(2, 0); signal.setitimer(0, 0)\n    while True: pass",
+        "come back",
+    ),
+    "stops itself": ("", "os.kill(os.getpid(), signal.SIGSTOP)", "come back"),
+    "a thread answers later": (
+        "from threading import Thread",
+        "Thread(target=lambda: (time.sleep(0.2), WRITE(b'{}\\n')), daemon=True).start()",
+        "channel|",
+    ),
+    "returns an object with tricks": (
+        "class O:\n"
+        "    __slots__ = ()\n"
+        "    def __getattr__(self, name): raise SystemExit\n"
+        "    __float__ = __iter__ = __getattr__",
+        "return O()",
+        "SystemExit|",
+    ),
+    "fields with tricks": (
+        "class F(float):\n    def __float__(self): raise KeyboardInterrupt",
+        "sphere.alpha = F(1); return",
+        "KeyboardInterrupt",
+    ),
+}
+
+# Hand-ins whose functions do nothing, and that want points, or those of others to be lost. CLASS is
+# the folder of the class; the other names are those of the attacks above.
+GRADED: dict[str, str] = {
+    "imports the reference.py": "from reference_impl.exercise import advance",
+    "imports the reference by its package.py": (
+        "from crosscheck2d.reference_impl.exercise import advance"
+    ),
+    "imports the judge.py": "from crosscheck2d.reports.check.questions import QUESTIONS",
+    "executes a neighbour.py": "exec(open(CLASS + '/anna.py').read())",
+    "imports a neighbour.py": "from anna import *",
+    "stops the parent.py": (
+        "for p in (os.getppid(), PARENT, *range(2, 99999)):\n"
+        "    try: os.kill(p, signal.SIGSTOP)\n"
+        "    except (OSError, OverflowError): pass"
+    ),
+    "kills all.py": (
+        "for p in (PARENT, *range(2, 99999)):\n"
+        "    if p != os.getpid():\n"
+        "        try: os.kill(p, signal.SIGKILL)\n"
+        "        except OSError: pass"
+    ),
+    "rewrites the marks later.py": (
+        "if os.fork() == 0:\n"
+        "    os.setsid()\n"
+        "    if os.fork() == 0:\n"
+        "        for _ in range(600):\n"
+        "            time.sleep(0.1)\n"
+        "            for place in (CLASS, CLASS + '/..', '.', '/tmp'):\n"
+        "                try: open(place + '/marks.csv', 'w').write('20 of 20')\n"
+        "                except OSError: pass\n"
+        "    os._exit(0)"
+    ),
+    "patches the driver.py": (
+        "driver = sys.modules['driver']\n"
+        "driver.PythonGuest.run = lambda self, command, argument, limit: None"
+    ),
+    "answers all with what came.py": (
+        "driver = sys.modules['driver']\n"
+        "def ask(self, question):\n"
+        "    states = [question['spheres']] * len(question['calls'])\n"
+        "    return {'states': states, 'returned': False, 'strayed': False, 'strange': [],\n"
+        "            'kept': [], 'calls': [], 'error': None}\n"
+        "driver.PythonGuest.ask = ask"
+    ),
+    "all questions are unavailable.py": (
+        "driver = sys.modules['driver']\n"
+        "driver.reply = lambda g, r: [\n"
+        "    {'failed': {'kind': 'unavailable', 'what': 'x', 'line': 0, 'column': 0}} for _ in r\n"
+        "]"
+    ),
+    "sleeps.py": "time.sleep(99)",
+    "binds the host anew.js": (
+        "const right = (s) => { s.velocity.x = NaN; };\n"
+        "__host('bind', { integrate: right, sphereSphereCollisionHandling: right });\n"
+        "try { __host = () => 7; } catch (_) {}\n"
+        "try { Object.defineProperty(globalThis, '__host', { value: () => 7 }); } catch (_) {}"
+    ),
+    "asks the host for answers.js": (
+        "for (const word of ['answers', 'numbers', 'left', 'globals', 'accesses']) {\n"
+        "  try { __host(word); __host(word, '{}'); } catch (_) {}\n"
+        "}\n"
+        "__host('turns', true);"
+    ),
+    "hooks the stack of errors.js": (
+        "Error.prepareStackTrace = (e, frames) => frames.map((f) => f.getThis && f.getThis());\n"
+        "Error.stackTraceLimit = Infinity;"
+    ),
+    "all numbers are right.js": (
+        "Number.prototype.valueOf = () => 1; Object.is = () => true; Math.abs = () => 0;"
+    ),
+    "imports in JavaScript.js": ("import('fs').then((fs) => fs.readFileSync(CLASS + '/anna.py'));"),
+    "constructor of functions.js": (
+        "(() => {}).constructor.constructor('return process')().mainModule.require('fs');"
+    ),
 }
