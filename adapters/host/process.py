@@ -133,24 +133,17 @@ class SolverProcess:
 
     def connect(self) -> Any:
         """Start a process, or reuse a waiting one, and send it the guest; returns its first answer.
-
-        The process itself stops a file that does not load in time. If it does not answer at all, it
-        is started once more before the file is blamed: a start of V8 has been seen to hang, though
-        in none of 1259 starts that were counted.
-        """
-        for last in (False, True):
-            try:
-                if not self.reuse():
-                    self.begin()
-                hello = self.exchange({"open": self.order}, STARTING)
-                if "failed" in hello or is_hello(hello):
-                    return hello
-                raise self.intruded()
-            except BaseException as error:
-                self.end()
-                if last or not (isinstance(error, SolverFailed) and error.kind == "timeout"):
-                    raise
-        raise AssertionError("the second start returns or raises")
+        The process itself stops a file that does not load in time."""
+        try:
+            if not self.reuse():
+                self.begin()
+            hello = self.exchange({"open": self.order}, STARTING)
+        except BaseException:
+            self.end()
+            raise
+        if "failed" in hello or is_hello(hello):
+            return hello
+        raise self.intruded()
 
     def reuse(self) -> bool:
         """Whether a waiting process has the same texts, and is this one's now."""

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
-from crosscheck2d.adapters.host.file import KINDS, NotASolver
+from crosscheck2d.adapters.host.file import HINTS, KINDS, NotASolver
 from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
 from crosscheck2d.reports.run.store import Store, reading, writing
@@ -83,7 +83,7 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
     own: list[str] = []
     faults: list[str] = []
     for name in asked:
-        if (file := Path(name.removesuffix(OWN))).suffix.lower() in KINDS:
+        if (file := Path(name.removesuffix(OWN))).suffix.lower() in (*KINDS, *HINTS):
             own += [f"{file}{OWN}"]
             faults += faults_of_file(file)
             continue

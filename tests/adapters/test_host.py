@@ -42,6 +42,7 @@ WEAKER = {
     "signal by F_SETOWN", "linker: C source beside", "exec of a shell", "own command line",
     "fills the disk", "name of a host", "unshare a user namespace", "a device made", "own place",
     "by the folder of the parent", "home folder", "keyctl of the session",
+    "folders of the parent in /tmp", "watch on the class", "userfaultfd",
     "kill everything",  # says yes where each single process refuses
 }  # fmt: skip
 

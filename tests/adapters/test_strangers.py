@@ -161,10 +161,20 @@ def test_a_box_is_told_where_four_walls_make_one():
     ],
 )
 def test_a_file_of_another_kind_says_what_to_do(name: str, hint: str, tmp_path: Path):
-    """In one sentence."""
+    """In one sentence, also as an engine of a run."""
     (tmp_path / name).write_text("x")
     with pytest.raises(NotASolver, match=hint):
         read_solver(tmp_path / name)
+    done = crosscheck("run", "free_fall", "--engine", name, cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert hint in done.stderr or name.endswith(".zip")
+
+
+def test_check_says_of_a_ported_engine_that_it_is_one(tmp_path: Path):
+    """Its functions are in a class."""
+    assert crosscheck("new-engine", "a.py", "--y-down", cwd=tmp_path).returncode == 0
+    done = crosscheck("check", "a.py", cwd=tmp_path)
+    assert (done.returncode, "is an engine (create, step, read)" in done.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(
