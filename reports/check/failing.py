@@ -53,7 +53,6 @@ def rows_until_failure(
             part = "2a"
         else:
             left |= left_by(process, needed(answers), limit)
-            left |= left_by(process, doubtful(left), LIMIT)
             detection = detection_rows(left, source.text)
             part = beyond_detection(part, detection, left)
     rows = [failure("2a", part, answers)]
@@ -96,22 +95,6 @@ def needed(answers: dict[str, SolverAnswer]) -> list[str]:
         *projection.DISPLACED,
         *pairs[:: 4 if was_stopped(answers) else 1],
     ]
-
-
-def doubtful(left: dict[str, SolverAnswer]) -> list[str]:
-    """The questions to repeat with more time: those whose call failed before it moved a sphere,
-    except overlapping pairs that only judge (a).
-
-    On a busy machine a call may be stopped before it has done anything.
-    """
-    idle = (name for name, answer in left.items() if answer.failed and not moved(left, name))
-    return [name for name in idle if name in projection.DISPLACED or apart(name)]
-
-
-def apart(name: str) -> bool:
-    """Whether the two spheres of a question do not overlap."""
-    a, b = QUESTIONS[name].balls
-    return bool(np.hypot(*np.subtract(a.x, b.x)) > a.r + b.r)
 
 
 def moved(left: dict[str, SolverAnswer], name: str) -> bool:

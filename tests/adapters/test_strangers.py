@@ -222,12 +222,18 @@ HINTS = {
         ' --move "advance_disk(ball, dt, width, height)"'
     ),
 }
+FIVE = ("five.py", '--fields "x y u v r"')  # no mass
 PLAIN = '--fields "x y u v r m" --collide hit --move go --per-frame 60 --pixels 100 --y-down'
 
 
 @pytest.mark.parametrize(
     ("name", "hints"),
-    [*HINTS.items(), ("plain.js", PLAIN), ("plain.py", PLAIN), ("five.py", '--fields "x y u v r"')],
+    [
+        pytest.param(*each, marks=[] if k % 4 == 0 else [pytest.mark.slow], id=each[0])
+        for k, each in enumerate(
+            [*HINTS.items(), *dict.fromkeys(("plain.js", "plain.py"), PLAIN).items(), FIVE]
+        )
+    ],
 )
 def test_a_ball_code_is_ported_by_hints_alone(name: str, hints: str, tmp_path: Path):
     """Two disks that meet, and a crowd in a box, which keeps its energy."""

@@ -7,11 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck2d.adapters.host.file import SolverFailed
 from crosscheck2d.reports.check.accesses import Access, part_of
-from crosscheck2d.reports.check.failing import FAR, doubtful
 from crosscheck2d.reports.check.page import write_page
-from crosscheck2d.reports.check.questions import QUESTIONS, SolverAnswer
 from crosscheck2d.reports.check.verdict import FileCheck, check_file
 from tests.reports.check.marked import marks_of
 from tests.solvers.mutants import CORRECT
@@ -201,25 +198,6 @@ def test_a_displacement_that_the_failure_may_have_cut_off_is_not_judged(
     assert [row.cause for row in one.of("2b")] == [
         "the call fails before it has moved both spheres"
     ]
-
-
-def test_a_call_that_was_stopped_before_it_did_anything_is_asked_again():
-    """On a busy machine. Not where it had moved a sphere, or came back; nor an overlapping pair
-    that only tells whether it is taken to collide."""
-    stopped = SolverFailed("timeout", "does not come back")
-    names = ("separate", "collision/shallow", "collision/upwards", OVERLAPPING, FAR, "same centre")
-    still = {name: list(QUESTIONS[name].balls) for name in names}
-    a, b = still["collision/upwards"]
-    moved = [[a._replace(x=(9.0, 9.0)), b]]
-    left = {name: SolverAnswer([balls], failed=stopped) for name, balls in still.items()}
-    left["collision/upwards"] = SolverAnswer(moved, failed=stopped)
-    left["separate"] = SolverAnswer([still["separate"]])
-
-    assert doubtful(left) == ["collision/shallow", FAR]
-    assert doubtful(left | {FAR: SolverAnswer([], failed=stopped)}) == ["collision/shallow", FAR]
-
-
-OVERLAPPING = "reach/0"
 
 
 @pytest.mark.slow
