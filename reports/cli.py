@@ -169,11 +169,11 @@ def run(
     ] = False,
 ) -> None:
     """Play scenes through engines, and write the report."""
-    from crosscheck2d.reports.commands.run import RunRequest, means_of, run_plan
+    from crosscheck2d.reports.commands.run import means_of, run_plan
 
     means = means_of(workers, timeout, memory, scheduler)
-    what = scenes or [], engine or [], dt or [], full, seed
-    run_plan(RunRequest(*what, timings, out, fresh, trajectories, bits), means, as_typed())
+    what = scenes or [], engine or [], dt or [], full, seed, timings, out
+    run_plan(*what, fresh, trajectories, bits, means, as_typed())
 
 
 @app.command()
