@@ -123,7 +123,9 @@ class Suite:
     def show_waiting(self, scenes: SceneTasks) -> None:
         """When every cell has ended: show for which exact answers the run still waits."""
         if len(scenes.records) == sum(map(len, scenes.cells.values())) and scenes.awaited:
-            self.progress.say(waiting_for(scenes.awaited))
+            first, *rest = scenes.awaited
+            more = f" and {len(rest)} more" if rest else ""
+            self.progress.say(f"the exact answer to {Path(first).stem}{more}")
 
     def keep(self, task: RunTask, result: Any) -> None:
         """Write the row of a task that is not a cell, and show its status."""
@@ -188,27 +190,15 @@ class Suite:
         return value | {"cell": task.key, "digest": row.digest}
 
 
-def waiting_for(scenes: Sequence[str]) -> str:
-    """The sentence part that names the scenes whose exact answer is being computed."""
-    more = f" and {len(scenes) - 1} more" if len(scenes) > 1 else ""
-    return f"the exact answer to {Path(scenes[0]).stem}{more}"
-
-
 def failed_cell(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
     """The result of a cell whose worker died or was stopped, with the states up to that time."""
     trajectory = from_trail(failure.trail, scenario)
-    samples = len(trajectory) if trajectory else 0
-    last = ""
+    samples, reason = len(trajectory) if trajectory else 0, failure.reason
     if samples:
         step, t = (samples - 1) * cell.substeps, scenario.times[samples - 1]
-        last = f"; last good state: step {step}, {t:g} s"
-    run = Run(
-        *cell.names,
-        scenario.name,
-        scenario.dt(cell.substeps),
-        failure.status,
-        failure.reason + last,
-    )
+        reason += f"; last good state: step {step}, {t:g} s"
+    dt = scenario.dt(cell.substeps)
+    run = Run(*cell.names, scenario.name, dt, failure.status, reason)
     file = packed(trajectory) if trajectory else b""
     return CellResult(run, samples, file, source_and_versions())
 
