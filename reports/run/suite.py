@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import partial
 from math import isnan, nan
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from crosscheck2d.reports.run.playing import CellResult, source_and_versions
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.results import RunResults, sources_of
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.run.timing_pass import CellToTime, Pass, cells_to_time
+from crosscheck2d.reports.run.timing_pass import CellToTime, cells_to_time, time_cells
 from crosscheck2d.reports.run.trajectories import from_trail, packed
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.model import Scenario
@@ -215,13 +216,13 @@ def take_timings(
     machine, and not `again`."""
     plan = store.get("run", "plan")
     assert plan is not None
-    machine = about("", 0)["machine"]
-    key = content_key(*sorted(cell.key for cell in cells), repr(machine), plan.value["seed"])
+    machine, seed = about("", 0)["machine"], plan.value["seed"]
+    key = content_key(*sorted(cell.key for cell in cells), repr(machine), seed)
     store.put("run", "plan", plan.value | {"timing": key, "timings": seconds})
     if not cells or not seconds or (store.get("timing", key) and not again):
         return
     progress.start(1, 1, f"timing, at most {seconds:g} s")
-    work: dict[Any, Callable[[], Any]] = {"timing": Pass(cells, seconds, plan.value["seed"])}
+    work: dict[Any, Callable[[], Any]] = {"timing": partial(time_cells, cells, seconds, seed)}
     with closing(run_all(work, 1, seconds + means.timeout, means.memory)) as results:
         for _, result in results:
             if isinstance(result, Failure):

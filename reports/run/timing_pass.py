@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from math import ceil, log2
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -21,9 +22,9 @@ from crosscheck2d.reports.run.stepping import (
     CALL,
     EMPTY,
     READ,
-    Stepping,
     binding_of,
     overheads,
+    step_through,
 )
 from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
 from crosscheck2d.scenarios.model import Scenario
@@ -123,47 +124,39 @@ def timed_scenes(played: Sequence[str]) -> list[str]:
     return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
 
 
-@dataclass(frozen=True)
-class Pass:
-    """The task of the worker: it times `cells`, and the overhead of their engines, within
-    `seconds`."""
+def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[dict[str, Any]]:
+    """In a worker: time these cells, and the overhead of their engines, within `seconds`. A
+    line for each thing timed; none if not even the warm-up fits into the time.
 
-    cells: Sequence[CellToTime]
-    seconds: float
-    seed: int
-
-    def __call__(self) -> list[dict[str, Any]]:
-        """A line for each thing timed; none if not even the warm-up fits into the time.
-
-        Cells at the middle step size of a scene are timed twice, which gives the noise floor. A
-        slow cell is not timed again: its time as played is an upper bound, because collisions were
-        recorded.
-        """
-        allow(self.seconds + STARTING)
-        started = perf_counter()
-        what, slow = [], []
-        for cell in self.cells:
-            part = cell.part
-            if cell.is_slow:
-                cost, until = [cell.seconds / cell.scenario.duration], cell.scenario.duration
-                slow.append(line_of(("timing", cell.key, 0, until), cost, [0.0]))
-                continue
-            run = Stepping(cell.row.make, part, cell.substeps)
-            for copy in range(1 + (cell.substeps == cell.scenario.middle_substeps)):
-                key = ("timing", cell.key, copy, part.duration)
-                what.append(Timed(key, run, part.duration))
-        what += overheads_of(self.cells)
-        left = self.seconds - (perf_counter() - started)  # importing the engines counts, too
-        rounds: dict[Any, list[Sample]] = {}
-        for sample in interleaved(what, ROUNDS, SHARE, self.seed, left):
-            rounds.setdefault(sample.key, []).append(sample)
-        lines = []
-        for key, samples in rounds.items():
-            # without the warm-up; with it if there are no others
-            counted = [sample for sample in samples if sample.round != WARM_UP] or samples
-            costs = [sample.cost for sample in counted]
-            lines.append(line_of(key, costs, [sample.wrapping for sample in counted]))
-        return [*lines, *slow] if lines else []
+    Cells at the middle step size of a scene are timed twice, which gives the noise floor. A
+    slow cell is not timed again: its time as played is an upper bound, because collisions were
+    recorded.
+    """
+    allow(seconds + STARTING)
+    started = perf_counter()
+    what, slow = [], []
+    for cell in cells:
+        part = cell.part
+        if cell.is_slow:
+            cost, until = [cell.seconds / cell.scenario.duration], cell.scenario.duration
+            slow.append(line_of(("timing", cell.key, 0, until), cost, [0.0]))
+            continue
+        run = partial(step_through, cell.row.make, part, cell.substeps)
+        for copy in range(1 + (cell.substeps == cell.scenario.middle_substeps)):
+            key = ("timing", cell.key, copy, part.duration)
+            what.append(Timed(key, run, part.duration))
+    what += overheads_of(cells)
+    left = seconds - (perf_counter() - started)  # importing the engines counts, too
+    rounds: dict[Any, list[Sample]] = {}
+    for sample in interleaved(what, ROUNDS, SHARE, seed, left):
+        rounds.setdefault(sample.key, []).append(sample)
+    lines = []
+    for key, samples in rounds.items():
+        # without the warm-up; with it if there are no others
+        counted = [sample for sample in samples if sample.round != WARM_UP] or samples
+        costs = [sample.cost for sample in counted]
+        lines.append(line_of(key, costs, [sample.wrapping for sample in counted]))
+    return [*lines, *slow] if lines else []
 
 
 def line_of(key: tuple[Any, ...], cost: list[float], wrapping: list[float]) -> dict[str, Any]:
