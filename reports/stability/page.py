@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from crosscheck2d.reports.page.documents import environment
 from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
 from crosscheck2d.reports.page.kit import (
     Chart,
@@ -197,8 +196,10 @@ def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
         causes.append(cause.format(", ".join(names), text, beside))
     asks = Text([Markup("<b>{}</b>").format(case.question), *facts(case)])
     folds = [replay_of(case, limit) for limit in limits if limit.failing and limit.replay]
-    replays = [Text([Markup("<b>The first runs that failed</b>"), *folds])] if folds else []
-    return [asks, limit_table(limits), Text(items=causes), *replays, readings(case, limits)]
+    parts: list[Part] = [asks, limit_table(limits), Text(items=causes)]
+    if folds:
+        parts += [Text([Markup("<b>The first runs that failed</b>")]), *folds]
+    return [*parts, readings(case, limits)]
 
 
 def facts(case: Case) -> list[str]:
@@ -247,8 +248,8 @@ def limit_table(limits: Sequence[Limit]) -> Table:
     return Table(frame, css="plain text stack", corner="engine", caption=caption)
 
 
-def replay_of(case: Case, limit: Limit) -> Markup:
-    """The first failing run at the limit, which is drawn when it is opened."""
+def replay_of(case: Case, limit: Limit) -> Section:
+    """The first failing run at the limit, folded."""
     assert limit.failing is not None
     label = f"{case.parameter} = {number(limit.failing.value)}: {limit.failing.event}"
     beside = EXACT if case.shown_with == EXACT else f"the same gas {case.shown_with}"
@@ -257,9 +258,7 @@ def replay_of(case: Case, limit: Limit) -> Markup:
         f" {beside}, where there is one."
     )
     replay = Playback(limit.replay, limit.ratio, label, caption)
-    html = environment().get_template("page/kit_parts.html.j2").module.parts([replay])  # type: ignore[attr-defined]
-    summary = Markup("<details><summary>{}: {}</summary>{}</details>")
-    return summary.format(limit.engine, label, html)
+    return Section(limit.engine, label, [replay], folded=True)
 
 
 def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
