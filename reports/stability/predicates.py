@@ -25,6 +25,7 @@ from crosscheck2d.reports.compare.verdicts import (
 from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 REFUSED = "refused"
+MOST_SPEED = 10.0  # radii/s
 
 
 class Predicate(NamedTuple):
@@ -203,17 +204,6 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
     return heights
 
 
-COLLISIONS_MISSED = Predicate("collisions missed", "collisions", 0.0, collisions_missed)
-COLLISIONS_SPURIOUS = Predicate("spurious collisions", "of the speed", 1e-3, collisions_spurious)
-RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, restitution_off)
-WRONG_DISTANCE = Predicate("wrong distance", "of the way", 0.01, wrong_distance)
-VELOCITY_OFF = Predicate("velocity off", "of the speed", 1e-3, velocity_off)
-SCALED_DEVIATION = Predicate("deviation", "radii", 0.25, scaled_deviation)
-ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, angle_off)
-BOUNCES_OFF = Predicate("bounce off", "of the height", MOST_BOUNCE, bounce_off)
-SPRING_GROWS = Predicate("spring grows", "doublings of energy", 1.0, spring_grows)
-
-
 def friction_off(scenario: Scenario, played: Trajectory) -> Verdict:
     """The impulse of friction is not that of Coulomb's law."""
     true, scene = truth_of(scenario), scenario.scene
@@ -266,15 +256,6 @@ def creeps(scenario: Scenario, played: Trajectory) -> Verdict:
     moved = np.hypot(*(x - x[first]).T) / radius + np.abs(turned - turned[first])
     moved[:first] = 0.0
     return largest(played.t, moved, CREEPS.bound, f"it has moved by {moved.max():.3g} radii")
-
-
-FRICTION_OFF = Predicate("friction off", "of the impulse", 0.1, friction_off)
-ROLLING_OFF = Predicate("rolling off", "of the start speed", 0.01, rolling_off)
-SLIPS = Predicate("slips", "of the speed", 0.05, slips)
-CREEPS = Predicate("creeps", "radii", 0.01, creeps)
-
-
-MOST_SPEED = 10.0  # radii/s
 
 
 def fastest(played: Trajectory, scene: Scene) -> Array:
@@ -336,6 +317,19 @@ def not_at_rest(scenario: Scenario, played: Trajectory) -> Verdict:
     return read(speed.max(), played.t[-len(late)], event, None)
 
 
+COLLISIONS_MISSED = Predicate("collisions missed", "collisions", 0.0, collisions_missed)
+COLLISIONS_SPURIOUS = Predicate("spurious collisions", "of the speed", 1e-3, collisions_spurious)
+RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, restitution_off)
+WRONG_DISTANCE = Predicate("wrong distance", "of the way", 0.01, wrong_distance)
+VELOCITY_OFF = Predicate("velocity off", "of the speed", 1e-3, velocity_off)
+SCALED_DEVIATION = Predicate("deviation", "radii", 0.25, scaled_deviation)
+ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, angle_off)
+BOUNCES_OFF = Predicate("bounce off", "of the height", MOST_BOUNCE, bounce_off)
+SPRING_GROWS = Predicate("spring grows", "doublings of energy", 1.0, spring_grows)
+FRICTION_OFF = Predicate("friction off", "of the impulse", 0.1, friction_off)
+ROLLING_OFF = Predicate("rolling off", "of the start speed", 0.01, rolling_off)
+SLIPS = Predicate("slips", "of the speed", 0.05, slips)
+CREEPS = Predicate("creeps", "radii", 0.01, creeps)
 STANDS = Predicate("does not stand", "of the bound", 1.0, stands)
 EJECTED = Predicate("ejected", "radii/s", 0.1, ejected)
 STILL_OVERLAP = Predicate("still overlap", "radii", 0.02, still_overlaps)
