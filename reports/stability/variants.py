@@ -30,14 +30,15 @@ def make_variant(name: str, variant: str) -> Any:
     right after `load`."""
     settings, _, loaded = ENGINES[name].variants[variant]
     engine: Any = changed(name, **settings)
-    load = engine.load
+    if loaded is None:
+        return engine
+    load, change = engine.load, loaded
 
     def load_and_change(scene: Scene, dt: float) -> None:
         load(scene, dt)
-        loaded(engine)
+        change(engine)
 
-    if loaded:
-        engine.load = load_and_change
+    engine.load = load_and_change
     return engine
 
 
