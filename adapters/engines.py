@@ -4,6 +4,7 @@ row."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +21,7 @@ from crosscheck2d.adapters.engine_row import (
     Mark,
     Variant,
 )
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion, parsed
 from crosscheck2d.adapters.library_versions import BOX2D
 from crosscheck2d.adapters.matched import Searched
 from crosscheck2d.scenarios.model import Scene
@@ -47,6 +49,10 @@ def _javascript_searched(name: str) -> Searched:
     from crosscheck2d.adapters.host.searched import SEARCHED
 
     return SEARCHED[name]
+
+
+def _at_version(library: LibraryAtVersion, *arguments: Any, **settings: Any) -> Engine:
+    return _made("crosscheck2d.adapters.host.apart.EngineApart", library, *arguments, **settings)
 
 
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
@@ -298,18 +304,38 @@ _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were whe
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: from `ENGINES`, from `FETCHED`, or for a solver's file `PATH:own`,
-    which is read once.
+    """The row of an engine: from `ENGINES`, from `FETCHED`, of one of them at another version, or
+    for a solver's file `PATH:own`, which is read once.
 
     Raises:
-        KeyError: it is neither.
+        KeyError: it is none of them.
         NotASolver: the file cannot be one.
     """
-    if name in FETCHED:
-        return FETCHED[name]
-    if name in ENGINES or not name.endswith(OWN):
-        return ENGINES[name]
-    return _read.get(name) or read_row(name)
+    row = known_row(name)
+    if row is None and name.endswith(OWN):
+        return _read.get(name) or read_row(name)
+    return row or ENGINES[name]
+
+
+def known_row(name: str) -> EngineRow | None:
+    """The row of a name of the tables, or of NAME@VERSION:PROFILE; None for any other name."""
+    usual, library = parsed(name)
+    row = ENGINES.get(usual) or FETCHED.get(usual)
+    if row is None or library is None:
+        return row
+    assert isinstance(row.make, partial)
+    return replace(
+        row,
+        make=partial(row.make, library=library)
+        if row.package
+        else partial(_at_version, library, *row.make.args),
+        summary=f"{library.package} {library.version}, {usual.partition(':')[2]}",
+        mark=None,
+        distributions=(),
+        package="",
+        source=library.recorded,
+        bits_of="",
+    )
 
 
 def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:
