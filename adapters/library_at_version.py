@@ -123,7 +123,9 @@ class LibraryAtVersion(NamedTuple):
 
     def unpack_npm(self, files: Path) -> None:
         """The package alone: what an old one names as needed may be at an address that is gone."""
-        done = npm_run(["pack", f"{self.package}@{self.version}"], files.parent, FETCHING)
+        # a cache of its own: without a network npm says of an old one that there is no such version
+        command = ["pack", "--cache=cache", f"{self.package}@{self.version}"]
+        done = npm_run(command, files.parent, FETCHING)
         if done.returncode:
             raise self.not_fetched(reason_in(done.stderr))
         (archive,) = files.parent.glob("*.tgz")

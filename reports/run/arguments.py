@@ -99,7 +99,7 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
         faults += [f"--engine {name}: {fault}" for fault in found]
         for row in matching:
             at = row if library is None else row.replace(":", f"@{library.version}:")
-            chosen.setdefault(row, []).append(at)
+            chosen.setdefault(row, []).insert(0 if at == row else len(known), at)
     if not asked:
         chosen = {row: [row] for row in unasked}
     if faults:
