@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from crosscheck2d.adapters import system
@@ -23,8 +24,8 @@ from crosscheck2d.scenarios.model import Array, Scene, State
 Call = tuple[Any, ...]
 """A method of the engine and its arguments; of "make" the class of the adapter and its own."""
 
-# (this process, library) -> a process that waits for the next engine; it ends with this one
-waiting: dict[tuple[int, LibraryAtVersion], subprocess.Popen[bytes]] = {}
+# (this process, folder) -> a process that waits for the next engine; it ends with this one
+waiting: dict[tuple[int, Path], subprocess.Popen[bytes]] = {}
 
 
 class EngineApart:
@@ -54,15 +55,15 @@ class EngineApart:
 
     def start(self) -> None:
         """A process with the library, or one that waits."""
-        self.process = waiting.pop((os.getpid(), self.library), None)
-        if self.process is not None and self.process.poll() is None:
-            return
         try:
-            folder = str(self.library.checked())
+            folder = self.library.checked()
         except NotInstalled as reason:
             raise NotLoaded(f"{self.library.package} {self.library.version}: {reason}") from None
+        self.process = waiting.pop((os.getpid(), folder), None)
+        if self.process is not None and self.process.poll() is None:
+            return
         self.process = subprocess.Popen(
-            python(f"from {__name__} import serve; serve({folder!r})"),
+            python(f"from {__name__} import serve; serve({str(folder)!r})"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -124,9 +125,10 @@ class EngineApart:
     def close(self) -> None:
         """Let the process wait for its next use."""
         if self.process is not None:
-            if before := waiting.pop((os.getpid(), self.library), None):
+            key = os.getpid(), self.library.folder
+            if before := waiting.pop(key, None):
                 end(before)
-            waiting[os.getpid(), self.library] = self.process
+            waiting[key] = self.process
             self.process = None
 
 

@@ -19,6 +19,7 @@ from crosscheck2d.adapters.conformance.probe import plain
 from crosscheck2d.adapters.engine import NO_SUCH, Unsupported
 from crosscheck2d.adapters.engines import ENGINES, known_row, row_of
 from crosscheck2d.adapters.host import apart
+from crosscheck2d.adapters.host.process import end
 from crosscheck2d.adapters.library_at_version import (
     PACKAGES,
     RECORD,
@@ -70,8 +71,10 @@ def need(name: str) -> str:
 def empty(tmp_path, monkeypatch):
     """A cache with nothing in it."""
     monkeypatch.setenv("CROSSCHECK_CACHE", str(tmp_path))
+    yield tmp_path
+    for process in apart.waiting.values():
+        end(process)
     apart.waiting.clear()
-    return tmp_path
 
 
 @pytest.fixture
