@@ -21,7 +21,7 @@ from crosscheck2d.adapters.engine_row import (
     Mark,
     Variant,
 )
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion, parsed
+from crosscheck2d.adapters.library_at_version import FORM, LibraryAtVersion
 from crosscheck2d.adapters.library_versions import BOX2D
 from crosscheck2d.adapters.matched import Searched
 from crosscheck2d.scenarios.model import Scene
@@ -74,6 +74,7 @@ _Pymunk = partial(
     EngineRow,
     outside=True,
     distributions=("pymunk",),
+    wheel="pymunk",
     mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
     searched=partial(_searched, "crosscheck2d.adapters.pymunk"),
     work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
@@ -82,6 +83,7 @@ _Box2D = partial(
     EngineRow,
     outside=True,
     distributions=(BOX2D,),
+    wheel="box2d",
     mark=Mark("#00876c", "#5be0b5", "square"),
     searched=partial(_searched, "crosscheck2d.adapters.box2d"),
     work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
@@ -90,6 +92,7 @@ _Box2DV3 = partial(
     EngineRow,
     outside=True,
     distributions=("pyb2d3",),
+    wheel="pyb2d3",
     mark=Mark("#b84fb0", "#c46bd8", "diamond"),
     searched=partial(_searched, "crosscheck2d.adapters.box2d_v3"),
     work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
@@ -317,6 +320,27 @@ def row_of(name: str) -> EngineRow:
     return row or ENGINES[name]
 
 
+def packages() -> dict[str, tuple[str, bool]]:
+    """Engine -> the package that other versions of it come in, and whether it is npm's."""
+    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED).items())
+    return {
+        name: (row.package or row.wheel, bool(row.package))
+        for name, row in rows
+        if row.package or row.wheel
+    }
+
+
+def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
+    """A name of an engine or a row without its version, and its library at that version; None for
+    a name without one, or of another form."""
+    engine, _, rest = name.partition("@")
+    version, colon, profile = rest.partition(":")
+    if not FORM.fullmatch(version) or engine not in (known := packages()):
+        return name, None
+    package, npm = known[engine]
+    return f"{engine}{colon}{profile}", LibraryAtVersion(package, version, npm)
+
+
 def known_row(name: str) -> EngineRow | None:
     """The row of a name of the tables, or of NAME@VERSION:PROFILE; None for any other name."""
     usual, library = parsed(name)
@@ -333,6 +357,7 @@ def known_row(name: str) -> EngineRow | None:
         mark=None,
         distributions=(),
         package="",
+        wheel="",
         source=library.recorded,
         bits_of="",
     )

@@ -10,33 +10,30 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
-from collections.abc import Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, npm_run, pinned, reason_in
+from crosscheck2d.adapters.npm_packages import (
+    FETCHING,
+    NotInstalled,
+    npm_run,
+    pinned,
+    placing,
+    reason_in,
+)
 
-WHEELS = {"pymunk": "pymunk", "box2d": "box2d", "box2d_v3": "pyb2d3"}
-NPM = {"planck": "planck", "matter": "matter-js", "rapier2d": "@dimforge/rapier2d-compat"}
-PACKAGES: Mapping[str, str] = WHEELS | NPM  # engine -> its package, of which there are versions
 FORM = re.compile(r"\d[\w.+-]*", re.ASCII)  # no option, no path, no tag that moves
-FETCHING = 300  # s
 RECORD = "sha256"  # the file with the hash of all others
 
 
 class LibraryAtVersion(NamedTuple):
-    """A version of the library of an engine."""
+    """A version of a package of npm, or of one that has wheels."""
 
-    engine: str
+    package: str
     version: str
-
-    @property
-    def package(self) -> str:
-        """Its package, in the index or the registry."""
-        return PACKAGES[self.engine]
+    npm: bool
 
     @property
     def folder(self) -> Path:
@@ -48,14 +45,14 @@ class LibraryAtVersion(NamedTuple):
         kept = folder()
         if kept is None:
             raise NotInstalled("not installed: no folder for it; set CROSSCHECK_CACHE to one")
-        place = "npm" if self.engine in NPM else str(sys.implementation.cache_tag)
+        place = "npm" if self.npm else str(sys.implementation.cache_tag)
         return kept / "versions" / place / f"{self.package.replace('/', '-')}-{self.version}"
 
     @property
     def recorded(self) -> str:
         """The hash that was recorded when it was fetched; "" if it was not."""
         try:
-            return (self.folder / RECORD).read_text()
+            return (self.folder / RECORD).read_text("utf-8")
         except (OSError, NotInstalled):
             return ""
 
@@ -68,9 +65,7 @@ class LibraryAtVersion(NamedTuple):
         """Its folder; raises `NotInstalled` if it is not there, or has changed since."""
         folder, recorded = self.folder, self.recorded
         if not recorded:
-            raise NotInstalled(
-                f"not installed: crosscheck run --engine {self.engine}@{self.version} fetches it"
-            )
+            raise NotInstalled("not installed: crosscheck run --engine NAME@VERSION fetches it")
         if digest_of(folder) != recorded:
             raise NotInstalled(f"{folder} has changed since it was fetched; delete this folder")
         return folder
@@ -86,19 +81,9 @@ class LibraryAtVersion(NamedTuple):
 
     def fetch(self) -> None:
         """Fetch it, whole or not at all; raises `NotInstalled` with a sentence."""
-        folder = self.folder
-        try:
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=folder.parent) as made:
-                files = Path(made) / "files"
-                (self.unpack_npm if self.engine in NPM else self.install_wheel)(files)
-                (files / RECORD).write_text(digest_of(files))
-                if not folder.exists():  # another process may have been faster
-                    os.replace(files, folder)
-        except subprocess.TimeoutExpired as fault:
-            raise self.not_fetched(f"it took more than {fault.timeout:g} s") from None
-        except OSError as fault:
-            raise self.not_fetched(str(fault)) from None
+        with placing(self.folder, self.not_fetched) as files:
+            (self.unpack_npm if self.npm else self.install_wheel)(files)
+            (files / RECORD).write_text(digest_of(files), "utf-8")
 
     def install_wheel(self, files: Path) -> None:
         """The wheel alone: what it needs is that of this environment."""
@@ -115,7 +100,8 @@ class LibraryAtVersion(NamedTuple):
             cwd=files.parent,  # where no project's settings apply
             env=os.environ | {"UV_HTTP_RETRIES": "1"},
             capture_output=True,
-            text=True,
+            encoding="utf-8",
+            errors="replace",
             timeout=FETCHING,
         )
         if done.returncode:
@@ -125,42 +111,32 @@ class LibraryAtVersion(NamedTuple):
         """The package alone: what an old one names as needed may be at an address that is gone."""
         # a cache of its own: without a network npm says of an old one that there is no such version
         command = ["pack", "--cache=cache", f"{self.package}@{self.version}"]
-        done = npm_run(command, files.parent, FETCHING)
+        done = npm_run(command, files.parent)
         if done.returncode:
             raise self.not_fetched(reason_in(done.stderr))
         (archive,) = files.parent.glob("*.tgz")
         shutil.unpack_archive(archive, files.parent / "archive", "gztar", filter="data")
         (package,) = (files.parent / "archive").iterdir()
+        files.rmdir()
         os.replace(package, files)
 
     def not_fetched(self, reason: str) -> NotInstalled:
         """The failure, with the reason that the tool gives."""
-        if reason == ABSENT:
-            return NotInstalled(reason)
         return NotInstalled(
             f"{self.package} {self.version} could not be fetched from the"
-            f" {'npm registry' if self.engine in NPM else 'package index'} ({reason})"
+            f" {'npm registry' if self.npm else 'package index'} ({reason})"
         )
-
-
-def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
-    """A name of an engine or a row without its version, and the library at that version; None for
-    a name without one, or of another form."""
-    engine, at, rest = name.partition("@")
-    version, colon, profile = rest.partition(":")
-    if not at or engine not in PACKAGES or not FORM.fullmatch(version):
-        return name, None
-    return f"{engine}{colon}{profile}", LibraryAtVersion(engine, version)
 
 
 @cache
 def digest_of(folder: Path) -> str:
-    """16 hex digits of a hash over all files of a folder, without what Python has compiled; read
-    once in a process."""
-    files = (path for path in folder.rglob("*") if path.is_file())
+    """16 hex digits of a hash over all files of a package, without what Python has compiled and
+    what the tool says of itself; read once in a process."""
     of_all = hashlib.sha256()
-    for path in sorted(files):
-        if path.name != RECORD and "__pycache__" not in path.parts:
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        place = path.relative_to(folder)
+        own = place.parts[0] in (RECORD, ".lock") or place.parts[0].endswith(".dist-info")
+        if not own and "__pycache__" not in place.parts:
             of_one = hashlib.sha256(path.read_bytes()).hexdigest()
-            of_all.update(f"{path.relative_to(folder).as_posix()} {of_one}\n".encode())
+            of_all.update(f"{place.as_posix()} {of_one}\n".encode())
     return of_all.hexdigest()[:16]

@@ -16,8 +16,8 @@ import shutil
 import subprocess
 import tempfile
 from base64 import b64encode
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -132,26 +132,33 @@ def fetch() -> None:
     They are fetched into a temporary folder and then moved, so that two processes can fetch at
     once.
     """
-    there = place()
+    with placing(place(), lambda reason: NotInstalled(not_fetched(reason))) as beside:
+        for file in (PINNED, LOCKED):
+            shutil.copy(file, beside)
+        done = npm_run(["ci"], beside)
+        if done.returncode:
+            raise NotInstalled(not_fetched(done.stderr))
+        for package in pinned()["played"]:
+            must_be_pinned(package, beside)
+
+
+@contextmanager
+def placing(there: Path, failed: Callable[[str], NotInstalled]) -> Iterator[Path]:
+    """Context with a new folder, which at the end is moved to `there`, in place of an old one;
+    raises what `failed` makes of the reason if a program takes too long, or the disk refuses."""
     try:
         there.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=there.parent) as made:
             beside = Path(made) / "packages"
             beside.mkdir()
-            for file in (PINNED, LOCKED):
-                shutil.copy(file, beside)
-            done = npm_run(["ci"], beside, FETCHING)
-            if done.returncode:
-                raise NotInstalled(not_fetched(done.stderr))
-            for package in pinned()["played"]:
-                must_be_pinned(package, beside)
-            if there.exists():  # the old one is not pinned, or another was faster
+            yield beside
+            if there.exists():  # the old one is not what is wanted, or another was faster
                 os.replace(there, Path(made) / "before")
             os.replace(beside, there)
-    except subprocess.TimeoutExpired:
-        raise NotInstalled(not_fetched(f"npm took more than {FETCHING} s")) from None
+    except subprocess.TimeoutExpired as fault:
+        raise failed(f"it took more than {fault.timeout:g} s") from None
     except OSError as fault:
-        raise NotInstalled(not_fetched(str(fault))) from None
+        raise failed(str(fault)) from None
 
 
 def must_be_pinned(package: str, at: Path) -> None:
@@ -168,9 +175,7 @@ def must_be_pinned(package: str, at: Path) -> None:
         ) from None
 
 
-def npm_run(
-    command: Sequence[str], folder: Path, seconds: float
-) -> subprocess.CompletedProcess[str]:
+def npm_run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """npm's end and output in a folder; raises `NotInstalled` without the extra, and
     `TimeoutExpired`."""
     try:
@@ -183,7 +188,7 @@ def npm_run(
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=seconds,
+        timeout=FETCHING,
     )
     return done  # type: ignore[no-any-return]
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED
-from crosscheck2d.adapters.library_at_version import PACKAGES
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, packages
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.reports.compare.metrics import METRICS, SCALES, Metric
 from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
@@ -17,7 +16,7 @@ from crosscheck2d.reports.terminal.tables import print_texts
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.truth.exact import answered_by
 
-VERSIONS = f"Any version of {', '.join(PACKAGES)} plays as NAME@VERSION: --engine pymunk@6.8.1"
+VERSIONS = f"Any version of {', '.join(packages())} plays as NAME@VERSION: --engine pymunk@6.8.1"
 
 
 def explain(what: str) -> None:

@@ -10,9 +10,17 @@ from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
+from crosscheck2d.adapters.engines import (
+    ENGINES,
+    FETCHED,
+    OWN,
+    UNASKED,
+    packages,
+    parsed,
+    read_row,
+)
 from crosscheck2d.adapters.host.file import KINDS, NotASolver
-from crosscheck2d.adapters.library_at_version import PACKAGES, LibraryAtVersion, parsed
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion
 from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
 from crosscheck2d.reports.run.store import Store, reading, writing
@@ -196,8 +204,8 @@ def unknown_engine(name: str, known: Collection[str]) -> str:
     engine, at, _ = name.partition("@")
     if not at or (engine not in names and Path(engine).suffix.lower() not in KINDS):
         return unknown("engine", name, names)
-    if engine not in PACKAGES:
-        of = ", ".join(PACKAGES)
+    if engine not in packages():
+        of = ", ".join(packages())
         return f"--engine {name}: {engine} is in no package that has versions, as those of {of} are"
     return (
         f"--engine {name}: write {engine}@VERSION[:PROFILE], a version such as 1.0.0 and one of the"

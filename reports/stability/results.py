@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
-from crosscheck2d.adapters.library_at_version import parsed
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.reports.run.cells import content_key, source_hash
 from crosscheck2d.reports.run.machine import about

@@ -17,16 +17,10 @@ import pytest
 from crosscheck2d.adapters import library_at_version as versions
 from crosscheck2d.adapters.conformance.probe import plain
 from crosscheck2d.adapters.engine import NO_SUCH, Unsupported
-from crosscheck2d.adapters.engines import ENGINES, known_row, row_of
+from crosscheck2d.adapters.engines import ENGINES, known_row, packages, parsed, row_of
 from crosscheck2d.adapters.host import apart
 from crosscheck2d.adapters.host.process import end
-from crosscheck2d.adapters.library_at_version import (
-    PACKAGES,
-    RECORD,
-    LibraryAtVersion,
-    digest_of,
-    parsed,
-)
+from crosscheck2d.adapters.library_at_version import RECORD, LibraryAtVersion, digest_of
 from crosscheck2d.adapters.npm_packages import NotInstalled, reason_in
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
@@ -47,9 +41,8 @@ PINNED = {
 
 
 @cache
-def lacking(engine: str, version: str) -> str:
+def lacking(library: LibraryAtVersion) -> str:
     """Why this version cannot be had; "" if it can."""
-    library = LibraryAtVersion(engine, version)
     try:
         if not library.recorded:
             library.fetch()
@@ -62,7 +55,7 @@ def lacking(engine: str, version: str) -> str:
 def need(name: str) -> str:
     """The name, if this version can be had."""
     _, library = parsed(name)
-    if reason := lacking(*library):
+    if reason := lacking(library):
         pytest.skip(reason)
     return name
 
@@ -81,10 +74,10 @@ def empty(tmp_path, monkeypatch):
 def version_0(empty):
     """A version 0 of each library that is a folder without files, so that the process imports the
     one that is installed."""
-    for engine in PACKAGES:
-        folder = LibraryAtVersion(engine, "0").folder
+    for package, npm in packages().values():
+        folder = LibraryAtVersion(package, "0", npm).folder
         folder.mkdir(parents=True)
-        (folder / RECORD).write_text(digest_of(folder))
+        (folder / RECORD).write_text(digest_of(folder), "utf-8")
     return empty
 
 
@@ -196,7 +189,7 @@ def test_without_uv_and_pip_a_sentence_names_both(monkeypatch):
     monkeypatch.setattr(versions.shutil, "which", lambda _name: None)
     monkeypatch.setattr(versions, "find_spec", lambda _name: None)
     with pytest.raises(NotInstalled, match="neither uv nor pip is installed"):
-        LibraryAtVersion("pymunk", "6.8.1").fetch()
+        LibraryAtVersion("pymunk", "6.8.1", False).fetch()
 
 
 @pytest.mark.parametrize(
@@ -251,13 +244,13 @@ def test_a_name_without_a_version_to_fetch_is_refused_in_one_sentence(name, sent
 @pytest.mark.usefixtures("version_0")
 def test_a_file_that_has_changed_since_it_was_fetched_is_refused():
     """By a letter; what Python compiles beside it does not count."""
-    library = LibraryAtVersion("pymunk", "0")
+    library = LibraryAtVersion("pymunk", "0", False)
     folder = library.folder
     (folder / "__pycache__").mkdir()
-    (folder / "__pycache__" / "a.pyc").write_text("compiled")
+    (folder / "__pycache__" / "a.pyc").write_bytes(b"compiled")
     digest_of.cache_clear()
     assert library.checked() == folder
-    (folder / "a.py").write_text("x")
+    (folder / "a.py").write_bytes(b"x")
     digest_of.cache_clear()
     with pytest.raises(NotInstalled, match="has changed since it was fetched; delete this folder"):
         library.checked()
