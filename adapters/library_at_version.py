@@ -52,7 +52,7 @@ class LibraryAtVersion(NamedTuple):
     def recorded(self) -> str:
         """The hash that was recorded when it was fetched; "" if it was not."""
         try:
-            return (self.folder / RECORD).read_text("utf-8")
+            return (self.folder / RECORD).read_text(encoding="utf-8")
         except (OSError, NotInstalled):
             return ""
 
@@ -76,14 +76,16 @@ class LibraryAtVersion(NamedTuple):
         folder = self.checked()
         file = folder / str(pinned()["played"][self.package]["file"])
         if not file.is_file():
-            file = folder / str(json.loads((folder / "package.json").read_text("utf-8"))["main"])
-        return file.read_text("utf-8")
+            file = folder / str(
+                json.loads((folder / "package.json").read_text(encoding="utf-8"))["main"]
+            )
+        return file.read_text(encoding="utf-8")
 
     def fetch(self) -> None:
         """Fetch it, whole or not at all; raises `NotInstalled` with a sentence."""
         with placing(self.folder, self.not_fetched) as files:
             (self.unpack_npm if self.npm else self.install_wheel)(files)
-            (files / RECORD).write_text(digest_of(files), "utf-8")
+            (files / RECORD).write_text(digest_of(files), encoding="utf-8")
 
     def install_wheel(self, files: Path) -> None:
         """The wheel alone: what it needs is that of this environment."""
