@@ -107,7 +107,13 @@ def test_an_adapter_in_a_process_of_its_own_gives_the_bits_of_this_one(engine, p
         assert repr(here.settings) == repr(there.settings)
 
 
-@pytest.mark.parametrize("engine", PINNED)
+@pytest.mark.parametrize(
+    "engine",
+    [
+        *("pymunk", "box2d", "box2d_v3"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("planck", "matter", "rapier2d")),
+    ],
+)
 def test_the_pinned_version_asked_for_by_its_number_gives_the_bits_of_the_usual_one(engine):
     """Fetched by itself, and played in a process of its own."""
     name = need(f"{engine}@{PINNED[engine]}:matched")
@@ -118,6 +124,7 @@ def test_the_pinned_version_asked_for_by_its_number_gives_the_bits_of_the_usual_
         assert bits(played(name, scene)) == bits(usual)
 
 
+@pytest.mark.slow
 def test_another_version_of_rapier_gives_other_bits():
     """So that the test before says something."""
     usual = played("rapier2d:matched", "asteroids")
@@ -136,6 +143,7 @@ def test_another_version_of_pymunk_is_the_one_that_plays_and_is_recorded():
     assert len(row.source) == 16
 
 
+@pytest.mark.slow
 def test_a_run_has_both_versions_side_by_side_and_needs_no_index_with_the_cache(
     tmp_path, monkeypatch
 ):
