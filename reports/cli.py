@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from crosscheck2d.reports.terminal.exits import refuse
 
@@ -26,16 +28,27 @@ app = typer.Typer(
 DEFAULT_OUT = Path("reports/out/latest")
 VARIED = "dt, speed, mass_ratio, restitution, scale, offset"
 
+
+def place(text: str) -> Path:
+    """A path as it was given; exits 2 for an empty one, which `Path` takes for the current
+    folder."""
+    if not text:
+        refuse(['"": is not there; name a file or a folder'])
+    return Path(text)
+
+
+path_option = partial(Option, metavar="PATH", parser=place)
+AsJson = Annotated[bool, Option("--json", help="Print JSON.")]
 Scenes = Annotated[
     list[str] | None,
-    typer.Argument(
+    Argument(
         metavar="SCENARIO|FILE.toml",
         help="Scenes: names of crosscheck list, or files. Default: all scenarios.",
     ),
 ]
 Engines = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--engine",
         metavar="NAME[@VERSION][:PROFILE]|FILE",
         help="Play only this engine: a name, at a version such as pymunk@6.8.1, or a file of your"
@@ -44,41 +57,37 @@ Engines = Annotated[
 ]
 Dts = Annotated[
     list[float] | None,
-    typer.Option(
-        "--dt",
-        metavar="S",
-        help="Play this step size instead of those of the scene. Repeatable.",
+    Option(
+        "--dt", metavar="S", help="Play this step size instead of those of the scene. Repeatable."
     ),
 ]
-Full = Annotated[bool, typer.Option("--full", help="Add two finer step sizes to every scene.")]
-Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of random scenes.")]
+Full = Annotated[bool, Option("--full", help="Add two finer step sizes to every scene.")]
+Seed = Annotated[int, Option(min=0, metavar="N", help="Seed of random scenes.")]
 Out = Annotated[
     Path,
-    typer.Option(
+    Option(
         metavar="DIR",
         help="Folder for the results. What was played there before is not played again.",
     ),
 ]
 Results = Annotated[
     Path,
-    typer.Option(
+    Option(
         metavar="DIR",
         help="Folder for the results. What was measured there before is not measured again.",
     ),
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Ignore the results that --out has.")]
+Fresh = Annotated[bool, Option("--fresh", help="Ignore the results that --out has.")]
 OneScene = Annotated[
     str,
-    typer.Argument(
-        metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."
-    ),
+    Argument(metavar="SCENARIO|FILE.toml", help="A scene: a name of crosscheck list, or a file."),
 ]
 Workers = Annotated[
-    int, typer.Option(min=0, metavar="N", help="Number of processes; 0: one for each core.")
+    int, Option(min=0, metavar="N", help="Number of processes; 0: one for each core.")
 ]
 Timeout = Annotated[
     float,
-    typer.Option(
+    Option(
         min=0.1,
         max=1e6,
         metavar="S",
@@ -90,7 +99,7 @@ Timeout = Annotated[
 ]
 Memory = Annotated[
     int,
-    typer.Option(
+    Option(
         min=0,
         max=10**9,
         metavar="MB",
@@ -98,11 +107,11 @@ Memory = Annotated[
     ),
 ]
 Scheduler = Annotated[
-    str, typer.Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")
+    str, Option(metavar="tcp://...", help="Play on the workers of this dask scheduler.")
 ]
 Timings = Annotated[
     float,
-    typer.Option(
+    Option(
         min=0,
         max=3600,
         metavar="SECONDS",
@@ -112,27 +121,19 @@ Timings = Annotated[
 ]
 Port = Annotated[
     int,
-    typer.Option(
+    Option(
         min=1,
         max=65535,
         metavar="N",
         help="Port on this machine; if it is in use, the next free one.",
     ),
 ]
-Opens = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
+Opens = Annotated[bool, Option("--open", help="Open the page in a browser.")]
 
 
 def as_typed() -> str:
     """The command, as a shell would take it again."""
     return shlex.join(["crosscheck", *sys.argv[1:]])
-
-
-def place(text: str) -> Path:
-    """A path as it was given; exits 2 for an empty one, which `Path` takes for the current
-    folder."""
-    if not text:
-        refuse(['"": is not there; name a file or a folder'])
-    return Path(text)
 
 
 @app.callback(invoke_without_command=True)
@@ -157,12 +158,11 @@ def run(
     scheduler: Scheduler = "",
     fresh: Fresh = False,
     trajectories: Annotated[
-        bool,
-        typer.Option("--trajectories", help="Write the trajectory of each cell as an .npz, too."),
+        bool, Option("--trajectories", help="Write the trajectory of each cell as an .npz, too.")
     ] = False,
     bits: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--bits",
             help="Write hashes of all results at the middle step size to bits.csv, and compare them"
             " with those kept in reports/bits.csv. Exit status 1: an engine has other bits.",
@@ -170,21 +170,19 @@ def run(
     ] = False,
 ) -> None:
     """Play scenes through engines, and write the report."""
-    from crosscheck2d.reports.commands.run import RunRequest, means_of, run_plan
+    from crosscheck2d.reports.commands.run import means_of, run_plan
 
     means = means_of(workers, timeout, memory, scheduler)
-    what = scenes or [], engine or [], dt or [], full, seed
-    run_plan(RunRequest(*what, timings, out, fresh, trajectories, bits), means, as_typed())
+    what = scenes or [], engine or [], dt or [], full, seed, timings, out
+    run_plan(*what, fresh, trajectories, bits, means, as_typed())
 
 
 @app.command()
 def report(
-    out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The folder of a run, finished or not.")
-    ],
+    out: Annotated[Path, Argument(metavar="OUT", help="The folder of a run, finished or not.")],
     timings: Annotated[
         float | None,
-        typer.Option(
+        Option(
             min=0.1, max=3600, metavar="SECONDS", help="Time the engines again, in so many seconds."
         ),
     ] = None,
@@ -201,8 +199,8 @@ def report(
 
 @app.command()
 def diff(
-    before: Annotated[Path, typer.Argument(metavar="OUT_A", help="The folder of a run.")],
-    after: Annotated[Path, typer.Argument(metavar="OUT_B", help="The folder of a later one.")],
+    before: Annotated[Path, Argument(metavar="OUT_A", help="The folder of a run.")],
+    after: Annotated[Path, Argument(metavar="OUT_B", help="The folder of a later one.")],
 ) -> None:
     """Show what changed between two runs.
 
@@ -218,14 +216,13 @@ def diff(
 def truth(
     scene: OneScene,
     events: Annotated[
-        bool,
-        typer.Option("--events", help="Print all collisions, not only the first and last ten."),
+        bool, Option("--events", help="Print all collisions, not only the first and last ten.")
     ] = False,
     at: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", help="Print where each disk is then, and how it moves."),
+        Option(metavar="SECONDS", help="Print where each disk is then, and how it moves."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
     seed: Seed = 0,
     timeout: Timeout = 60.0,
 ) -> None:
@@ -244,35 +241,30 @@ def truth(
 def check(
     path: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             metavar="FILE|DIR",
             parser=place,
             help="An Exercise.js, a solver.py, or a folder of them, one for each student.",
         ),
     ],
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print every question and its answer as JSON.")
+        bool, Option("--json", help="Print every question and its answer as JSON.")
     ] = False,
     junit: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PATH", parser=place, help="Write every question as a JUnit test, too."
-        ),
+        Path | None, path_option(help="Write every question as a JUnit test, too.")
     ] = None,
     page: Annotated[
         Path | None,
-        typer.Option(
-            metavar="PATH",
-            parser=place,
+        path_option(
             help=(
                 "Where to write the page of the file, or of the class.  [default: check.html for a"
                 " file, none for a class]"
-            ),
+            )
         ),
     ] = None,
     formats: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--format",
             metavar="NAME",
             help=(
@@ -282,17 +274,11 @@ def check(
         ),
     ] = None,
     outs: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--out",
-            metavar="PATH",
-            parser=place,
-            help="Where the --format goes.  [default: printed]",
-        ),
+        list[Path] | None, path_option("--out", help="Where the --format goes.  [default: printed]")
     ] = None,
     points: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="TASKS.toml",
             parser=place,
             help="File with the points of each task or question.  [default: 20 in all]",
@@ -300,7 +286,7 @@ def check(
     ] = None,
     id_pattern: Annotated[
         str,
-        typer.Option(
+        Option(
             metavar="REGEX",
             help=(
                 "Pattern of the student's id in the path: the match, or its first group."
@@ -310,21 +296,17 @@ def check(
     ] = "",
     hints: Annotated[
         str,
-        typer.Option(
+        Option(
             metavar="full|low",
             help="Whether marks of a student name likely causes, or only wrong answers.",
         ),
     ] = "full",
     scaffold: Annotated[
-        str,
-        typer.Option(
-            metavar="gradescope",
-            help="Write an autograder to DIR, and check nothing.",
-        ),
+        str, Option(metavar="gradescope", help="Write an autograder to DIR, and check nothing.")
     ] = "",
     seed: Annotated[
         int | None,
-        typer.Option(
+        Option(
             metavar="N",
             min=0,
             help="Numbers of the questions.  [default: 0 for a file, random for a class]",
@@ -332,7 +314,7 @@ def check(
     ] = None,
     packages: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--package",
             metavar="NAME",
             help="An installed package that a solver.py may import beside numpy. Repeatable.",
@@ -340,9 +322,8 @@ def check(
     ] = None,
     unprotected: Annotated[
         bool,
-        typer.Option(
-            "--unprotected",
-            help="Check a folder with Python files even where no sandbox works.",
+        Option(
+            "--unprotected", help="Check a folder with Python files even where no sandbox works."
         ),
     ] = False,
 ) -> None:
@@ -370,7 +351,7 @@ def check(
 def play(
     flight: Annotated[
         Path | None,
-        typer.Argument(metavar="FLIGHT.toml", parser=place, help="A saved flight to fly again."),
+        Argument(metavar="FLIGHT.toml", parser=place, help="A saved flight to fly again."),
     ] = None,
     engine: Engines = None,
     port: Port = 8000,
@@ -389,18 +370,14 @@ def play(
 def lesson(
     name: Annotated[
         str,
-        typer.Argument(
-            metavar="NAME", help="A lesson, by name or number. Default: the list of them."
-        ),
+        Argument(metavar="NAME", help="A lesson, by name or number. Default: the list of them."),
     ] = "",
     port: Port = 8000,
     opens: Opens = False,
     export: Annotated[
         Path | None,
-        typer.Option(
-            metavar="PATH",
-            parser=place,
-            help="Write lesson NAME to a file, or all lessons to a folder, to open offline.",
+        path_option(
+            help="Write lesson NAME to a file, or all lessons to a folder, to open offline."
         ),
     ] = None,
 ) -> None:
@@ -427,7 +404,7 @@ def lesson(
 def speed(
     scenes: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="SCENARIO|FILE.toml",
             help=(
                 "Scenes: names of crosscheck list, or files. Default: one of each kind, or with"
@@ -438,7 +415,7 @@ def speed(
     engine: Engines = None,
     full: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--full", help="Measure all scenarios, finer steps, more rounds, up to 100 000 disks."
         ),
     ] = False,
@@ -459,11 +436,11 @@ def speed(
 def advise(
     scene: OneScene,
     error: Annotated[
-        str, typer.Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
+        str, Option(metavar="E", help="The largest error allowed: 1% or 0.01.")
     ] = "1%",
     purpose: Annotated[
         str,
-        typer.Option(
+        Option(
             "--for",
             metavar="PURPOSE",
             help="What the error is of: trajectory, energy or statistics.",
@@ -471,7 +448,7 @@ def advise(
     ] = "trajectory",
     engine: Engines = None,
     seed: Seed = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Find the cheapest engine and step size for a scene.
 
@@ -486,14 +463,14 @@ def advise(
 def stability(
     cases: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="CASE|FILE.toml",
             help="Cases: rows of limits.csv, or scene files. Default: all cases.",
         ),
     ] = None,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             metavar="WHAT",
             help=f"What to vary in FILE.toml: {VARIED}. Repeatable. Default: each of them.",
         ),
@@ -501,9 +478,7 @@ def stability(
     engine: Engines = None,
     full: Annotated[
         bool,
-        typer.Option(
-            "--full", help="Play all runs at more values, to brackets of 1 % instead of 5 %."
-        ),
+        Option("--full", help="Play all runs at more values, to brackets of 1 % instead of 5 %."),
     ] = False,
     fresh: Fresh = False,
     out: Results = Path("reports/out/stability"),
@@ -523,7 +498,7 @@ def stability(
 def tune(
     engine: Annotated[
         list[str] | None,
-        typer.Argument(
+        Argument(
             metavar="ENGINE",
             help="Engines to search. Default: all with settings to search that need no --extra.",
         ),
@@ -564,9 +539,7 @@ def new_engine(
 def new_solver(
     name: Annotated[
         Path,
-        typer.Argument(
-            metavar="NAME", parser=place, help="The file to write: Exercise.js or solver.py."
-        ),
+        Argument(metavar="NAME", parser=place, help="The file to write: Exercise.js or solver.py."),
     ],
 ) -> None:
     """Write the two functions of the exercise, to be filled in."""
@@ -579,9 +552,7 @@ def new_solver(
 def list_(
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="engines|scenarios|metrics|verdicts|cases|lessons", help="Default: all."
-        ),
+        Argument(metavar="engines|scenarios|metrics|verdicts|cases|lessons", help="Default: all."),
     ] = "",
 ) -> None:
     """List engines, scenarios, metrics, verdicts, cases and lessons, and say what each is."""

@@ -4,6 +4,7 @@ worse."""
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from math import inf
 from pathlib import Path
 from typing import NoReturn
@@ -63,28 +64,20 @@ def show_difference(before: Path, after: Path) -> NoReturn:
 def by_engine(changed: Difference) -> list[list[str]]:
     """A row for each engine: changed statuses and numbers, and the factor of its time."""
     timings = {timing.engine: timing for timing in changed.timings}
-    every = (
-        *changed.same,
-        *(change.engine for change in (*changed.statuses, *changed.numbers)),
-        *(change.beside for change in changed.numbers if change.beside),
-        *timings,
-    )
+    changes = *changed.statuses, *changed.numbers
+    engines = [*changed.same, *(change.engine for change in changes)]
+    engines += [change.beside for change in changes if change.beside]
     rows = []
-    for engine in dict.fromkeys(every):
+    for engine in dict.fromkeys((*engines, *timings)):
         statuses, numbers = (
-            [one for one in kind if engine in (one.engine, one.beside)]
+            Counter(x.verdict for x in kind if engine in (x.engine, x.beside))
             for kind in (changed.statuses, changed.numbers)
         )
-        counts = [
-            count(statuses, "worse"),
-            count(statuses, "better"),
-            str(changed.same[engine]),
-            count(numbers, ROUNDING),
-            count(numbers, "worse"),
-            count(numbers, "better"),
-            count(numbers, "other"),
-        ]
-        rows.append([engine, *counts, said_of(timings.get(engine))])
+        counts = [statuses["worse"], statuses["better"]]
+        same = str(changed.same[engine])
+        others = [numbers[verdict] for verdict in (ROUNDING, "worse", "better", "other")]
+        texts = [*(str(n or "") for n in counts), same, *(str(n or "") for n in others)]
+        rows.append([engine, *texts, said_of(timings.get(engine))])
     return rows
 
 
@@ -92,11 +85,6 @@ def in_words(change: Change) -> str:
     """A change in a line."""
     values = f"{change.before or 'nan'} → {change.after or 'nan'}"
     return f"{change.verdict}: {change.engine}, {change.what}: {values}"
-
-
-def count(changes: list[Change], verdict: str) -> str:
-    """The number of changes with this verdict, or nothing."""
-    return str(sum(one.verdict == verdict for one in changes) or "")
 
 
 def said_of(timing: Timing | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -51,16 +51,13 @@ def said_of(engines: Sequence[str]) -> dict[str, list[Said]]:
             else:
                 found[name] = with_lines(check.says, check.shown)
     found = {name: found[name] for name in engines if name in found}
-    for line in lines({name: [sentence for sentence, _ in found[name]] for name in found}):
-        say(line)
+    for name, pairs in found.items():
+        say("\n".join(lines(name, [sentence for sentence, _ in pairs])))
     return found
 
 
-def lines(found: Mapping[str, list[str]]) -> list[str]:
+def lines(name: str, sentences: Sequence[str]) -> list[str]:
     """Lines for a terminal: the file, then its sentences."""
-    said = []
-    for name, says in found.items():
-        said.append(f"{name.removesuffix(OWN)}, by crosscheck check:")
-        for k, sentence in enumerate(says, 1):
-            said.append(f"  {k}. {sentence}" if len(says) > 1 else f"  {sentence}")
-    return said
+    numbers = [f"{k}. " for k in range(1, len(sentences) + 1)] if len(sentences) > 1 else [""]
+    heading = f"{name.removesuffix(OWN)}, by crosscheck check:"
+    return [heading, *(f"  {number}{text}" for number, text in zip(numbers, sentences))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -104,18 +104,11 @@ def print_summary(report: Report, page: str) -> None:
             console.print(f"Without a model of friction: {', '.join(without)}.", highlight=False)
         if scenes:
             console.print()
-    print_list(
-        console,
-        [*report.findings, *own_solvers(report.said), *notes(report), statuses(report)],
-    )
+    checks = ["\n".join(lines(name, says)) for name, says in report.said.items()]
+    print_list(console, [*report.findings, *checks, *notes(report), statuses(report)])
     for line in filter(None, (failures(report, Path(page).parent), times(report))):
         console.print(line, highlight=False, soft_wrap=True)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
-
-
-def own_solvers(said: Mapping[str, list[str]]) -> list[str]:
-    """The check of each solver's file, a paragraph for each."""
-    return ["\n".join(lines({name: says})) for name, says in said.items()]
 
 
 def title_of(scenes: int, rough: bool = False) -> str:

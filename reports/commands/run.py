@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
@@ -30,55 +29,50 @@ from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.truth import cache
 
 
-@dataclass(frozen=True)
-class RunRequest:
-    """The arguments of the command, as typed, and the folder for the results."""
-
-    scenes: Sequence[str]
-    engines: Sequence[str]
-    dts: Sequence[float]
-    full: bool
-    seed: int
-    timings: float
-    out: Path
-    fresh: bool = False
-    trajectories: bool = False
-    bits: bool = False
-
-
-def run_plan(request: RunRequest, means: Means, command: str) -> NoReturn:
-    """Play, compare, report into `request.out`; exits 0, 1 (an engine or a scene could not be
-    compared, or with `bits` an engine has others than those kept), 2, 130 or 143."""
-    names = checked_engines(request.engines) if request.engines else of_main_job()
+def run_plan(
+    scenes: Sequence[str],
+    engines: Sequence[str],
+    dts: Sequence[float],
+    full: bool,
+    seed: int,
+    timings: float,
+    out: Path,
+    fresh: bool,
+    trajectories: bool,
+    bits: bool,
+    means: Means,
+    command: str,
+) -> NoReturn:
+    """Play, compare, report into `out`; exits 0, 1 (an engine or a scene could not be compared, or
+    with `bits` an engine has others than those kept), 2, 130 or 143."""
+    names = checked_engines(engines) if engines else of_main_job()
     rows = {name: row_of(name) for name in names}
     plan = RunPlan(
-        scenes=checked_scenes(
-            request.scenes or list(SCENARIOS), request.dts, request.full, request.seed
-        ),
-        engines=rows,
-        checks=checks_of([name for name, row in rows.items() if row.exercise]),
-        seed=request.seed,
-        dts=request.dts,
-        full=request.full,
+        checked_scenes(scenes or list(SCENARIOS), dts, full, seed),
+        rows,
+        seed,
+        dts,
+        full,
         # starting and calling a JavaScript engine is slow
-        timings=request.timings * (2 if any(row.package for row in rows.values()) else 1),
-        command=command,
-        trajectories=request.trajectories,
+        timings * (2 if any(row.package for row in rows.values()) else 1),
+        command,
+        checks_of([name for name, row in rows.items() if row.exercise]),
+        trajectories,
     )
     if fault := cache.fault():
         say(fault)
-    with opening(request.out, COMMAND, request.fresh) as store:
+    with opening(out, COMMAND, fresh) as store:
         try:
-            with keeping(request.out, lambda: what_is_kept(store)), Progress() as progress:
+            with keeping(out, lambda: what_is_kept(store)), Progress() as progress:
                 carry_out(plan, means, store, progress)
                 results = RunResults.read(store)
                 report = make_report(results, progress.say)
-                if request.bits:
+                if bits:
                     write_bits(results)
         except (NoScheduler, OtherVersions) as fault:
             say(f"{fault}. {what_is_kept(store)}")
             sys.exit(FAILED)
-        finish(report, FAILED if request.bits and not kept_bits(store.folder) else DONE)
+        finish(report, FAILED if bits and not kept_bits(store.folder) else DONE)
 
 
 def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means:

@@ -45,33 +45,42 @@ def show_truth(
     with Progress() as progress, closing(run_all({checked: task}, 1, timeout)) as results:
         progress.say(f"the exact answer to {scenario.name}")
         [(_, record)] = results
-    if isinstance(record, Failure | str):
-        why = (
-            f"no exact answer: {record}"
-            if isinstance(record, str)
-            else no_answer(record, timeout).reason
-        )
-        say(f"{scenario.name}: {why}")
-        sys.exit(FAILED)
+    if isinstance(record, Failure):
+        reason = no_answer(record, timeout).reason
+    elif isinstance(record, str):
+        reason = f"no exact answer: {record}"
+    elif at is not None and at > record.horizon:
+        reason = f"no exact answer at {at:g} s: {record.reason}"
+    else:
+        print_answer(scenario, record, every, at, as_json)
+        sys.exit(DONE)
+    say(f"{scenario.name}: {reason}")
+    sys.exit(FAILED)
+
+
+def print_answer(
+    scenario: Scenario, record: TruthRecord, every: bool, at: float | None, as_json: bool
+) -> None:
+    """Print the record, or where each disk is `at` s, as JSON or as text."""
     state = None if at is None else state_at(scenario, record, at)
-    if at is not None and state is None:
-        say(f"{scenario.name}: no exact answer at {at:g} s: {record.reason}")
-        sys.exit(FAILED)
     if as_json:
         written = as_plain(scenario, record) | ({"state": state} if state else {})
         print(json.dumps(written, indent=2, allow_nan=False))
     elif state is not None:
-        print_state(state)
+        console = Console()
+        console.print(f"at {state['t_s']:.15g} s")
+        rows = [
+            [str(disk), *(f"{value:.15g}" for value in (*x, *v, angle, spin))]
+            for disk, x, v, angle, spin in (disk.values() for disk in state["disks"])
+        ]
+        print_table(console, STATE_HEADINGS, rows)
     else:
         print_truth(scenario, record, every)
-    sys.exit(DONE)
 
 
-def state_at(scenario: Scenario, record: TruthRecord, at: float) -> dict[str, Any] | None:
-    """Where each disk is at `at` s and how it moves; None beyond the horizon."""
+def state_at(scenario: Scenario, record: TruthRecord, at: float) -> dict[str, Any]:
+    """Where each disk is at `at` s, within the horizon, and how it moves."""
     t = np.array([at])
-    if at > record.horizon:
-        return None
     if record.method == CLOSED_FORM:
         assert scenario.truth is not None
         answer = scenario.truth(t)
@@ -80,21 +89,7 @@ def state_at(scenario: Scenario, record: TruthRecord, at: float) -> dict[str, An
     else:
         moved, turned = record.motion(scenario.scene, scenario.thrusts, t)
     disks = zip(*(part[0].tolist() for part in (*moved, *turned)))
-    return {
-        "t_s": at,
-        "disks": [dict(zip(STATE, (i, *disk))) for i, disk in enumerate(disks)],
-    }
-
-
-def print_state(state: dict[str, Any]) -> None:
-    """Print the state of each disk as a table."""
-    rows = [
-        [str(disk), *(f"{value:.15g}" for value in (*x, *v, angle, spin))]
-        for disk, x, v, angle, spin in (disk.values() for disk in state["disks"])
-    ]
-    console = Console()
-    console.print(f"at {state['t_s']:.15g} s")
-    print_table(console, STATE_HEADINGS, rows)
+    return {"t_s": at, "disks": [dict(zip(STATE, (i, *disk))) for i, disk in enumerate(disks)]}
 
 
 def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
@@ -176,9 +171,17 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
         print_table(console, headings, rows, left=HEADINGS[2:4])
         if len({*record.events[:, 0]}) < len(record.events):
             console.print("Collisions at one instant are listed by disk, not in their order.")
-    for title, texts in outcomes_in_words(record).items():
+    ends = outcomes(record)
+    for k, end in enumerate(ends, 1):
+        velocities = end["velocities_m_s"].items()
+        lines = {
+            "velocities, m/s": "\n".join(
+                f"disk {disk}: ({vx:.6g}, {vy:.6g})" for disk, (vx, vy) in velocities
+            ),
+            "one order": ", ".join(f"{i} on {name(j)}" for i, j in end["order"]),
+        }
         console.print()
-        print_texts(console, texts, title)
+        print_texts(console, lines, f"Outcome {k} of {len(ends)}; none is the truth")
 
 
 def seconds(t: float) -> str:
@@ -200,31 +203,15 @@ def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
     angles if it is empty."""
     rows = [list(HEADINGS)]
     for t, i, j, impulse, cosine in record.events.tolist():
-        shown = f"{impulse:.6g}" if impulse else "comes to rest"
+        force = f"{impulse:.6g}" if impulse else "comes to rest"
         angle = f"{cosine:.6g}" if impulse and not np.isnan(cosine) else ""
-        rows.append([f"{t:.12g}", str(int(i)), name(j), shown, angle])
+        rows.append([f"{t:.12g}", str(int(i)), name(j), force, angle])
     if not any(row[-1] for row in rows[1:]):
         rows = [row[:-1] for row in rows]
-    skipped = 0 if every else max(0, len(rows) - 1 - 2 * SHOWN)
-    if skipped:
+    skipped = len(rows) - 1 - 2 * SHOWN
+    if skipped > 0 and not every:
         rows[1 + SHOWN : -SHOWN] = [[f"{skipped} more: --events", *[""] * (len(rows[0]) - 1)]]
     return rows
-
-
-def outcomes_in_words(record: TruthRecord) -> dict[str, dict[str, str]]:
-    """Heading for each possible outcome of a simultaneous collision, none of which is the truth ->
-    the velocities after it, and one order of collisions that leads there."""
-    found = outcomes(record)
-    return {
-        f"Outcome {k} of {len(found)}; none is the truth": {
-            "velocities, m/s": "\n".join(
-                f"disk {disk}: ({vx:.6g}, {vy:.6g})"
-                for disk, (vx, vy) in end["velocities_m_s"].items()
-            ),
-            "one order": ", ".join(f"{i} on {name(j)}" for i, j in end["order"]),
-        }
-        for k, end in enumerate(found, 1)
-    }
 
 
 def name(j: float) -> str:

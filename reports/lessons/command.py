@@ -18,7 +18,7 @@ from crosscheck2d.reports.lessons.pages import ALONE, FILES, Links, answer_json,
 from crosscheck2d.reports.run.arguments import unknown
 from crosscheck2d.reports.run.made import may_overwrite, sealed
 from crosscheck2d.reports.run.pool import Failure, run_all
-from crosscheck2d.reports.run.store import place_of, refuse_place
+from crosscheck2d.reports.run.store import place_of
 from crosscheck2d.reports.terminal.exits import FAILED, FolderTaken, refuse, say
 from crosscheck2d.reports.terminal.foreign_text import legible, put_text
 from crosscheck2d.reports.terminal.progress import Progress
@@ -75,7 +75,6 @@ def write_all(folder: Path) -> None:
     """All lessons and their list, a page each, with links between them."""
     with exporting(folder):
         folder = place_of(folder, "--export ")
-        refuse_place(folder, "--export ")
         pages = {folder / f"{name}.html": lesson for name, lesson in LESSONS.items()}
         for path in (*pages, folder / INDEX):
             if path.parent.exists():

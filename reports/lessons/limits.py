@@ -25,9 +25,16 @@ from crosscheck2d.reports.lessons.lesson import (
 from crosscheck2d.reports.page.style import TRUTH, number
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
-from crosscheck2d.reports.stability.limits import NEVER_FAILS, QUICK, Case, Limit, Trial, engines_of
+from crosscheck2d.reports.stability.limits import (
+    NEVER_FAILS,
+    QUICK,
+    Case,
+    Limit,
+    LimitSearch,
+    Trial,
+    engines_of,
+)
 from crosscheck2d.reports.stability.overview import bracket, why
-from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
 
 HARSHNESS = tuple(range(9))  # places from the gentlest value of a case to its harshest

@@ -23,6 +23,8 @@ from crosscheck2d.scenarios.model import Trajectory
 KEPT = Path(__file__).parents[1] / "bits.csv"
 COLUMNS = ["scenario", "engine", "profile", "dt_s", "status", "bits", "until"]
 DIGITS = 4  # hex digits of a hash in `until`
+BITS = "bits.csv"  # in the folder of a run
+SHOWN = 12  # differences
 
 
 class ChangedBits(NamedTuple):
@@ -91,57 +93,59 @@ def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[ChangedBits
     """The rows of both tables whose bits differ; and all rows that both have, with the suffixes
     _kept and _now."""
     both = kept.merge(now, on=COLUMNS[:4], suffixes=("_kept", "_now"))
-    found = []
-    for row in both[both.bits_kept != both.bits_now].to_dict("records"):
-        name = f"{row['engine']}:{row['profile']}"
-        samples = first_other(row["until_kept"], row["until_now"])
-        found.append(ChangedBits(row["scenario"], name, *samples))
-    return found, both
+    changed = [
+        ChangedBits(
+            row["scenario"],
+            f"{row['engine']}:{row['profile']}",
+            *first_other(row["until_kept"], row["until_now"]),
+        )
+        for row in both[both.bits_kept != both.bits_now].to_dict("records")
+    ]
+    return changed, both
 
 
 def first_other(one: str, other: str) -> tuple[int, int]:
     """The last sample whose hashes agree, and the next hashed sample; (-1, -1) if the two columns
     `until` have different lengths."""
-    mine, theirs = one.split(), other.split()
-    if not mine or len(mine) != len(theirs):
+    pairs = list(zip(one.split(), other.split()))
+    if not pairs or len(one.split()) != len(other.split()):
         return -1, -1
-    at = next(k for k in range(len(mine)) if mine[k] != theirs[k])
+    at = next(k for k, (mine, theirs) in enumerate(pairs) if mine != theirs)
     # the hashes are those of samples 0, 1, 2, 4 ... and the last
-    samples = [0, *(2**p for p in range(len(mine)))]
-    return (samples[at - 1] if at else -1), samples[at]
-
-
-BITS = "bits.csv"  # in the folder of a run
-SHOWN = 12  # differences
+    samples = [-1, 0, *(2**p for p in range(len(pairs)))]
+    return samples[at], samples[at + 1]
 
 
 def write_bits(results: RunResults) -> None:
     """Write the table of a run to its folder, below the system, architecture and versions, which
     may affect the bits."""
-    made_by = {
-        "system": platform.system(),
-        "architecture": platform.machine(),
-        "Python": platform.python_version(),
-        **versions(),
-    }
+    system = {"system": platform.system(), "architecture": platform.machine()}
+    made_by = {**system, "Python": platform.python_version(), **versions()}
     results.store.export(BITS, written(rows_of(results), made_by))
 
 
 def kept_bits(folder: Path) -> bool:
-    """Print in how many scenes the bits of a run equal the kept ones; whether all that can be
-    compared do, and there is something to compare."""
+    """Print in how many scenes the bits of a run equal the kept ones, and the first differences;
+    whether all that can be compared do, and there is something to compare."""
     kept, here = (path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS))
-    table, made_by = read(here), about_of(here)
+    table, (before, made_by) = read(here), map(about_of, (kept, here))
     changed, both = differences(read(kept), table)
-    console = Console()
     counts = Counter((both.engine + ":" + both.profile).tolist())
-    show(console, changed, counts)
+    other = Counter(row.name for row in changed)
+    rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
+    console = Console()
+    title = "In how many scenes the bits are those kept in reports/bits.csv"
+    print_table(console, ["engine", "the same", "of"], rows, title)
+    console.print()
+    print_list(console, map(in_words, changed[:SHOWN]))
+    if len(changed) > SHOWN:
+        console.print(f"and {counted(len(changed) - SHOWN, 'more difference')}")
     if new := {*(table.engine + ":" + table.profile)} - {*counts}:
         names = listed(sorted(new))
         console.print(f"No bits are kept of {names} in these scenes and steps.", highlight=False)
     others = [
         f"{key} {value} (here {made_by.get(key)})"
-        for key, value in about_of(kept).items()
+        for key, value in before.items()
         if made_by.get(key) != value
     ]
     if others:
@@ -150,25 +154,12 @@ def kept_bits(folder: Path) -> bool:
     return not changed and not both.empty
 
 
-def show(console: Console, found: list[ChangedBits], counts: Counter[str]) -> None:
-    """Print a row for each engine, and the first differences."""
-    other = Counter(each.name for each in found)
-    rows = [[name, str(n - other[name]), str(n)] for name, n in counts.items()]
-    title = "In how many scenes the bits are those kept in reports/bits.csv"
-    print_table(console, ["engine", "the same", "of"], rows, title)
-    console.print()
-    print_list(console, [in_words(each) for each in found[:SHOWN]])
-    if len(found) > SHOWN:
-        console.print(f"and {counted(len(found) - SHOWN, 'more difference')}")
-
-
-def in_words(one: ChangedBits) -> str:
+def in_words(row: ChangedBits) -> str:
     """A sentence on where the bits differ."""
-    if one.other < 0:
-        return f"{one.name} in {one.scenario}: it did not play to the same sample"
-    if one.same < 0:
-        return f"{one.name} in {one.scenario}: other bits from the start on"
-    return (
-        f"{one.name} in {one.scenario}: the same bits up to sample {one.same}, others by sample"
-        f" {one.other}"
-    )
+    if row.other < 0:
+        where = "it did not play to the same sample"
+    elif row.same < 0:
+        where = "other bits from the start on"
+    else:
+        where = f"the same bits up to sample {row.same}, others by sample {row.other}"
+    return f"{row.name} in {row.scenario}: {where}"

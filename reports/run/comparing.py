@@ -176,27 +176,22 @@ class SceneTasks:
             return
         source = self.sources[scene]
         task = ANSWER, digest(repr((source.digest, judge_hash())).encode())
-        answer, of_answer = self.stored_answer(task[1])
+        answer, row = None, self.store.get(*task)
+        if row is not None:
+            record = TruthRecord(**unpacked(row.blob)) if row.blob else None
+            answer = ExactAnswer(record, *row.value)
         if task not in self.scenes and (answer is None or answer.worth_another_try(self.timeout)):
             yield self.started(task, scene), partial(compute_answer, source)
             return
-        if answer is None:
+        if answer is None or row is None:
             return
         self.answers[scene] = answer
-        rows = [(record["cell"], record["digest"]) for record in records]
-        task = COMPARED, digest(repr((rows, of_answer, judge_hash())).encode())
+        cells = [(record["cell"], record["digest"]) for record in records]
+        task = COMPARED, digest(repr((cells, row.digest, judge_hash())).encode())
         if row := self.store.get(*task):
             self.tables[scene] = SceneTable(task[1], row.blob)
         elif task not in self.scenes:
             yield self.started(task, scene), CompareTask(self.store, source, records, answer)
-
-    def stored_answer(self, key: str) -> tuple[ExactAnswer | None, str]:
-        """The answer in the row with this key, and the digest of the row."""
-        row = self.store.get(ANSWER, key)
-        if row is None:
-            return None, ""
-        record = TruthRecord(**unpacked(row.blob)) if row.blob else None
-        return ExactAnswer(record, *row.value), row.digest
 
     def started(self, task: Key, scene: str) -> Key:
         """Remember what a task is of."""
@@ -208,9 +203,9 @@ class SceneTasks:
     def awaited(self) -> list[str]:
         """The scenes whose exact answer is being computed, or is about to be."""
         return [
-            scene
-            for task, scene in self.scenes.items()
-            if task[0] == ANSWER and task in self.under_way
+            self.scenes[task]
+            for task in self.scenes
+            if task in self.under_way and task[0] == ANSWER
         ]
 
     def task_ended(self, task: Key, result: Any, partly: bool = False) -> Iterator[Task]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -205,14 +205,12 @@ def edited_scenes(before: Cells, after: Cells) -> list[str]:
 def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> list[Change]:
     """The cells of both runs that ended differently; in an edited scene none is worse."""
     changes = []
-    for name in [name for name in before if name in after]:
-        scenario, engine, dt = name
-        was, now = before[name]["status"], after[name]["status"]
+    for (scenario, engine, dt), cell in before.items():
+        other = after.get((scenario, engine, dt))
+        was, now = cell["status"], other["status"] if other else cell["status"]
         if was != now:
-            if scenario in edited:
-                verdict = "other"
-            else:
-                verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
+            verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
+            verdict = "other" if scenario in edited else verdict
             changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
     return changes
 
@@ -221,30 +219,24 @@ def changed_judgement(
     before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name], edited: Collection[str]
 ) -> list[Change]:
     """The cells that `both` runs played but only one judged, so that only that one has numbers."""
-    was, now = reasons(before), reasons(after)
+    reasons = [
+        {
+            ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), r["versus"]): r
+            for r in table[table.metric == "status"].to_dict("records")
+            if r["note"].startswith(NOT_JUDGED)
+        }
+        for table in (before, after)
+    ]
     changes = []
-    for cell, versus in sorted(was.keys() ^ now.keys()):
+    for cell, versus in sorted(reasons[0].keys() ^ reasons[1].keys()):
         if cell in both:
             scenario, engine, dt = cell
-            what, key = f"{scenario}  dt {dt:.4g} s  against {versus}: status", (cell, versus)
-            verdict = "other" if scenario in edited else "worse" if key in now else "better"
-            changes.append(
-                Change(engine, what, was.get(key, "judged"), now.get(key, "judged"), verdict)
-            )
+            what = f"{scenario}  dt {dt:.4g} s  against {versus}: status"
+            was, now = (of.get((cell, versus), {"note": "judged"})["note"] for of in reasons)
+            verdict = "better" if now == "judged" else "worse"
+            verdict = "other" if scenario in edited else verdict
+            changes.append(Change(engine, what, was, now, verdict))
     return changes
-
-
-def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
-    """((scenario, `engine:profile`, dt in s), `versus`) -> why it is not judged."""
-    rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict(
-        "records"
-    )
-    return {
-        ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), str(r["versus"])): str(
-            r["note"]
-        )
-        for r in rows
-    }
 
 
 def table_of(results: RunResults) -> pd.DataFrame:
@@ -259,10 +251,7 @@ def table_of(results: RunResults) -> pd.DataFrame:
 
 
 def changed_numbers(
-    before: pd.DataFrame,
-    after: pd.DataFrame,
-    equal: Collection[Name],
-    edited: Collection[str],
+    before: pd.DataFrame, after: pd.DataFrame, equal: Collection[Name], edited: Collection[str]
 ) -> tuple[list[Change], Counter[str]]:
     """Every number that differs between the tables, and how many are equal, by engine.
 
@@ -276,53 +265,37 @@ def changed_numbers(
     differs = both.value != both.value_after
     changes = []
     for row in both[differs].to_dict("records"):
+        scenario, dt = row["scenario"], float(row["dt_s"])
+        beside = row["versus"] if ":" in row["versus"] else ""
+        engines = [row["name"], beside] if beside else [row["name"]]
         was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
-        must = all((row["scenario"], name, float(row["dt_s"])) in equal for name in engines_of(row))
-        if must:
-            verdict = "worse"
-        elif is_rounding(engines_of(row), was, now):
+        must = all((scenario, name, dt) in equal for name in engines)
+        first, second = (
+            NOT_JUDGED if row[f"note{end}"].startswith(NOT_JUDGED) else row[f"value{end}"]
+            for end in ("", "_after")
+        )
+        what = f"{scenario}  dt {dt:.4g} s  {row['metric']} against {row['versus']}"
+        if NOT_JUDGED in (first, second):
+            verdict = "other"
+        elif must:
+            verdict, what = "worse", f"{what} (same cell, other bits)"
+        elif is_rounding(engines, was, now):
             verdict = ROUNDING
-        elif row["scenario"] in edited:
+        elif scenario in edited:
             verdict = "other"
         elif row["metric"] in VERDICTS:
-            verdict = change_of_failure(row)
+            fails = [
+                not value <= float(row[f"bound{end}"])
+                for value, end in ((was, ""), (now, "_after"))
+            ]
+            verdict = "other" if fails[0] == fails[1] else "worse" if fails[1] else "better"
         else:
             verdict = verdict_of(row["metric"], row["versus"], was, now)
-        what = (
-            f"{row['scenario']}  dt {float(row['dt_s']):.4g} s  {row['metric']} against"
-            f" {row['versus']}"
-        )
-        note = " (same cell, other bits)" if must else ""
-        was_said, now_said = (
-            said_of(row["value"], row["note"]),
-            said_of(row["value_after"], row["note_after"]),
-        )
-        if NOT_JUDGED in (was_said, now_said):
-            verdict, note = "other", ""
-        changes.append(
-            Change(
-                row["name"],
-                what + note,
-                was_said,
-                now_said,
-                verdict,
-                ratio(was, now),
-                beside="".join(engines_of(row)[1:]),
-            )
-        )
+        factor = ratio(was, now)
+        changes.append(Change(row["name"], what, first, second, verdict, factor, beside))
     equal_rows = both[~differs]
     between = equal_rows.versus.str.contains(":", regex=False)
     return changes, Counter([*equal_rows.name, *equal_rows.versus[between]])
-
-
-def said_of(value: str, note: str) -> str:
-    """A number as in the table, or "not judged"."""
-    return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
-
-
-def engines_of(row: Mapping[Hashable, Any]) -> list[str]:
-    """The engines of a number: one, or the two that it compares."""
-    return [row["name"]] + ([row["versus"]] if ":" in row["versus"] else [])
 
 
 def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
@@ -332,15 +305,6 @@ def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
         return False
     bound = max(DIVERGED, *(ROUNDINGS * rounding_of(name) for name in engines))
     return abs(now - was) <= bound * max(1.0, abs(was), abs(now))
-
-
-def change_of_failure(row: Mapping[Hashable, Any]) -> str:
-    """Whether a verdict fails that did not before, or the other way round."""
-    was, now = (
-        not float(row[f"value{end}"] or "nan") <= float(row[f"bound{end}"])
-        for end in ("", "_after")
-    )
-    return "other" if was == now else "worse" if now else "better"
 
 
 def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
@@ -360,12 +324,7 @@ def ratio(was: float, now: float) -> float:
     return large / small if small > 0 and math.isfinite(large) else math.inf
 
 
-def timings_of(
-    one: RunResults,
-    other: RunResults,
-    before: Cells,
-    after: Cells,
-) -> list[Timing]:
+def timings_of(one: RunResults, other: RunResults, before: Cells, after: Cells) -> list[Timing]:
     """The ratio after : before of every engine, over the cells that were timed in both runs, round
     by round."""
     ratios: dict[str, list[float]] = {}
@@ -375,10 +334,9 @@ def timings_of(
         now = other.timings.get(after[name]["cell"], {}).get(0)
         if was is None or now is None or was["timed_s"] != now["timed_s"]:
             continue
-        if before[name]["scene_hash"] != after[name]["scene_hash"]:
-            continue
         rounds = [*zip(was["cost"], now["cost"])]
-        if rounds and min(min(rounds)) > 0:
+        alike = before[name]["scene_hash"] == after[name]["scene_hash"]
+        if alike and rounds and min(min(rounds)) > 0:
             fastest, then = (min(times) for times in zip(*rounds))
             least.setdefault(name[1], []).append(then / fastest)
             ratios.setdefault(name[1], []).extend(now / was for was, now in rounds)

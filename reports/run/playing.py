@@ -46,19 +46,19 @@ def play_cell(
     return play_once(row.make, cell.engine, scenario, scenario.dt(cell.substeps), watch)
 
 
-class ClockStart:
-    """Called with every sample of a cell. The first sample, when the engine is loaded, starts the
-    clock of the cell."""
+def clocked(then: Callable[[State], None] = unwatched) -> Callable[[State], None]:
+    """A function to call with every sample of a cell, which calls `then`. The first sample, when
+    the engine is loaded, starts the clock of the cell."""
+    begun = False
 
-    def __init__(self, then: Callable[[State], None] = unwatched) -> None:
-        self.begun, self.then = False, then
-
-    def __call__(self, state: State) -> None:
-        """Start the clock at the first call, then call `then`."""
-        if not self.begun:
-            self.begun = True
+    def watch(state: State) -> None:
+        nonlocal begun
+        if not begun:
+            begun = True
             allow()
-        self.then(state)
+        then(state)
+
+    return watch
 
 
 def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
@@ -66,7 +66,7 @@ def play_here(cell: Cell, row: EngineRow, scenario: Scenario) -> CellResult:
     trajectory packed."""
     allow(LOADING)
     keep_processes()  # a file plays many cells, and a process takes longer to start than most
-    run = play_cell(cell, row, scenario, ClockStart(lambda state: leave(parts_of(state))))
+    run = play_cell(cell, row, scenario, clocked(lambda state: leave(parts_of(state))))
     file, samples = (packed(run.trajectory), len(run.trajectory)) if run.trajectory else (b"", 0)
     return CellResult(replace(run, trajectory=None), samples, file, source_and_versions())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
@@ -26,76 +26,52 @@ class Spent(NamedTuple):
     wrapping: float = 0.0
 
 
-@dataclass(frozen=True)
-class Stepping:
+def step_through(make: Make, scenario: Scenario, substeps: int) -> Spent:
     """A run of an engine through a scenario. Building the scene is not timed; nothing is read, and
     no collisions are recorded."""
-
-    make: Make
-    scenario: Scenario
-    substeps: int
-
-    def __call__(self) -> Spent:
-        """One run."""
-        scenario, dt = self.scenario, self.scenario.dt(self.substeps)
-        with closing(self.make()) as engine:
-            engine.listening, engine.wrapping = False, 0.0
-            engine.load(scenario.scene, dt)
-            seconds = advance(engine, scenario, 0, scenario.intervals * self.substeps, dt)
-            return Spent(seconds, engine.wrapping)
+    dt = scenario.dt(substeps)
+    with closing(make()) as engine:
+        engine.listening, engine.wrapping = False, 0.0
+        engine.load(scenario.scene, dt)
+        seconds = advance(engine, scenario, 0, scenario.intervals * substeps, dt)
+        return Spent(seconds, engine.wrapping)
 
 
-@dataclass(frozen=True)
-class EmptySteps:
-    """Steps of a world with one static disk, the least that every engine accepts: `EMPTY_STEPS` in
-    one call of `step`, or if `singly`, `CALLS` of one step each."""
-
-    make: Make
-    dt: float
-    singly: bool
-
-    def __call__(self) -> Spent:
-        """One run."""
-        with closing(self.make()) as engine:
-            engine.listening = False
-            engine.load(empty_world(), self.dt)
-            calls, count = (CALLS, 1) if self.singly else (1, EMPTY_STEPS)
-            started = perf_counter()
-            for _ in range(calls):
-                engine.step(count)
-            return Spent(perf_counter() - started)
+def empty_steps(make: Make, dt: float, calls: int, count: int) -> Spent:
+    """Calls of `step`, each of `count` steps, of a world with one static disk, the least that every
+    engine accepts."""
+    with closing(make()) as engine:
+        engine.listening = False
+        engine.load(empty_world(), dt)
+        started = perf_counter()
+        for _ in range(calls):
+            engine.step(count)
+        return Spent(perf_counter() - started)
 
 
-@dataclass(frozen=True)
-class ReadOuts:
+def read_outs(make: Make, scenario: Scenario) -> Spent:
     """`READS` read-outs of a scene after its first step, each after one more step: some engines
     cache what they have read."""
-
-    make: Make
-    scenario: Scenario
-
-    def __call__(self) -> Spent:
-        """One run."""
-        seconds = 0.0
-        with closing(self.make()) as engine:
-            engine.listening = False
-            engine.load(self.scenario.scene, self.scenario.dt(self.scenario.substeps[-1]))
-            for _ in range(READS):
-                engine.step(1)
-                started = perf_counter()
-                engine.read()
-                seconds += perf_counter() - started
-        return Spent(seconds)
+    seconds = 0.0
+    with closing(make()) as engine:
+        engine.listening = False
+        engine.load(scenario.scene, scenario.dt(scenario.substeps[-1]))
+        for _ in range(READS):
+            engine.step(1)
+            started = perf_counter()
+            engine.read()
+            seconds += perf_counter() - started
+    return Spent(seconds)
 
 
-def overheads(make: Make, scenario: Scenario) -> list[tuple[str, EmptySteps | ReadOuts, int]]:
+def overheads(make: Make, scenario: Scenario) -> list[tuple[str, Callable[[], Spent], int]]:
     """(what, how to run it, count in a run) for everything that is timed beside the steps of an
     engine in a scenario."""
     dt = scenario.dt(scenario.substeps[-1])
     return [
-        (EMPTY, EmptySteps(make, dt, singly=False), EMPTY_STEPS),
-        (CALL, EmptySteps(make, dt, singly=True), CALLS),
-        (READ, ReadOuts(make, scenario), READS),
+        (EMPTY, partial(empty_steps, make, dt, 1, EMPTY_STEPS), EMPTY_STEPS),
+        (CALL, partial(empty_steps, make, dt, CALLS, 1), CALLS),
+        (READ, partial(read_outs, make, scenario), READS),
     ]
 
 

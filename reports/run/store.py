@@ -29,6 +29,11 @@ OWN = re.compile(
 OLD = "journal.jsonl"  # of versions before the store
 EXPORT = "export"  # the kind of the row of a file: the digests that it may have
 MOVE_IT = "move it to another folder, or delete it"
+MOVE_OR_NAME = "name another folder, or move it elsewhere"
+OF_OLD_FORMAT = (
+    f"was made by an earlier version of crosscheck, which kept {OLD}; name another folder, or"
+    " delete it"
+)
 
 _locks: set[int] = set()  # open files of this process; a fork must not hold its locks
 
@@ -128,7 +133,7 @@ class Store:
                 raise FolderTaken(
                     f"{option}{self.folder}: holds {name}, which"
                     f" {changed(path) if name in exports else 'crosscheck did not make'};"
-                    f" name another folder, or move it elsewhere"
+                    f" {MOVE_OR_NAME}"
                 )
 
 
@@ -158,13 +163,15 @@ def writing(
         OSError: it cannot be made, written or locked.
     """
     folder = place_of(out, option)
-    refuse_place(folder, option)
     new, unlocked = not folder.exists(), not (folder / LOCK).exists()
     folder.mkdir(parents=True, exist_ok=True)
     with locked(folder, option):
         try:
-            if not (folder / FILE).exists():
-                refuse_nonempty(folder, option)
+            inside = sorted(path.name for path in folder.iterdir() if not OWN.fullmatch(path.name))
+            if inside and not (folder / FILE).exists():
+                what = f"holds {inside[0]}, which crosscheck did not make; {MOVE_OR_NAME}"
+                what = OF_OLD_FORMAT if OLD in inside else what
+                raise FolderTaken(f"{option}{folder}: {what}")
             rows = Rows(folder / FILE)
         except BaseException:
             with suppress(OSError):
@@ -208,41 +215,17 @@ def reading(folder: Path, command: str) -> Iterator[Store]:
 def without_store(folder: Path, command: str) -> str:
     """Why a folder cannot be read."""
     if (folder / OLD).exists():
-        return of_old_format(folder)
+        return f"{folder}: {OF_OLD_FORMAT}"
     return f"{folder}: has no {FILE} of {command}, so it is not the folder of one"
 
 
-def of_old_format(folder: Path) -> str:
-    """A sentence on the folder of an earlier version."""
-    return (
-        f"{folder}: was made by an earlier version of crosscheck, which kept {OLD}; name another"
-        " folder, or delete it"
-    )
-
-
-def refuse_nonempty(folder: Path, option: str) -> None:
-    """Raise `FolderTaken` if a folder without rows holds anything."""
-    inside = sorted(path.name for path in folder.iterdir() if not OWN.fullmatch(path.name))
-    if OLD in inside:
-        raise FolderTaken(f"{option}{of_old_format(folder)}")
-    if inside:
-        raise FolderTaken(
-            f"{option}{folder}: holds {inside[0]}, which crosscheck did not make; name another"
-            " folder, or move it elsewhere"
-        )
-
-
 def place_of(out: Path, option: str = "--out ") -> Path:
-    """The folder that `out` names, with links resolved; raises `FolderTaken` for a link to
-    nothing."""
+    """The folder that `out` names, with links resolved; raises `FolderTaken` unless results may go
+    into it, or it can be made."""
     # Path.resolve raises RuntimeError, not OSError, for a link to itself
     if out.is_symlink() and not out.exists():
         raise FolderTaken(f"{option}{out}: is a link to nothing; name a folder")
-    return Path(os.path.realpath(out))
-
-
-def refuse_place(folder: Path, option: str) -> None:
-    """Raise `FolderTaken` unless results may go into this folder, or one that can be made here."""
+    folder = Path(os.path.realpath(out))
     if folder == Path.cwd() or folder in Path.cwd().parents:
         raise FolderTaken(
             f"{option}{folder}: is the current folder, or above it; name another folder, or go"
@@ -250,6 +233,7 @@ def refuse_place(folder: Path, option: str) -> None:
         )
     if folder.exists() and not folder.is_dir():
         raise FolderTaken(f"{option}{folder}: is a file; name a folder that does not exist yet")
+    return folder
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import partial
 from math import isnan, nan
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from crosscheck2d.reports.run.playing import CellResult, source_and_versions
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.results import RunResults, sources_of
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.run.timing_pass import CellToTime, Pass, cells_to_time
+from crosscheck2d.reports.run.timing_pass import CellToTime, cells_to_time, time_cells
 from crosscheck2d.reports.run.trajectories import from_trail, packed
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.model import Scenario
@@ -123,7 +124,9 @@ class Suite:
     def show_waiting(self, scenes: SceneTasks) -> None:
         """When every cell has ended: show for which exact answers the run still waits."""
         if len(scenes.records) == sum(map(len, scenes.cells.values())) and scenes.awaited:
-            self.progress.say(waiting_for(scenes.awaited))
+            first, *rest = scenes.awaited
+            more = f" and {len(rest)} more" if rest else ""
+            self.progress.say(f"the exact answer to {Path(first).stem}{more}")
 
     def keep(self, task: RunTask, result: Any) -> None:
         """Write the row of a task that is not a cell, and show its status."""
@@ -188,27 +191,15 @@ class Suite:
         return value | {"cell": task.key, "digest": row.digest}
 
 
-def waiting_for(scenes: Sequence[str]) -> str:
-    """The sentence part that names the scenes whose exact answer is being computed."""
-    more = f" and {len(scenes) - 1} more" if len(scenes) > 1 else ""
-    return f"the exact answer to {Path(scenes[0]).stem}{more}"
-
-
 def failed_cell(cell: Cell, scenario: Scenario, failure: Failure) -> CellResult:
     """The result of a cell whose worker died or was stopped, with the states up to that time."""
     trajectory = from_trail(failure.trail, scenario)
-    samples = len(trajectory) if trajectory else 0
-    last = ""
+    samples, reason = len(trajectory) if trajectory else 0, failure.reason
     if samples:
         step, t = (samples - 1) * cell.substeps, scenario.times[samples - 1]
-        last = f"; last good state: step {step}, {t:g} s"
-    run = Run(
-        *cell.names,
-        scenario.name,
-        scenario.dt(cell.substeps),
-        failure.status,
-        failure.reason + last,
-    )
+        reason += f"; last good state: step {step}, {t:g} s"
+    dt = scenario.dt(cell.substeps)
+    run = Run(*cell.names, scenario.name, dt, failure.status, reason)
     file = packed(trajectory) if trajectory else b""
     return CellResult(run, samples, file, source_and_versions())
 
@@ -225,13 +216,13 @@ def take_timings(
     machine, and not `again`."""
     plan = store.get("run", "plan")
     assert plan is not None
-    machine = about("", 0)["machine"]
-    key = content_key(*sorted(cell.key for cell in cells), repr(machine), plan.value["seed"])
+    machine, seed = about("", 0)["machine"], plan.value["seed"]
+    key = content_key(*sorted(cell.key for cell in cells), repr(machine), seed)
     store.put("run", "plan", plan.value | {"timing": key, "timings": seconds})
     if not cells or not seconds or (store.get("timing", key) and not again):
         return
     progress.start(1, 1, f"timing, at most {seconds:g} s")
-    work: dict[Any, Callable[[], Any]] = {"timing": Pass(cells, seconds, plan.value["seed"])}
+    work: dict[Any, Callable[[], Any]] = {"timing": partial(time_cells, cells, seconds, seed)}
     with closing(run_all(work, 1, seconds + means.timeout, means.memory)) as results:
         for _, result in results:
             if isinstance(result, Failure):

@@ -17,8 +17,6 @@ from crosscheck2d.reports.run.cells import scene_hash
 from crosscheck2d.reports.run.comparing import (
     ANSWER,
     PATHS,
-    ExactAnswer,
-    SceneTable,
     SceneTasks,
     csv_of,
     read_scene_table,
@@ -39,18 +37,14 @@ class Tables(NamedTuple):
     Attributes:
         runs: runs.csv.
         timed: timings.csv.
-        answers: scene -> its exact answer, or why there is none.
-        scene_tables: scene -> its part of deviations.csv.
-        failed: scene -> why it could not be compared.
+        scenes: the answers, tables and failures of all scenes.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
     """
 
     runs: pd.DataFrame
     timed: pd.DataFrame
-    answers: dict[str, ExactAnswer]
-    scene_tables: dict[str, SceneTable]
-    failed: dict[str, Failure]
+    scenes: SceneTasks
     unjudged: dict[str, str]
 
 
@@ -69,25 +63,26 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
                 f" {results.folder} plays it again"
             )
     tasks = compare_missing(results, say)
-    played = [scene for scene in results.by_scene if scene in tasks.answers]
-    names = {scene: results.sources[scene].name for scene in results.by_scene}
-    lost = {names[scene]: tasks.answers[scene].lost for scene in played}
-    unjudged = {name: why for name, why in lost.items() if why}
-    unjudged |= {names[scene]: not_compared(fault) for scene, fault in tasks.failed.items()}
     say("writing the tables")
-    store, tables = results.store, {scene: tasks.tables.get(scene) for scene in played}
-    store.put("run", "comparisons", {scene: table.key for scene, table in tables.items() if table})
-    parts = [
-        table.csv if table else csv_of(not_judged(results, scene, tasks.failed[scene]).table)
-        for scene, table in tables.items()
-    ]
+    store, parts, keys, unjudged = results.store, list[bytes](), dict[str, str](), dict[str, str]()
+    for scene in (scene for scene in results.by_scene if scene in tasks.answers):
+        name, answer = results.sources[scene].name, tasks.answers[scene]
+        if answer.lost:
+            unjudged[name] = answer.lost
+        if failure := tasks.failed.get(scene):
+            unjudged[name] = not_compared(failure)
+            parts.append(csv_of(not_judged(results, scene, failure).table))
+        else:
+            keys[scene], csv = tasks.tables[scene]
+            parts.append(csv)
+    store.put("run", "comparisons", keys)
     store.export("deviations.csv", joined(parts))
     runs = table_of_runs(results.records)
     store.export("runs.csv", runs.to_csv(index=False))
     timed = timings(results)
     store.export(TABLE, timed.to_csv(index=False, float_format="%.6g"))
     export_trajectories(results)
-    return Tables(runs, timed, tasks.answers, tasks.tables, tasks.failed, unjudged)
+    return Tables(runs, timed, tasks, unjudged)
 
 
 def joined(parts: Sequence[bytes]) -> bytes:
@@ -142,16 +137,16 @@ def not_judged(results: RunResults, scene: str, failure: Failure) -> Comparison:
 def comparisons_of(results: RunResults, tables: Tables) -> list[Comparison]:
     """The comparisons in reading order. Only runs at the middle dt have their trajectories, because
     no others are drawn."""
-    comparisons = []
+    comparisons, scenes = [], tables.scenes
     for scene, records in results.by_scene.items():
-        if scene in tables.failed:
-            comparisons.append(not_judged(results, scene, tables.failed[scene]))
+        if scene in scenes.failed:
+            comparisons.append(not_judged(results, scene, scenes.failed[scene]))
             continue
-        scenario = tables.answers[scene].put_into(results.sources[scene].scenario())
+        scenario = scenes.answers[scene].put_into(results.sources[scene].scenario())
         scenario, truth = answered(scenario)
         middle = scenario.middle_substeps
         runs = [results.run(record, record["substeps"] == middle) for record in records]
-        table = read_scene_table(tables.scene_tables[scene].csv)
+        table = read_scene_table(scenes.tables[scene].csv)
         comparisons.append(Comparison(scenario, truth, runs, table))
     return comparisons
 

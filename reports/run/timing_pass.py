@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from math import ceil, log2
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -21,9 +22,9 @@ from crosscheck2d.reports.run.stepping import (
     CALL,
     EMPTY,
     READ,
-    Stepping,
     binding_of,
     overheads,
+    step_through,
 )
 from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
 from crosscheck2d.scenarios.model import Scenario
@@ -123,62 +124,59 @@ def timed_scenes(played: Sequence[str]) -> list[str]:
     return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
 
 
-@dataclass(frozen=True)
-class Pass:
-    """The task of the worker: it times `cells`, and the overhead of their engines, within
-    `seconds`."""
+def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[dict[str, Any]]:
+    """In a worker: time these cells, and the overhead of their engines, within `seconds`. A
+    line for each thing timed; none if not even the warm-up fits into the time.
 
-    cells: Sequence[CellToTime]
-    seconds: float
-    seed: int
-
-    def __call__(self) -> list[dict[str, Any]]:
-        """A line for each thing timed; none if not even the warm-up fits into the
-        time."""
-        allow(self.seconds + STARTING)
-        started = perf_counter()
-        slow = [cell for cell in self.cells if cell.is_slow]
-        what = [
-            timed
-            for cell, copies in in_turns([cell for cell in self.cells if not cell.is_slow])
-            for timed in (timed_cell(cell, copy) for copy in range(copies))
-        ]
-        what += overheads_of(self.cells)
-        left = self.seconds - (perf_counter() - started)  # importing the engines counts, too
-        samples = interleaved(what, ROUNDS, SHARE, self.seed, left)
-        rounds: dict[Any, list[Sample]] = {}
-        for sample in samples:
-            rounds.setdefault(sample.key, []).append(sample)
-        lines = [
-            # without the warm-up; with it if there are no others
-            line_of(key, [sample for sample in found if sample.round != WARM_UP] or found)
-            for key, found in rounds.items()
-        ]
-        return [*lines, *map(as_played, slow)] if lines else []
-
-
-def in_turns(cells: Sequence[CellToTime]) -> list[tuple[CellToTime, int]]:
-    """The cells to time, with a number for each timing. Cells at the middle step size of a scene
-    are timed twice, which gives the noise floor."""
-    return [(cell, 2 if cell.substeps == cell.scenario.middle_substeps else 1) for cell in cells]
+    Cells at the middle step size of a scene are timed twice, which gives the noise floor. A
+    slow cell is not timed again: its time as played is an upper bound, because collisions were
+    recorded.
+    """
+    allow(seconds + STARTING)
+    started = perf_counter()
+    what, slow = [], []
+    for cell in cells:
+        part = cell.part
+        if cell.is_slow:
+            cost, until = [cell.seconds / cell.scenario.duration], cell.scenario.duration
+            slow.append(line_of(("timing", cell.key, 0, until), cost, [0.0]))
+            continue
+        run = partial(step_through, cell.row.make, part, cell.substeps)
+        for copy in range(1 + (cell.substeps == cell.scenario.middle_substeps)):
+            key = ("timing", cell.key, copy, part.duration)
+            what.append(Timed(key, run, part.duration))
+    what += overheads_of(cells)
+    left = seconds - (perf_counter() - started)  # importing the engines counts, too
+    rounds: dict[Any, list[Sample]] = {}
+    for sample in interleaved(what, ROUNDS, SHARE, seed, left):
+        rounds.setdefault(sample.key, []).append(sample)
+    lines = []
+    for key, samples in rounds.items():
+        # without the warm-up; with it if there are no others
+        counted = [sample for sample in samples if sample.round != WARM_UP] or samples
+        costs = [sample.cost for sample in counted]
+        lines.append(line_of(key, costs, [sample.wrapping for sample in counted]))
+    return [*lines, *slow] if lines else []
 
 
-def timed_cell(cell: CellToTime, copy: int) -> Timed:
-    """The measurement of a cell: its steps, with a cost in s per simulated second."""
-    part = cell.part
-    key = ("timing", cell.key, copy, part.duration)
-    return Timed(key, Stepping(cell.row.make, part, cell.substeps), part.duration)
+def line_of(key: tuple[Any, ...], cost: list[float], wrapping: list[float]) -> dict[str, Any]:
+    """The line for the costs of one key."""
+    if key[0] == "timing":
+        _, cell, copy, until = key
+        return {"timing": cell, "copy": copy, "timed_s": until, "cost": cost, "wrapping": wrapping}
+    _, what, name, scene = key
+    return {"overhead": what, "of": name, "scenario": scene, "cost": cost}
 
 
 def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
     """The empty steps, calls and read-outs of all engines that accept an empty world."""
-    found: dict[Any, Timed] = {}
+    timed: dict[Any, Timed] = {}
     for cell in cells:
         for what, run, amount in overheads(cell.row.make, cell.scenario):
             # Only a read-out depends on the scene.
             key = ("overhead", what, cell.name, cell.scenario.name if what == READ else "")
-            found.setdefault(key, Timed(key, run, amount))
-    return [timed for timed in found.values() if can(timed)]
+            timed.setdefault(key, Timed(key, run, amount))
+    return [one for one in timed.values() if can(one)]
 
 
 def can(timed: Timed) -> bool:
@@ -187,25 +185,6 @@ def can(timed: Timed) -> bool:
         timed.run()
         return True
     return False
-
-
-def line_of(key: tuple[Any, ...], samples: Sequence[Sample]) -> dict[str, Any]:
-    """The line for the samples of one key."""
-    costs = [sample.cost for sample in samples]
-    if key[0] == "timing":
-        _, cell, copy, until = key
-        wrapping = [sample.wrapping for sample in samples]
-        return {"timing": cell, "copy": copy, "timed_s": until, "cost": costs, "wrapping": wrapping}
-    _, what, name, scene = key
-    return {"overhead": what, "of": name, "scenario": scene, "cost": costs}
-
-
-def as_played(cell: CellToTime) -> dict[str, Any]:
-    """The line for a cell that is not timed again: its time as played, an upper
-    bound, because collisions were recorded."""
-    until = cell.scenario.duration
-    cost = [cell.seconds / until]
-    return {"timing": cell.key, "copy": 0, "timed_s": until, "cost": cost, "wrapping": [0.0]}
 
 
 def is_busy(results: RunResults) -> bool:

@@ -25,10 +25,10 @@ from crosscheck2d.reports.compare.verdicts import first_failed
 from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.machine import busy_cores
-from crosscheck2d.reports.run.playing import LOADING, ClockStart
+from crosscheck2d.reports.run.playing import LOADING, clocked
 from crosscheck2d.reports.run.pool import Failure, allow
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.run.stepping import Stepping
+from crosscheck2d.reports.run.stepping import step_through
 from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
 from crosscheck2d.reports.speed.causes import cause_of
 from crosscheck2d.reports.speed.effort import doublings
@@ -498,7 +498,7 @@ def play_part(part: Scored, purpose: str, bound: float, one: Attempt) -> Attempt
     """The attempt with its error in a part of the scene, and until when, s, it keeps the bound."""
     scenario, truth = part
     allow(LOADING)  # a kernel's first compilation is no time of an engine
-    run = play_once(one.make, one.name, scenario, one.dt, ClockStart())
+    run = play_once(one.make, one.name, scenario, one.dt, clocked())
     until = nan
     if run.trajectory is not None and len(run.trajectory) > 1:
         jumps = jumps_of(truth, scenario) if purpose == "energy" else None
@@ -548,7 +548,7 @@ def end_of(scene: str, seed: int, one: Attempt) -> tuple[str, bool]:
     fails in it; "" if neither; and whether it is a verdict."""
     scenario = open_scene(scene, seed)
     allow(LOADING)
-    run = play_once(one.make, one.name, scenario, one.dt, ClockStart())
+    run = play_once(one.make, one.name, scenario, one.dt, clocked())
     if run.status == "ok":
         failed = first_failed(run, scenario, scored(scene, seed).truth)
         return (f"{failed.text} at {failed.at:.3g} s", True) if failed else ("", False)
@@ -569,7 +569,7 @@ def times_of_whole(
     comes after the horizon of its exact answer may cost more than what comes before."""
     scenario = open_scene(scene, seed)
     what = [
-        Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
+        Timed(key, partial(step_through, make, scenario, key[1]), scenario.duration)
         for key, make in makes.items()
     ]
     return interleaved(what, ROUNDS, BUDGET, seed)

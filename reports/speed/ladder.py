@@ -4,6 +4,7 @@ another."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +15,7 @@ from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.verdicts import first_failed
 from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.run.stepping import Make, Stepping, overheads
+from crosscheck2d.reports.run.stepping import Make, overheads, step_through
 from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
 from crosscheck2d.reports.run.timing_pass import can
 from crosscheck2d.reports.speed.scored_part import scored
@@ -98,7 +99,7 @@ def times_of(
     """
     scenario = scored(scene, seed).scenario
     what = [
-        Timed(key, Stepping(make, scenario, key[1]), scenario.duration)
+        Timed(key, partial(step_through, make, scenario, key[1]), scenario.duration)
         for key, make in engines.items()
     ]
     for name, make in also.items():

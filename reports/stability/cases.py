@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from crosscheck2d.reports.stability.cases_alone import ALONE
-from crosscheck2d.reports.stability.cases_collisions import COLLISIONS
+from crosscheck2d.reports.stability.cases_few import ALONE, COLLISIONS
 from crosscheck2d.reports.stability.cases_friction import FRICTION
 from crosscheck2d.reports.stability.cases_gas import GAS
 from crosscheck2d.reports.stability.cases_stacks import STACKS
-from crosscheck2d.reports.stability.cases_suite import SUITE
 from crosscheck2d.reports.stability.limits import Case
+from crosscheck2d.reports.stability.vary import SUITE
 
 FAMILIES = {
     "One collision": COLLISIONS,

@@ -13,7 +13,7 @@ from math import ceil, hypot
 import numpy as np
 
 from crosscheck2d.reports.stability.limits import Case
-from crosscheck2d.reports.stability.predicates_friction import (
+from crosscheck2d.reports.stability.predicates import (
     CREEPS,
     FRICTION_OFF,
     ROLLING_OFF,

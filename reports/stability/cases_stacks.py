@@ -10,7 +10,7 @@ from numpy.random import default_rng
 from numpy.typing import ArrayLike
 
 from crosscheck2d.reports.stability.limits import RARELY, Case
-from crosscheck2d.reports.stability.predicates_crowds import (
+from crosscheck2d.reports.stability.predicates import (
     BURSTS,
     EJECTED,
     NOT_AT_REST,

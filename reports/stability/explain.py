@@ -1,32 +1,144 @@
 """Gives every limit its cause: the matching row of the table of reasons, or what was found by
 playing the failing run again.
 
-A reason is shown by the limit that it predicts, by the limit of a variant, by an intervention
-or by an ablation; a reason that nothing shows is called likely.
+A reason is shown by the limit that it predicts, by the limit of a variant, by an intervention (the
+failing run with one thing changed works), or by an ablation: the reference with only these
+mechanisms of the engine (`adapters/mechanisms/table.py`) works and fails at the same values. A
+reason that nothing shows is called likely.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatch
+from functools import partial
+from math import isnan
+from typing import Any, NamedTuple
 
-from crosscheck2d.reports.compare.causes import LATE, Cause, CauseKind, by_mechanisms
-from crosscheck2d.reports.stability.ablations import sufficient_mechanisms
-from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.interventions import (
-    FIRST,
-    SAYS_SO,
-    cause_by_replays,
-    intervention_of,
-    with_settings,
+import numpy as np
+
+from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.mechanisms.settings import find_remedy, settings_of, without_finer
+from crosscheck2d.adapters.mechanisms.table import (
+    MECHANISMS,
+    Mechanism,
+    mechanisms_of,
+    with_mechanisms,
 )
-from crosscheck2d.reports.stability.limits import NEVER_FAILS, Limit
+from crosscheck2d.reports.compare.causes import (
+    ACTS_AT_END,
+    LATE,
+    Cause,
+    CauseKind,
+    by_mechanisms,
+    unknown,
+)
+from crosscheck2d.reports.compare.faces import ALONG, first_on_line
+from crosscheck2d.reports.compare.verdicts import Verdict
+from crosscheck2d.reports.stability.cases import CASES
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, Case, Limit, LimitSearch
+from crosscheck2d.reports.stability.predicates import REFUSED, judge
+from crosscheck2d.reports.stability.predicates_usable import GHOST
 from crosscheck2d.reports.stability.reasons import LAWS, Reason, reason_of
-from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
+from crosscheck2d.reports.stability.vary import similar
+from crosscheck2d.scenarios.model import Array, Scenario, Scene
+from crosscheck2d.scenarios.truth.exact import with_oracle
 
 # the factor by which a prediction may be off: the width of the quick form's bracket; and collisions
 # are not all lost at one value
 NEAR = 1.05
+MOST = 300  # disks: the ablated reference tests all pairs
+# where an engine works nowhere, the reading of its ablation must be the same within this factor
+ALIKE = 2.0
+FINER = 8
+SAYS_SO = "the engine's message says so"
+
+
+def explained(limits: Sequence[Limit]) -> list[Limit]:
+    """The limits with their causes, each shown where that is possible: by the limit itself, or by
+    the limit of its variant. A search that was lost has none."""
+    by_name = {(limit.case, limit.engine): limit for limit in limits}
+    return [
+        replace(limit, cause=cause_of(limit, by_name)) if limit.status == "ok" else limit
+        for limit in limits
+    ]
+
+
+def cause_of(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause | None:
+    """Why it fails. A reason from the table that nothing else shows is replaced if an ablation
+    shows another cause."""
+    reason = reason_of(limit)
+    if reason is None:
+        varies = CASES[limit.case].varies if limit.case in CASES else limit.case.rpartition(":")[2]
+        return cause_by_replays(limit, varies)
+    law, shown = LAWS[reason.law], list[str]()
+    text, source = law.text, law.source
+    if predicted(limit, reason):
+        shown.append(f"predicts {reason.predicts:.4g}")
+    variant = reason.variant
+    variant = limit.engine + variant if variant.startswith("+") else variant
+    varied = by_name.get((limit.case, variant))
+    if varied and farther(varied, limit):
+        shown.append(f"{variant} gets farther")
+    if limit.refused:
+        shown.append(SAYS_SO)
+    if limit.mechanisms:
+        ablation = by_mechanisms(limit.mechanisms, limit.engine)
+        if law.mechanism in limit.mechanisms:
+            shown.append(ablation.shown)
+        elif law.mechanism == LATE:  # which every ablation has
+            text, source = f"{text}; {ablation.text}", f"{source}; {ablation.source}"
+            shown.append(ablation.shown)
+        elif not shown:
+            return ablation
+    return Cause(CauseKind.LAW, text, source, "; ".join(shown))
+
+
+def predicted(limit: Limit, reason: Reason) -> bool:
+    """Whether the limit that follows from the reason lies in the bracket, or outside by no more
+    than the factor `NEAR`."""
+    if reason.predicts is None:
+        return False
+    low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
+    return low / NEAR <= reason.predicts <= high * NEAR
+
+
+def farther(varied: Limit, limit: Limit) -> bool:
+    """Whether `varied` fails at a harsher value than the other, or not at all."""
+    if varied.verdict == NEVER_FAILS:
+        return limit.verdict != NEVER_FAILS
+    harsher = CASES[varied.case].harsher
+    return harsher * varied.fails_at > harsher * limit.fails_at
+
+
+def cause_by_replays(limit: Limit, varied: str) -> Cause | None:
+    """The cause of a failure that has none in the table, as what removes it shows; None if nothing
+    failed."""
+    failing = limit.failing
+    if failing is None:
+        return None
+    if limit.settings_help:
+        return Cause(CauseKind.SETTING, limit.settings, shown="works with it")
+    if limit.mechanisms:
+        return by_mechanisms(limit.mechanisms, limit.engine)
+    ghost = f"a {GHOST}: " * (failing.broken == GHOST)
+    if intervention := INTERVENTIONS.get(limit.intervention):
+        shown = f"works {intervention.how}"
+        if intervention.reason is None:
+            cause = unknown(shown, "the step is too large for something in it")
+            return cause._replace(text=ghost + cause.text)
+        return Cause(CauseKind.INTERVENTION, ghost + intervention.reason, shown=shown)
+    if failing.broken == REFUSED:
+        return Cause(CauseKind.REFUSAL, "the engine refuses it", shown=SAYS_SO)
+    tried = dict.fromkeys(
+        intervention.how
+        for name, intervention in INTERVENTIONS.items()
+        if name not in FIRST and intervention.fits(limit.engine, varied)
+    )
+    also = f"it also fails {', '.join(tried)}" if tried else ""
+    return unknown("", also, limit.settings)
 
 
 def with_replays(search: LimitSearch, limit: Limit) -> Limit:
@@ -56,61 +168,200 @@ def with_replays(search: LimitSearch, limit: Limit) -> Limit:
     return replace(limit, intervention=intervention_of(search, limit))
 
 
-def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their causes, each shown where that is possible: by the limit itself, or by
-    the limit of its variant. A search that was lost has none."""
-    by_name = {(limit.case, limit.engine): limit for limit in limits}
-    return [
-        replace(limit, cause=cause_of(limit, by_name)) if limit.status == "ok" else limit
-        for limit in limits
-    ]
+def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> tuple[str, ...]:
+    """The names of the smallest set of mechanisms with which the reference has the limit; `LATE`
+    if it needs none, () if no set has the limit or no ablation can be played.
+
+    Tried in this order: end-of-step detection alone; each mechanism alone (with those it acts
+    on); all mechanisms, from which those that are not needed are then removed.
+    """
+    ablations = Ablations.of(search, limit)
+    if ablations is None:
+        return ()
+    known = ablations.mechanisms
+    for alone in ([], *([*(x for x in known if x.name in one.on_top), one] for one in known)):
+        if ablations.alike(alone):
+            return tuple(base.name for base in alone) or (LATE,)
+    if not known or not ablations.alike(known):
+        return ()
+    return tuple(mechanism.name for mechanism in ablations.needed())
 
 
-def cause_of(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause | None:
-    """Why it fails. A reason from the table that nothing else shows is replaced if an ablation
-    shows another cause."""
-    reason = reason_of(limit)
-    if reason is None:
-        varies = CASES[limit.case].varies if limit.case in CASES else limit.case.rpartition(":")[2]
-        return cause_by_replays(limit, varies)
-    law, shown = LAWS[reason.law], ways_shown(limit, reason, by_name)
-    text, source = law.text, law.source
-    if limit.mechanisms:
-        ablation = by_mechanisms(limit.mechanisms, limit.engine)
-        if law.mechanism in limit.mechanisms:
-            shown.append(ablation.shown)
-        elif law.mechanism == LATE:  # which every ablation has
-            text, source = f"{text}; {ablation.text}", f"{source}; {ablation.source}"
-            shown.append(ablation.shown)
-        elif not shown:
-            return ablation
-    return Cause(CauseKind.LAW, text, source, "; ".join(shown))
+@dataclass(frozen=True)
+class Ablations:
+    """A case with the scenarios that fail and work next to a limit, the engine's mechanisms, and
+    the verdict on its failing run.
+
+    Attributes:
+        bad: the first run that failed.
+        good: all runs at the nearest value that works; empty if the engine works nowhere.
+    """
+
+    case: Case
+    bad: Scenario
+    good: list[Scenario]
+    mechanisms: list[Mechanism]
+    verdict: Verdict
+
+    @staticmethod
+    def of(search: LimitSearch, limit: Limit) -> Ablations | None:
+        """None if nothing failed, nothing was played, or the engine has no known mechanisms."""
+        failure, failing = search.failure(limit), limit.failing
+        name, _, variant = search.engine.partition("+")
+        if failure is None or failing is None or name not in MECHANISMS:
+            return None
+        (judged, run), scene = failure, search.case.scene
+        bad = scene(limit.fails_at, failing.first)
+        if run.trajectory is None or bad.scene.n > MOST:
+            return None
+        works = not isnan(limit.works_at)
+        good = [scene(limit.works_at, run) for run in range(failing.runs if works else 0)]
+        dt = bad.dt(bad.substeps[0])
+        known = [] if variant else mechanisms_of(name, run.settings, bad.scene, dt)
+        mechanisms = [mechanism for mechanism in known if mechanism.parameters]
+        verdict = judge(search.case.predicate, judged, run)
+        return Ablations(search.case, bad, good, mechanisms, verdict)
+
+    def needed(self) -> list[Mechanism]:
+        """The mechanisms that remain after removing, one after the other, each one without which
+        the ablation still has the limit."""
+        needed = self.mechanisms
+        for mechanism in self.mechanisms:
+            fewer = [x for x in needed if x is not mechanism and mechanism.name not in x.on_top]
+            needed = fewer if self.alike(fewer) else needed
+        return needed
+
+    def alike(self, mechanisms: Sequence[Mechanism]) -> bool:
+        """Whether the ablation fails as the engine does at the limit, and works where the engine
+        works."""
+        verdict = self.judge(self.bad, mechanisms)
+        if not verdict.failed or verdict.id != self.verdict.id:
+            return False
+        if self.good:
+            failed = sum(self.judge(scenario, mechanisms).failed for scenario in self.good)
+            return failed <= self.case.by_chance * len(self.good)
+        return 1 / ALIKE <= verdict.value / self.verdict.value <= ALIKE
+
+    def judge(self, scenario: Scenario, mechanisms: Sequence[Mechanism]) -> Verdict:
+        """The verdict of the predicate on the ablation's run or runs."""
+        ablation = DrivenEngine("reference:ablation", partial(with_mechanisms, mechanisms))
+        return judge(self.case.predicate, *self.case.play(ablation, scenario))
 
 
-def ways_shown(limit: Limit, reason: Reason, by_name: Mapping[tuple[str, str], Limit]) -> list[str]:
-    """What confirms the reason, apart from an ablation."""
-    shown = []
-    if predicted(limit, reason):
-        shown.append(f"predicts {reason.predicts:.4g}")
-    variant = reason.variant_of(limit.engine)
-    varied = by_name.get((limit.case, variant))
-    if varied and farther(varied, limit):
-        shown.append(f"{variant} gets farther")
-    return [*shown, SAYS_SO] if limit.refused else shown
+def finer(scenario: Scenario, times: int = FINER) -> Scenario:
+    """The same scene in steps that are shorter by this factor."""
+    return replace(scenario, substeps=(scenario.substeps[0] * times,))
 
 
-def predicted(limit: Limit, reason: Reason) -> bool:
-    """Whether the limit that follows from the reason lies in the bracket, or outside by no more
-    than the factor `NEAR`."""
-    if reason.predicts is None:
-        return False
-    low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
-    return low / NEAR <= reason.predicts <= high * NEAR
+def at_home(scenario: Scenario) -> Scenario:
+    """The same scene, moved along x so that its middle is at the origin."""
+    return similar(scenario, shift=-float(np.mean(scenario.scene.position[:, 0])))
 
 
-def farther(varied: Limit, limit: Limit) -> bool:
-    """Whether `varied` fails at a harsher value than the other, or not at all."""
-    if varied.verdict == NEVER_FAILS:
-        return limit.verdict != NEVER_FAILS
-    harsher = CASES[varied.case].harsher
-    return harsher * varied.fails_at > harsher * limit.fails_at
+def joined(scenario: Scenario) -> Scenario:
+    """The same scene with walls that touch on one line joined into one."""
+    walls, scene = list[Array](), scenario.scene
+    lines = np.array([first_on_line(scene.walls, w) for w in range(len(scene.walls))])
+    for line in np.unique(lines):
+        start, end = scene.walls[line]
+        way = end - start
+        spans = np.sort((scene.walls[lines == line] - start) @ way / (way @ way), axis=1)
+        spans = spans[spans[:, 0].argsort()]
+        reach = np.maximum.accumulate(spans[:, 1])
+        first = np.flatnonzero(np.append(True, spans[1:, 0] > reach[:-1] + ALONG))
+        last = np.append(first[1:], len(spans)) - 1
+        walls += [start + np.outer(pair, way) for pair in zip(spans[first, 0], reach[last])]
+    whole: Scene = replace(scene, walls=np.array(walls).reshape(-1, 2, 2))
+    return with_oracle(replace(scenario, scene=whole))
+
+
+class Intervention(NamedTuple):
+    """One change to a failing run.
+
+    Attributes:
+        engines, varied: patterns of engines and of what is varied, for which it is tried.
+        reason: why it failed, if it works with the change; None: that is not known.
+        how: the change in words.
+        change: what is done to the scene, if anything.
+        engine: the engine that plays it instead; "": the same.
+    """
+
+    engines: str
+    varied: str
+    reason: str | None
+    how: str
+    change: Callable[[Scenario], Scenario] | None = None
+    engine: str = ""
+
+    def fits(self, engine: str, varied: str) -> bool:
+        """Whether the change is tried for this engine and this parameter."""
+        return fnmatch(engine, self.engines) and fnmatch(varied, self.varied)
+
+
+PIECES = "the walls of one floor act as several; join them into one wall"
+FLOAT32 = "positions are float32, too coarse so far from the origin"
+TOO_LARGE = f"{ACTS_AT_END}, and the step is too large for that"
+UNSWEPT, EIGHTHS = "disks are not swept against each other", "in steps of an eighth"
+ORDERED, BULLETS = "reference:ordered", "box2d_v3:matched+bullets"
+INTERVENTIONS = {
+    "joined": Intervention("*", "*", PIECES, "on a floor of one wall", joined),
+    "at_home": Intervention("box2d*", "offset", FLOAT32, "at the origin", at_home),
+    "in_order": Intervention("reference:[el]*", "*", ACTS_AT_END, f"as {ORDERED}", engine=ORDERED),
+    # For matter a smaller step is ambiguous: its friction, its friction of the air and its resting
+    # threshold depend on the step, too.
+    "finer_matter": Intervention("matter:*", "[!d]*", None, EIGHTHS, finer),
+    "finer": Intervention("*", "[!d]*", TOO_LARGE, EIGHTHS, finer),
+    "swept": Intervention("box2d_v3:matched", "*", UNSWEPT, f"as {BULLETS}", engine=BULLETS),
+}
+"""In the order in which they are tried: changes of one thing only come first, a finer step comes
+later. The settings of the engine come after `FIRST`.
+
+Where the step itself is varied, a finer one is not tried.
+"""
+FIRST = ("joined",)
+
+
+def intervention_of(
+    search: LimitSearch, limit: Limit, names: Iterable[str] = tuple(INTERVENTIONS)
+) -> str:
+    """The first change of `names` with which the run that failed at the limit works; "" if none
+    does, or if nothing failed.
+
+    A refusal needs no other explanation.
+    """
+    failure = search.failure(limit)
+    if failure is None or failure[1].status == "unsupported":
+        return ""
+    for name in names:
+        intervention = INTERVENTIONS[name]
+        if intervention.fits(search.engine, search.case.varies):
+            change = intervention.change
+            scenario = change(failure[0]) if change else failure[0]
+            run = play_as(intervention.engine or search.engine, scenario)
+            if not judge(search.case.predicate, scenario, run).failed:
+                return name
+    return ""
+
+
+def with_settings(search: LimitSearch, limit: Limit) -> Limit:
+    """The limit with the settings of the engine with which the run that failed at it works, or with
+    those that do not help."""
+    failure = search.failure(limit)
+    if failure is None or failure[1].status == "unsupported" or "+" in search.engine:
+        return limit
+    scenario, predicate = failure[0], search.case.predicate
+
+    def error(parameters: Mapping[str, Any]) -> float:
+        chosen, steps = without_finer(parameters)
+        driven = DrivenEngine(search.engine, partial(row_of(search.engine).make, **chosen))
+        verdict = judge(predicate, *search.case.play(driven, finer(scenario, steps)))
+        share = abs(verdict.value) / (predicate.bound or 1.0)
+        if verdict.failed:
+            return share if share > 1.0 else np.inf
+        return float(np.fmin(share, 1.0))  # nan: there is nothing to judge
+
+    dt = scenario.dt(scenario.substeps[0])
+    remedy = find_remedy(settings_of(search.engine, scenario.scene, dt), error, bound=1.0)
+    helps = bool(remedy.settings) and remedy.after <= 1.0
+    words = remedy.sentence(search.engine) if helps else remedy._replace(settings=()).sentence("")
+    return replace(limit, settings=words, settings_help=helps)

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
-from crosscheck2d.reports.page.documents import environment
 from crosscheck2d.reports.page.drawing import Line, draw_lines, new_figure, svg_of
 from crosscheck2d.reports.page.kit import (
     Chart,
@@ -36,7 +35,6 @@ from crosscheck2d.reports.stability.limits import (
     Case,
     Limit,
 )
-from crosscheck2d.reports.stability.maps import MAPS, MapOf
 from crosscheck2d.reports.stability.overview import (
     MARKS,
     bracket,
@@ -47,15 +45,30 @@ from crosscheck2d.reports.stability.overview import (
     where_it_works,
     why,
 )
-from crosscheck2d.reports.stability.predicates import REFUSED
+from crosscheck2d.reports.stability.predicates import REFUSED, Predicate
 from crosscheck2d.reports.stability.results import StabilityResults, case_named
-from crosscheck2d.reports.stability.touching import AT_ONCE, GAPS, PAIRS, TOUCHING, AtGap, LawOf
+from crosscheck2d.reports.stability.tables import (
+    AT_ONCE,
+    GAPS,
+    MAPS,
+    PAIRS,
+    TOUCHING,
+    AtGap,
+    LawOf,
+    MapOf,
+)
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import put_text
 
 GENERATOR = "crosscheck stability"
 FITS = 12  # columns of the table of limits in the width of a page
 SHARES = (0.3, 1.0, 5.0, 100.0)  # of the bound of a map: where its colours begin
+CELLS = (
+    "Each cell shows the first value, from gentle to harsh, at which an engine fails: the"
+    " deeper the colour, the gentler that value. Below each name are the parameter that is"
+    " varied, and the step size dt and the radius R of the disks that move, if constant. A row"
+    " opens on its failing runs, their causes and all readings."
+)
 WHICH_LAW = (
     "When a disk strikes touching disks, mechanics does not determine the order of their"
     " collisions. There is no single right answer, so engines are not scored. The table names the"
@@ -139,10 +152,8 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
         case, of_engine = case_named(name), {limit.engine: limit for limit in members}
         label = name if name in FAMILY_OF else Path(name).name
         kept = ", ".join(f"{symbol} {value}" for symbol, value in held(case).items())
-        note = TableCell(
-            "; ".join(filter(None, [case.with_unit(case.parameter), kept])), css="soft"
-        )
-        index.append(TableCell(label, title=case.question, notes=(note,)))
+        note = "; ".join(filter(None, [case.with_unit(case.parameter), kept]))
+        index.append(TableCell(label, title=case.question, notes=(TableCell(note, css="soft"),)))
         rows.append([cell_of(case, of_engine.get(engine)) for engine in engines])
         groups.append(FAMILY_OF.get(name, "A scene of your own"))
         opens[label] = case_parts(case, members)
@@ -150,16 +161,10 @@ def limit_sections(limits: Sequence[Limit], names: Sequence[str]) -> list[Sectio
     frame = pd.DataFrame(rows, index=index, columns=heads, dtype=object)
     css = "fixed limits" if len(engines) <= FITS else "plain limits"
     marks = "; ".join(f"{mark}: {meaning}" for mark, meaning in MARKS.items())
-    says = (
-        "Each cell shows the first value, from gentle to harsh, at which an engine fails: the"
-        " deeper the colour, the gentler that value. Below each name are the parameter that is"
-        " varied, and the step size dt and the radius R of the disks that move, if constant. A row"
-        " opens on its failing runs, their causes and all readings."
-    )
     table = Table(frame, groups, opens=opens, css=css, corner="case", caption=f"{marks}.")
     return [
         Section("In short", parts=[Text(items=findings(limits))], id="summary"),
-        Section("Limits", says, [table], id="limits"),
+        Section("Limits", CELLS, [table], id="limits"),
     ]
 
 
@@ -169,34 +174,38 @@ def cell_of(case: Case, limit: Limit | None) -> TableCell:
         return TableCell("")
     if limit.verdict == NEVER_FAILS:
         return TableCell(in_words(limit), f"does not fail up to {number(limit.works_at)}", css="g0")
-    title = f"{limit.verdict}. {why(limit)}"
-    if limit.verdict == NEVER_WORKS or limit.status != "ok":
-        return TableCell(in_words(limit), title, css="bad")
-    gentler = sum(case.harsher * value < case.harsher * limit.fails_at for value in case.values)
-    depth = round(4 * (1 - gentler / len(case.values)))
-    return TableCell(in_words(limit), title, css=f"g{max(1, min(4, depth))}")
+    css = "bad"
+    if limit.verdict != NEVER_WORKS and limit.status == "ok":
+        gentler = sum(case.harsher * value < case.harsher * limit.fails_at for value in case.values)
+        css = f"g{max(1, min(4, round(4 * (1 - gentler / len(case.values)))))}"
+    return TableCell(in_words(limit), f"{limit.verdict}. {why(limit)}", css=css)
 
 
 def case_parts(case: Case, limits: Sequence[Limit]) -> list[Part]:
-    """What opens below the row of a case: its facts, its limits, their causes, the failing runs,
-    and all readings."""
-    replays = [(limit, replay_of(case, limit)) for limit in limits]
-    folds = [fold(limit, replay) for limit, replay in replays if replay]
-    return [
-        Text([Markup("<b>{}</b>").format(case.question), *facts(case)]),
-        limit_table(limits),
-        Text(items=causes(limits)),
-        *([Text([Markup("<b>The first runs that failed</b>"), *folds])] if folds else []),
-        readings(case, limits),
-    ]
+    """What opens below the row of a case: its facts, its limits, every cause once, the failing
+    runs, and all readings."""
+    engines: dict[tuple[str, str, str], list[str]] = {}
+    for limit in limits:
+        if limit.verdict != NEVER_FAILS:
+            source, shown = (limit.cause.source, limit.cause.shown) if limit.cause else ("", "")
+            engines.setdefault((why(limit), source, shown), []).append(limit.engine)
+    causes = []
+    for (text, source, shown), names in engines.items():
+        beside = "; ".join(filter(None, [source, f"tested: {shown}" if shown else ""]))
+        cause = Markup("<b>{}</b>: {} <small>{}</small>")
+        causes.append(cause.format(", ".join(names), text, beside))
+    asks = Text([Markup("<b>{}</b>").format(case.question), *facts(case)])
+    folds = [replay_of(case, limit) for limit in limits if limit.failing and limit.replay]
+    parts: list[Part] = [asks, limit_table(limits), Text(items=causes)]
+    if folds:
+        parts += [Text([Markup("<b>The first runs that failed</b>")]), *folds]
+    return [*parts, readings(case, limits)]
 
 
 def facts(case: Case) -> list[str]:
-    """What is varied, what failing is, how the report asks, and what is played."""
+    """What is varied, what failing is, what is played, and how the report asks."""
     predicate = case.predicate
     span = f"from {number(case.values[0])} to {number(case.values[-1])}"
-    unit = f" {predicate.unit}".replace(" 1", "")
-    fails = f"Fails: {predicate.name}, {predicate.means} (above {number(predicate.bound)}{unit})."
     runs = "Runs: one at each value; nothing in it is random"
     if case.runs > 1:
         runs = (
@@ -206,8 +215,17 @@ def facts(case: Case) -> list[str]:
         )
     if case.by_chance:
         runs += f"; one in {round(1 / case.by_chance)} may fail, as the result depends on the seed"
-    sentences = [f"Varied: {case.with_unit(case.parameter)}, {span}. {fails}", f"{runs}."]
+    sentences = [
+        f"Varied: {case.with_unit(case.parameter)}, {span}. Fails: {predicate.name},"
+        f" {predicate.means} ({above(predicate)}).",
+        f"{runs}.",
+    ]
     return [*sentences, f"In the report: {text}"] if (text := in_report(case)) else sentences
+
+
+def above(predicate: Predicate) -> str:
+    """Beyond which number a run fails."""
+    return f"above {number(predicate.bound)} {predicate.unit}".removesuffix(" 1")
 
 
 def limit_table(limits: Sequence[Limit]) -> Table:
@@ -230,59 +248,23 @@ def limit_table(limits: Sequence[Limit]) -> Table:
     return Table(frame, css="plain text stack", corner="engine", caption=caption)
 
 
-def causes(limits: Sequence[Limit]) -> list[Markup]:
-    """Every cause once, with its engines, its source and how it was shown."""
-    engines: dict[tuple[str, str, str], list[str]] = {}
-    for limit in limits:
-        if limit.verdict != NEVER_FAILS:
-            source, shown = (limit.cause.source, limit.cause.shown) if limit.cause else ("", "")
-            engines.setdefault((why(limit), source, shown), []).append(limit.engine)
-    items = []
-    for (text, source, shown), names in engines.items():
-        beside = "; ".join(filter(None, [source, f"tested: {shown}" if shown else ""]))
-        items.append(
-            Markup("<b>{}</b>: {} <small>{}</small>").format(", ".join(names), text, beside)
-        )
-    return items
-
-
-def fold(limit: Limit, replay: Playback) -> Markup:
-    """A replay that is drawn when it is opened."""
-    html = environment().get_template("page/kit_parts.html.j2").module.parts([replay])  # type: ignore[attr-defined]
-    return Markup("<details><summary>{}: {}</summary>{}</details>").format(
-        limit.engine, replay.label, html
-    )
-
-
-def replay_of(case: Case, limit: Limit) -> Playback | None:
-    """The first failing run at the limit; None if none was kept."""
-    failing = limit.failing
-    if failing is None or not limit.replay:
-        return None
-    label = f"{case.parameter} = {number(failing.value)}: {failing.event}"
+def replay_of(case: Case, limit: Limit) -> Section:
+    """The first failing run at the limit, folded."""
+    assert limit.failing is not None
+    label = f"{case.parameter} = {number(limit.failing.value)}: {limit.failing.event}"
     beside = EXACT if case.shown_with == EXACT else f"the same gas {case.shown_with}"
     caption = (
         "From just before the failure; at speed 1 all of it takes five seconds. In black:"
         f" {beside}, where there is one."
     )
-    return Playback(limit.replay, limit.ratio, label, caption)
+    replay = Playback(limit.replay, limit.ratio, label, caption)
+    return Section(limit.engine, label, [replay], folded=True)
 
 
 def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
     """The worst reading of every engine against the parameter, with the bound above which it fails;
     for a case that reads nothing else, the share of runs that failed."""
     predicate, lines = case.predicate, []
-    for limit in limits:
-        if predicate.bound:
-            trials = [t for t in limit.trials if isfinite(t.worst) and isfinite(t.value)]
-            y = [abs(trial.worst) or np.nan for trial in trials]  # 0 is nowhere on a log scale
-        else:
-            trials = [trial for trial in limit.trials if not trial.left and isfinite(trial.value)]
-            y = [trial.failed / trial.runs for trial in trials]
-        if len(trials) > 1:
-            lines.append(Line(limit.engine, [trial.value for trial in trials], y, limit.engine))
-    if not lines or not any(np.any(np.asarray(line.y) > 0) for line in lines):
-        return Text(["No engine reads more than 0 anywhere."])
     what = f"{predicate.name.capitalize()}, {predicate.unit}"
     caption = (
         f"The worst of the runs played at each value of {case.parameter}, harsher to the right."
@@ -295,6 +277,18 @@ def readings(case: Case, limits: Sequence[Limit]) -> Chart | Text:
             f"The share of the runs at each value of {case.parameter} that failed; harsher to the"
             " right. Values at which the quick form stopped at the first failing run are not drawn."
         )
+    for limit in limits:
+        trials = [trial for trial in limit.trials if isfinite(trial.value)]
+        if predicate.bound:
+            trials = [trial for trial in trials if isfinite(trial.worst)]
+            y = [abs(trial.worst) or np.nan for trial in trials]  # 0 is nowhere on a log scale
+        else:
+            trials = [trial for trial in trials if not trial.left]
+            y = [trial.failed / trial.runs for trial in trials]
+        if len(trials) > 1:
+            lines.append(Line(limit.engine, [trial.value for trial in trials], y, limit.engine))
+    if not lines or not any(np.any(np.asarray(line.y) > 0) for line in lines):
+        return Text(["No engine reads more than 0 anywhere."])
     figure, axes = new_figure(9.5, 3.6)
     if predicate.bound:
         axes.axhline(predicate.bound, color="#57626e", linestyle=":", linewidth=1.3)
@@ -309,41 +303,42 @@ def map_section(maps: Sequence[MapOf]) -> Section:
     engines = list(dict.fromkeys(result.engine for result in maps))
     drawn = {(result.engine, result.name): result for result in maps}
     names = [name for name in MAPS if any(result.name == name for result in maps)]
-    rows = [[map_count(drawn.get((engine, name))) for name in names] for engine in engines]
+    rows, opens = [], dict[str, list[Part]]()
+    for engine in engines:
+        results = [drawn.get((engine, name)) for name in names]
+        opens[engine] = [grid(result) for result in results if result and result.cells]
+        rows.append(
+            [
+                f"{sum(cell[3] for cell in result.cells)} of {len(result.cells)}"
+                if result and result.cells
+                else (result.status if result else "")
+                for result in results
+            ]
+        )
     frame = pd.DataFrame(rows, engines, names, dtype=object)
-    opens: dict[str, list[Part]] = {
-        engine: [
-            grid(drawn[engine, name])
-            for name in names
-            if (engine, name) in drawn and drawn[engine, name].cells
-        ]
-        for engine in engines
-    }
-    asks = [f"{name}: {MAPS[name].asks} {fails_where(name)}" for name in names]
+    asks = [
+        f"{name}: {MAPS[name].asks} An engine fails where {MAPS[name].predicate.means}:"
+        f" {above(MAPS[name].predicate)}."
+        for name in names
+    ]
     table = Table(frame, opens=opens, css="plain", corner="engine")
     says = "At how many of the values each engine fails. A row opens on its maps. An engine that"
     says += " has no such parameter has no number."
     return Section("Two parameters at once", says, [Text(items=asks), table], id="maps")
 
 
-def fails_where(name: str) -> str:
-    """What failing is in a map."""
-    predicate = MAPS[name].predicate
-    unit = f" {predicate.unit}".replace(" 1", "")
-    return f"An engine fails where {predicate.means}: above {number(predicate.bound)}{unit}."
-
-
-def map_count(result: MapOf | None) -> str:
-    """How many of the values of a map fail."""
-    if result is None or not result.cells:
-        return result.status if result else ""
-    return f"{sum(cell[3] for cell in result.cells)} of {len(result.cells)}"
-
-
 def grid(result: MapOf) -> Table:
-    """A map: a row for each y, from large to small, a column for each x."""
-    chart = MAPS[result.name]
-    at = {cell[:2]: map_cell(*cell[2:], chart.predicate.bound) for cell in result.cells}
+    """A map: a row for each y, from large to small, a column for each x; a reading is coloured by
+    its share of the bound."""
+    chart, at = MAPS[result.name], dict[tuple[float, float], TableCell]()
+    for x, y, value, failed, kind, event in result.cells:
+        happens = f"{kind}: {event}" if failed else ""
+        if isnan(value):
+            at[x, y] = TableCell("r" if kind == REFUSED else "!", happens, css="bad")
+        else:
+            depth = sum(value / chart.predicate.bound > share for share in SHARES)
+            title = "; ".join(filter(None, [number(value), happens]))
+            at[x, y] = TableCell("×" if failed else "", title, css=f"g{depth}")
     rows = [[at[x, y] for x in chart.x] for y in reversed(chart.y)]
     index = [number(y) for y in reversed(chart.y)]
     heads = [TableCell(number(x, 2)) for x in chart.x]
@@ -354,16 +349,6 @@ def grid(result: MapOf) -> Table:
     )
     frame = pd.DataFrame(rows, index, heads, dtype=object)
     return Table(frame, css="plain number", caption=caption)
-
-
-def map_cell(value: float, failed: bool, kind: str, event: str, bound: float) -> TableCell:
-    """A reading, coloured by its share of the bound."""
-    happens = f"{kind}: {event}" if failed else ""
-    if isnan(value):
-        return TableCell("r" if kind == REFUSED else "!", happens, css="bad")
-    depth = sum(value / bound > share for share in SHARES)
-    title = "; ".join(filter(None, [number(value), happens]))
-    return TableCell("×" if failed else "", title, css=f"g{depth}")
 
 
 def law_section(laws: Sequence[LawOf]) -> Section:
@@ -382,9 +367,8 @@ def law_section(laws: Sequence[LawOf]) -> Section:
     frame = pd.DataFrame(rows, [law.engine for law in ordered], heads, dtype=object)
     groups = [f"{law.name}: {TOUCHING[law.name].asks}" for law in ordered]
     sources = [f"{name}: {TOUCHING[name].source}." for name in dict.fromkeys(x.name for x in laws)]
-    table = Table(
-        frame, groups, [(TableCell("gap in radii"), len(GAPS))], css="plain", corner="engine"
-    )
+    spans = [(TableCell("gap in radii"), len(GAPS))]
+    table = Table(frame, groups, spans, css="plain", corner="engine")
     says = WHICH_LAW + " Point at a cell for its numbers."
     return Section("Touching disks: which law", says, [table, Text(items=sources)], id="touching")
 
@@ -395,10 +379,6 @@ def law_cell(at: AtGap) -> TableCell:
         return TableCell(at.law, css="bad")
     motion = "; ".join(f"({number(x, 2)}, {number(y, 2)})" for x, y in at.velocity)
     title = f"{number(at.off, 2)} off, energy {number(at.energy)}; leave with {motion}"
-    if at.law == PAIRS:
-        return TableCell("pairs", title)
-    return (
-        TableCell("at once", title, css="g1")
-        if at.law == AT_ONCE
-        else TableCell(f"energy {at.energy:.2f}", title, css="g3")
-    )
+    words = {PAIRS: ("pairs", ""), AT_ONCE: ("at once", "g1")}
+    word, css = words.get(at.law, (f"energy {at.energy:.2f}", "g3"))
+    return TableCell(word, title, css=css)

@@ -1,8 +1,7 @@
 """What "fails" means: a predicate reads one number off a run and has a bound above which the run
 fails. It gives a `Verdict`, the type of those on whole runs; bounds that both have are kept there.
 
-This file has the predicates of one collision and of one or two disks.
-"""
+This file has the predicates of one or two disks, of friction, stacks, piles and overlaps."""
 
 from __future__ import annotations
 
@@ -14,10 +13,19 @@ import numpy as np
 
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.verdicts import MOST_BOUNCE, Verdict
-from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
+from crosscheck2d.reports.compare.verdicts import (
+    MOST_BOUNCE,
+    MOST_JITTER,
+    MOST_RESIDUAL,
+    MOST_SINKING,
+    SETTLED,
+    Verdict,
+    own_speed,
+)
+from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
 REFUSED = "refused"
+MOST_SPEED = 10.0  # radii/s
 
 
 class Predicate(NamedTuple):
@@ -196,6 +204,119 @@ def apexes(scenario: Scenario, played: Trajectory) -> Array:
     return heights
 
 
+def friction_off(scenario: Scenario, played: Trajectory) -> Verdict:
+    """The impulse of friction is not that of Coulomb's law."""
+    true, scene = truth_of(scenario), scenario.scene
+    impulse, expected = friction_impulses(played, scene), friction_impulses(true, scene)
+    off = np.abs(impulse - expected) / np.abs(expected)
+    way, disk = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(off), off, -1))), off.shape)
+    share = impulse[way, disk] / expected[way, disk] + 0.0
+    what = ("speed along the surfaces", "spin")[way]
+    event = f"friction changes the {what} of disk {disk} by {share:.3g} times the right amount"
+    return read(off[way, disk], true.collisions.t[0], event, int(disk))
+
+
+def friction_impulses(trajectory: Trajectory, scene: Scene) -> Array:
+    """(2, n) N s of friction from start to end, once from the disks' velocities (m dv) and once
+    from their spins (I dw / r). The two have the same size if friction acts at the rim. Along the
+    contact: the floor, or between two disks side by side."""
+    tangent = np.array([1.0, 0.0] if len(scene.walls) else [0.0, 1.0])
+    dv = (trajectory.velocity[-1] - trajectory.velocity[0]) @ tangent
+    dw = trajectory.angular_velocity[-1] - trajectory.angular_velocity[0]
+    return np.array([scene.mass * dv, scene.inertia * dw / scene.radius])
+
+
+def rolling_off(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk does not roll at the right speed after it has slid."""
+    scene = scenario.scene
+    speed, rim = (
+        np.stack([each.velocity[:, 0, 0], -scene.radius[0] * each.angular_velocity[:, 0]])
+        for each in (played, truth_of(scenario))
+    )
+    off = np.abs(speed - rim).max(axis=0) / np.abs(scene.velocity[0, 0])
+    moves, turns = speed[:, -1] / rim[:, -1]
+    event = f"it moves at {moves:.4g}, and its rim at {turns:.4g}, of the speed of rolling"
+    return read(off[-1], first_above(played.t, off, ROLLING_OFF.bound), event)
+
+
+def slips(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk slips on a slope on which it should roll."""
+    along = played.velocity[1:, 0, 0]
+    slip = along + scenario.scene.radius[0] * played.angular_velocity[1:, 0]
+    share = np.abs(slip) / np.where(along, np.abs(along), np.nan)
+    at = first_above(played.t[1:], share, SLIPS.bound)
+    return read(share[-1], at, f"the rim slips at {share[-1]:.3g} of the speed of the disk")
+
+
+def creeps(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk at rest moves or turns after the first tenth of the run."""
+    first = int(np.ceil(SETTLED * (len(played) - 1)))
+    x, turned = played.position[:, 0], played.angle[:, 0]
+    radius = scenario.scene.radius[0]
+    moved = np.hypot(*(x - x[first]).T) / radius + np.abs(turned - turned[first])
+    moved[:first] = 0.0
+    return largest(played.t, moved, CREEPS.bound, f"it has moved by {moved.max():.3g} radii")
+
+
+def fastest(played: Trajectory, scene: Scene) -> Array:
+    """(k,) radii/s."""
+    speed: Array = (laws.lengths(played.velocity) / scene.radius).max(axis=1)
+    return speed
+
+
+def stands(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk sinks by 0.1 radii, or jitters at 0.02 sqrt(g R)."""
+    half, moved = len(played) // 2, laws.lengths(played.position - played.position[0])
+    radii = (moved / scenario.scene.radius).max(axis=1)
+    worst = int(np.argmax(moved[-1]))
+    event = f"disk {worst} has moved by {radii.max():.3g} radii"
+    speed = laws.lengths(played.velocity[half:]) / own_speed(scenario)
+    jitter = float(np.sqrt((speed**2).mean(axis=1)).mean())
+    says = f"jitters at {jitter:.3g} sqrt(g R)"
+    return worst_of(
+        [
+            largest(played.t, radii, MOST_SINKING, event, worst, "sinks"),
+            read(jitter / MOST_JITTER, played.t[half], says, None, "jitters"),
+        ]
+    )
+
+
+def ejected(scenario: Scenario, played: Trajectory) -> Verdict:
+    """Two disks that start at rest separate at a speed."""
+    speed = fastest(played, scenario.scene)
+    at = first_above(played.t, speed, EJECTED.bound)
+    return read(speed[-1], at, f"the disks separate at {speed[-1]:.3g} radii/s")
+
+
+def still_overlaps(scenario: Scenario, played: Trajectory) -> Verdict:
+    """An overlap is left after a second."""
+    overlap = float(laws.penetration(played, scenario.scene)[-1])
+    return read(overlap, played.t[-1], f"an overlap of {overlap:.3g} radii is left")
+
+
+def bursts(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk leaves the box, or flies at 10 radii/s."""
+    walls, x = scenario.scene.walls, played.position
+    low, high = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
+    outside = ((x < low) | (x > high)).any(axis=2).sum(axis=1)
+    speed, out = fastest(played, scenario.scene), f"{outside.max()} disks are out of the box"
+    flies = f"a disk flies at {speed.max():.3g} radii/s"
+    return worst_of(
+        [
+            largest(played.t, outside, 0.5, out, None, "escape"),
+            largest(played.t, speed, MOST_SPEED, flies, None, "energy"),
+        ]
+    )
+
+
+def not_at_rest(scenario: Scenario, played: Trajectory) -> Verdict:
+    """A disk that should be at rest moves."""
+    late = played.velocity[-max(1, len(played) // 10) :]
+    speed = np.sqrt((late**2).sum(axis=2).mean(axis=1)) / own_speed(scenario)
+    event = f"still moves at {speed.max():.3g} sqrt(g R)"
+    return read(speed.max(), played.t[-len(late)], event, None)
+
+
 COLLISIONS_MISSED = Predicate("collisions missed", "collisions", 0.0, collisions_missed)
 COLLISIONS_SPURIOUS = Predicate("spurious collisions", "of the speed", 1e-3, collisions_spurious)
 RESTITUTION_OFF = Predicate("restitution off", "1", 0.01, restitution_off)
@@ -205,3 +326,12 @@ SCALED_DEVIATION = Predicate("deviation", "radii", 0.25, scaled_deviation)
 ANGLE_OFF = Predicate("angle off", "of the angle", 0.02, angle_off)
 BOUNCES_OFF = Predicate("bounce off", "of the height", MOST_BOUNCE, bounce_off)
 SPRING_GROWS = Predicate("spring grows", "doublings of energy", 1.0, spring_grows)
+FRICTION_OFF = Predicate("friction off", "of the impulse", 0.1, friction_off)
+ROLLING_OFF = Predicate("rolling off", "of the start speed", 0.01, rolling_off)
+SLIPS = Predicate("slips", "of the speed", 0.05, slips)
+CREEPS = Predicate("creeps", "radii", 0.01, creeps)
+STANDS = Predicate("does not stand", "of the bound", 1.0, stands)
+EJECTED = Predicate("ejected", "radii/s", 0.1, ejected)
+STILL_OVERLAP = Predicate("still overlap", "radii", 0.02, still_overlaps)
+BURSTS = Predicate("bursts", "of the bound", 1.0, bursts)
+NOT_AT_REST = Predicate("not at rest", "sqrt(g R)", MOST_RESIDUAL, not_at_rest)

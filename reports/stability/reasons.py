@@ -237,16 +237,8 @@ class Reason(NamedTuple):
 
     def fits(self, limit: Limit) -> bool:
         """Whether the row is about this case and this engine."""
-        return matches(limit.case, self.cases) and matches(limit.engine, self.engines)
-
-    def variant_of(self, engine: str) -> str:
-        """The name of `variant` for an engine that has the reason."""
-        return engine + self.variant if self.variant.startswith("+") else self.variant
-
-
-def matches(name: str, patterns: str) -> bool:
-    """Whether a name fits one of the patterns."""
-    return any(fnmatch(name, pattern) for pattern in patterns.split())
+        pairs = (limit.case, self.cases), (limit.engine, self.engines)
+        return all(any(fnmatch(name, p) for p in patterns.split()) for name, patterns in pairs)
 
 
 def growth_limit(share: float) -> float:

@@ -1,46 +1,51 @@
 """Carries out the stability report: every case on every engine, a row for each as it
-ends, and the table of limits."""
+ends, the replay of its failing run, and the table of limits."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from contextlib import closing, suppress
+from dataclasses import asdict, astuple, dataclass, replace
 from functools import partial
 from math import nan
-from time import process_time
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
+from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.page.replay import COLLISIONS, pack_layers, ratio_of
 from crosscheck2d.reports.run.cells import content_key, source_hash
 from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.run.made import digest_of
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.store import Store
+from crosscheck2d.reports.run.trajectories import STATE
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import explained, with_replays
-from crosscheck2d.reports.stability.failures import with_failure
 from crosscheck2d.reports.stability.limits import (
     FORMS,
     FULL,
     NEVER_WORKS,
     Case,
     Limit,
+    LimitSearch,
     Trial,
     engines_of,
 )
-from crosscheck2d.reports.stability.maps import MAPS, MapOf, map_of
-from crosscheck2d.reports.stability.search import LimitSearch
-from crosscheck2d.reports.stability.touching import TOUCHING, LawOf, law_of
+from crosscheck2d.reports.stability.tables import MAPS, TOUCHING, LawOf, MapOf, law_of, map_of
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY, taking_part
 from crosscheck2d.reports.stability.vary import case_of_file
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.model import Collisions, Scenario, Trajectory, frozen
+from crosscheck2d.scenarios.no_truth import NoTruth
 
 COLUMNS = (
     *("engine", "profile", "case", "parameter", "works_at", "fails_at", "unit", "predicate"),
@@ -69,20 +74,27 @@ OTHERS = 0.16
 FULL_TIMES = 5  # the time of the full form over that of the quick one: 71 searches in both
 # the first in the full form, where they are the longest; in the quick form they are short
 LONGEST = ("long_gas", "long_wrapped_gas")
+BEFORE, AFTER = 120, 40  # samples of a failure that are shown
+REPLAY = 5.0  # s that a replay lasts
+Result = Limit | MapOf | LawOf
+RESULTS: dict[str, TypeAdapter[Any]] = {
+    "limit": TypeAdapter(Limit),
+    "map": TypeAdapter(MapOf),
+    "law": TypeAdapter(LawOf),
+}
+"""Kind of a row -> the type of its value."""
 
 
 @dataclass(frozen=True)
 class StabilityPlan:
-    """What was asked for: names of `CASES` or FILE.toml:vary, of `MAPS`, `TOUCHING` and
+    """What was asked for: `names` of `CASES`, FILE.toml:vary, `MAPS` and `TOUCHING`, engines of
     `ENGINES`, and a key of `FORMS`."""
 
-    cases: Sequence[str]
-    maps: Sequence[str]
-    touching: Sequence[str]
+    names: Sequence[str]
     engines: Sequence[str]
     form: str
-    workers: int
-    command: str
+    workers: int = 1
+    command: str = ""
 
     @property
     def added(self) -> dict[str, EngineRow]:
@@ -104,9 +116,45 @@ class StabilityPlan:
         """The key of the row of a task: a hash of all that decides its result."""
         path = task.name.rpartition(":")[0]
         row = self.added.get(task.engine)
-        own = row.source if row is not None else ""
-        what = repr(task), repr(self.versions), digest_of(path) if path else "", own
-        return content_key(*what, source_hash(SOURCE))
+        what = repr(task), repr(self.versions), digest_of(path) if path else ""
+        return content_key(*what, row.source if row else "", source_hash(SOURCE))
+
+    def tasks(self) -> list[Task]:
+        """All tasks, the slowest first, so that no long one is left at the end."""
+        smooth = [name for name in self.engines if name not in WITH_FRICTION_ONLY]
+        tasks = []
+        for name in self.names:
+            if name in MAPS or name in TOUCHING:
+                only = MAPS[name].only if name in MAPS else ()
+                engines = [engine for engine in smooth if not only or engine in only]
+            else:
+                among = engines_of(case_named(name), ENGINES)
+                engines = [engine for engine in among if engine.split("+")[0] in self.engines]
+            tasks += [Task(name, engine, self.form) for engine in engines]
+        return sorted(
+            tasks, key=lambda task: (task.name not in LONGEST, -SECONDS.get(task.name, 0.0))
+        )
+
+    def done_before(self, store: Store) -> set[Task]:
+        """The tasks that have a row and ended well."""
+        rows = {task: store.get(task.kind, self.key(task)) for task in self.tasks()}
+        return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
+
+    def carry_out(self, store: Store, progress: Progress) -> None:
+        """Do every task that has no row yet, and write the row of each as it ends."""
+        keys, done = {task: self.key(task) for task in self.tasks()}, self.done_before(store)
+        header = about(self.command, 0) | {"versions": self.versions, "form": self.form}
+        store.put(*HEADER, header | {"tasks": [(key, astuple(task)) for task, key in keys.items()]})
+        work: dict[Any, Callable[[], Any]] = {
+            task: partial(task, self.added) for task in keys if task not in done
+        }
+        progress.start(len(work), len(keys))
+        with closing(run_all(work, self.workers, FORMS[self.form].timeout)) as results:
+            for task, result in results:
+                reason = result.reason if isinstance(result, Failure) else ""
+                row = failed(task, result) if isinstance(result, Failure) else result
+                store.put(task.kind, keys[task], asdict(row))
+                progress.done(f"{task.name}  {task.engine}", row.status, reason)
 
 
 @dataclass(frozen=True)
@@ -114,20 +162,24 @@ class Task:
     """A case, a map or a scene of touching disks on one engine; tasks do not depend on each
     other."""
 
-    kind: str
     name: str
     engine: str
     form: str
 
-    def __call__(self, added: Mapping[str, EngineRow]) -> Limit | MapOf | LawOf:
-        """In the worker: do it, with the rows that the plan adds among the others."""
+    @property
+    def kind(self) -> str:
+        """Of its row."""
+        return "map" if self.name in MAPS else "law" if self.name in TOUCHING else "limit"
+
+    def __call__(self, added: Mapping[str, EngineRow]) -> Result:
+        """In the worker: do it, with the rows that the plan adds among the others. A limit comes
+        with its cause and its replay."""
         with taking_part(added):
-            if self.kind == "limit":
-                return found_limit(self)
-            if self.kind == "law":
-                return law_of(self.name, self.engine)
-            started = process_time()
-            return replace(map_of(self.name, self.engine), seconds=process_time() - started)
+            if self.kind != "limit":
+                return (map_of if self.kind == "map" else law_of)(self.name, self.engine)
+            search = LimitSearch(case_named(self.name), self.engine, FORMS[self.form])
+            limit = replace(search.limit(), case=self.name)
+            return with_failure(search, with_replays(search, limit))
 
 
 def case_named(name: str) -> Case:
@@ -140,88 +192,84 @@ def expected(tasks: Collection[Task], workers: int) -> str:
     searches = [task for task in tasks if task.kind == "limit"]
     cases = {task.name for task in searches}
     engines = {task.engine.partition("+")[0] for task in searches}
+    whole = any(task.form == FULL.name for task in tasks)
     seconds = sum(SECONDS.get(task.name, OTHERS) for task in tasks) / workers
+    minutes = max(1, round(seconds * (FULL_TIMES if whole else 1) / 60))
     parts = [
         f"{counted(len(searches), 'search', 'searches')} ({counted(len(cases), 'case')},"
-        f" {counted(len(engines), 'engine')})",
-        counted(len(tasks) - len(searches), "other table"),
+        f" {counted(len(engines), 'engine')})"
     ]
-    times = FULL_TIMES if any(task.form == FULL.name for task in tasks) else 1
-    minutes = max(1, round(seconds * times / 60))
-    least = "at least" if times > 1 else "about"
+    if len(tasks) > len(searches):
+        parts.append(counted(len(tasks) - len(searches), "other table"))
     return (
-        f"{' and '.join(parts if len(tasks) > len(searches) else parts[:1])}: {least}"
-        f" {counted(minutes, 'minute')} in {counted(workers, 'process', 'processes')}"
+        f"{' and '.join(parts)}: {'at least' if whole else 'about'} {counted(minutes, 'minute')}"
+        f" in {counted(workers, 'process', 'processes')}"
     )
 
 
-def found_limit(task: Task) -> Limit:
-    """Search, and explain the first failing run at the limit."""
-    started = process_time()
-    search = LimitSearch(case_named(task.name), task.engine, FORMS[task.form])
-    limit = with_replays(search, replace(search.limit(), case=task.name))
-    limit = with_failure(search, limit)
-    return replace(limit, seconds=process_time() - started)
-
-
-def done_before(plan: StabilityPlan, store: Store) -> set[Task]:
-    """The tasks of the plan that have a row and ended well."""
-    rows = {task: store.get(task.kind, plan.key(task)) for task in tasks_of(plan)}
-    return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
-
-
-def carry_out(plan: StabilityPlan, store: Store, progress: Progress) -> None:
-    """Do every task that has no row yet, and write the row of each as it ends."""
-    tasks, done = {task: plan.key(task) for task in tasks_of(plan)}, done_before(plan, store)
-    header = about(plan.command, 0) | {"versions": plan.versions, "form": plan.form}
-    wanted = [(key, asdict(task)) for task, key in tasks.items()]
-    store.put(*HEADER, header | {"tasks": wanted})
-    work: dict[Any, Callable[[], Any]] = {
-        task: partial(task, plan.added) for task in tasks if task not in done
-    }
-    progress.start(len(work), len(tasks))
-    with closing(run_all(work, plan.workers, FORMS[plan.form].timeout)) as results:
-        for task, result in results:
-            reason = result.reason if isinstance(result, Failure) else ""
-            result = failed(task, result) if isinstance(result, Failure) else result
-            store.put(task.kind, tasks[task], asdict(result))
-            progress.done(f"{task.name}  {task.engine}", result.status, reason)
-
-
-def tasks_of(plan: StabilityPlan) -> list[Task]:
-    """All tasks, the slowest first, so that no long one is left at the end."""
-    smooth = [name for name in plan.engines if name not in WITH_FRICTION_ONLY]
-    tasks = [
-        Task("map", name, engine, plan.form)
-        for name in plan.maps
-        for engine in MAPS[name].engines(smooth)
-    ]
-    tasks += [Task("law", name, engine, plan.form) for name in plan.touching for engine in smooth]
-    for name in plan.cases:
-        tasks += [
-            Task("limit", name, engine, plan.form)
-            for engine in engines_of(case_named(name), ENGINES)
-            if engine.split("+")[0] in plan.engines
-        ]
-    return sorted(tasks, key=lambda task: (task.name not in LONGEST, -SECONDS.get(task.name, 0.0)))
-
-
-def failed(task: Task, failure: Failure) -> Limit | MapOf | LawOf:
+def failed(task: Task, failure: Failure) -> Result:
     """The result of a task whose worker died or was stopped."""
-    if task.kind == "map":
-        return MapOf(task.name, task.engine, (), status=failure.status)
-    if task.kind == "law":
-        return LawOf(task.name, task.engine, (), status=failure.status)
+    if task.kind != "limit":
+        return (MapOf if task.kind == "map" else LawOf)(
+            task.name, task.engine, (), status=failure.status
+        )
     event = f"{failure.status}: {failure.reason}"
-    trial = Trial(nan, 1, 1, nan, 0, nan, event, failure.status)
-    return Limit(
-        task.name, task.engine, task.form, NEVER_WORKS, nan, nan, (trial,), status=failure.status
-    )
+    trials = (Trial(nan, 1, 1, nan, 0, nan, event, failure.status),)
+    names = task.name, task.engine, task.form
+    return Limit(*names, NEVER_WORKS, nan, nan, trials, status=failure.status)
+
+
+def with_failure(search: LimitSearch, limit: Limit) -> Limit:
+    """The limit with the replay of its first failing run, from a tenth of the shown time before the
+    failure, and the trajectory that is shown with it, if there is one."""
+    failing, failure = limit.failing, search.failure(limit)
+    if failing is None or failure is None or failure[1].trajectory is None:
+        return limit
+    scenario, run = failure
+    samples, trajectories = near(failing, scenario), [failure[1].trajectory]
+    with suppress(NoTruth):
+        if scenario.truth is not None:
+            trajectories.append(scenario.truth(scenario.times))
+    engine, profile = limit.engine.split(":")
+    runs = Run(engine, profile, limit.case, run.dt), None
+    parts = [part_of(trajectory, samples, scenario) for trajectory in trajectories]
+    layers = [(run, part) for run, part in zip(runs, parts) if len(part)]
+    first, last = (float(scenario.times[k]) for k in (samples[0], samples[-1]))
+    at = min(max(failing.at, first), last) if np.isfinite(failing.at) else first
+    opening = {
+        "opens": max(first, at - max(0.1 * (last - first), 1.5 * scenario.sample_interval)),
+        "pace": (last - first) / REPLAY,
+        "event": {"t": at, "disk": failing.disk},
+    }
+    pack = pack_layers(scenario, layers, samples, opening)
+    return replace(limit, replay=pack, ratio=ratio_of(scenario, layers))
+
+
+def near(failing: Trial, scenario: Scenario) -> NDArray[np.int64]:
+    """The samples around the failure, up to `BEFORE` before and `AFTER` after it; if the failure
+    is early or late in the run, more from the other side."""
+    at = failing.at if np.isfinite(failing.at) else 0.0
+    middle = int(np.clip(round(at / scenario.sample_interval), 0, scenario.intervals))
+    first = max(0, min(middle - BEFORE, scenario.intervals - BEFORE - AFTER))
+    return np.arange(first, min(scenario.intervals, first + BEFORE + AFTER) + 1)
+
+
+def part_of(whole: Trajectory, shown: NDArray[np.int64], scenario: Scenario) -> Trajectory:
+    """A trajectory at those of the samples `shown` that it has, and the collisions between them,
+    if they are few enough to show."""
+    first, last = shown[0], shown[-1]
+    state: dict[str, Any] = {n: frozen(getattr(whole, n)[first : last + 1]) for n in ("t", *STATE)}
+    collisions = whole.collisions
+    low, high = (k * scenario.sample_interval for k in (first - 0.5, last + 0.5))
+    among = (collisions.t >= low) & (collisions.t <= high)
+    among &= among.sum() <= COLLISIONS
+    columns = [getattr(collisions, name)[among] for name in ("t", "i", "j", "impulse")]
+    return replace(whole, **state, collisions=Collisions(*columns))
 
 
 class StabilityResults(NamedTuple):
-    """All that was found: the limits with their reasons, the maps, the laws of touching disks, and
-    the header."""
+    """All that was found, in reading order: the limits with their reasons, the maps, the laws of
+    touching disks, and the header."""
 
     limits: list[Limit]
     maps: list[MapOf]
@@ -229,56 +277,31 @@ class StabilityResults(NamedTuple):
     header: dict[str, Any]
 
     @property
-    def all(self) -> list[Limit | MapOf | LawOf]:
+    def all(self) -> list[Result]:
         """The result of every task."""
         return [*self.limits, *self.maps, *self.laws]
 
 
 def read(store: Store) -> StabilityResults:
-    """The stability report in a folder, in reading order."""
+    """The stability report in a folder."""
     plan = store.get(*HEADER)
     assert plan is not None
-    made: dict[str, Callable[[Any], Limit | MapOf | LawOf]] = {
-        "limit": limit_from,
-        "map": MapOf.from_record,
-        "law": LawOf.from_record,
-    }
-    results: dict[Task, Limit | MapOf | LawOf] = {}
-    for key, wanted in plan.value["tasks"]:
-        task = Task(**wanted)
-        if row := store.get(task.kind, key):
-            results[task] = made[task.kind](row.value)
-    order = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
-    engines = engines_now()
-
-    def place(task: Task) -> tuple[int, str, int]:
-        return order.get(task.name, len(order)), task.name, engines.index(task.engine)
-
-    ordered = [results[task] for task in sorted(results, key=place)]
-    limits = explained([result for result in ordered if isinstance(result, Limit)])
-    maps = [result for result in ordered if isinstance(result, MapOf)]
-    laws = [result for result in ordered if isinstance(result, LawOf)]
-    return StabilityResults(limits, maps, laws, plan.value)
-
-
-def engines_now() -> list[str]:
-    """The engines of all cases in reading order, with those of the plan."""
-    return list(
-        dict.fromkeys(engine for case in CASES.values() for engine in engines_of(case, ENGINES))
+    names = {name: k for k, name in enumerate([*CASES, *MAPS, *TOUCHING])}
+    engines = list(dict.fromkeys(e for case in CASES.values() for e in engines_of(case, ENGINES)))
+    tasks = [(Task(*task), key) for key, task in plan.value["tasks"]]
+    tasks.sort(
+        key=lambda pair: (
+            names.get(pair[0].name, len(names)),
+            pair[0].name,
+            engines.index(pair[0].engine),
+        )
     )
-
-
-def limit_from(record: dict[str, Any]) -> Limit:
-    """The limit in the value of a row."""
-    trials = (Trial(**trial | floats(trial, "value", "worst", "at")) for trial in record["trials"])
-    numbers = floats(record, "works_at", "fails_at", "spacing", "seconds", "ratio")
-    whole = {"trials": tuple(trials), "mechanisms": tuple(record["mechanisms"])}
-    return Limit(**record | numbers | whole)
-
-
-def floats(record: Mapping[str, Any], *names: str) -> dict[str, float]:
-    """These fields of a record as numbers; other fields may hold the text "nan"."""
-    return {name: float(record[name]) for name in names}
+    results: dict[str, list[Any]] = {kind: [] for kind in RESULTS}
+    for task, key in tasks:
+        if row := store.get(task.kind, key):
+            results[task.kind].append(RESULTS[task.kind].validate_python(row.value))
+    limits, maps, laws = results.values()
+    return StabilityResults(explained(limits), maps, laws, plan.value)
 
 
 def table(limits: Sequence[Limit]) -> pd.DataFrame:

@@ -25,26 +25,21 @@ class DrivenEngine(NamedTuple):
     change: str = ""
 
 
-class ChangedOnceLoaded:
-    """An engine with one thing changed right after `load`; all other calls are passed on."""
-
-    def __init__(self, engine: Engine, change: Callable[[Any], None]) -> None:
-        self.engine, self.change = engine, change
-
-    def load(self, scene: Scene, dt: float) -> None:
-        """Load the scene into the engine, then apply the change."""
-        self.engine.load(scene, dt)
-        self.change(self.engine)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.engine, name)
-
-
 def make_variant(name: str, variant: str) -> Any:
-    """The engine of a row of `ENGINES`, changed as one of the row's variants says."""
+    """The engine of a row of `ENGINES`, changed as one of the row's variants says: at once, and
+    right after `load`."""
     settings, _, loaded = ENGINES[name].variants[variant]
-    engine = changed(name, **settings)
-    return ChangedOnceLoaded(engine, loaded) if loaded else engine
+    engine: Any = changed(name, **settings)
+    if loaded is None:
+        return engine
+    load, change = engine.load, loaded
+
+    def load_and_change(scene: Scene, dt: float) -> None:
+        load(scene, dt)
+        change(engine)
+
+    engine.load = load_and_change
+    return engine
 
 
 def with_variant(variant: str) -> tuple[str, ...]:

@@ -1,4 +1,5 @@
-"""A case from a user's scene file: the scene, and one quantity of it that is varied."""
+"""Cases of whole scenes: the largest usable dt of every scenario of the suite, and one quantity of
+a user's scene file that is varied."""
 
 from __future__ import annotations
 
@@ -6,19 +7,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.stability.cases_suite import dense_ladder, in_steps, ladder
 from crosscheck2d.reports.stability.limits import Case
 from crosscheck2d.reports.stability.predicates_usable import USABLE
 from crosscheck2d.reports.stability.variants import WITH_FRICTION_ONLY
+from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import (
     Array,
-    Collisions,
     Scenario,
     Scene,
     Thrust,
@@ -27,14 +27,73 @@ from crosscheck2d.scenarios.model import (
 )
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
+MOST_SAMPLES = 300  # samples at most
+LONG = 2e4  # steps of a disk
+SEEDS = 4  # runs at a value of a random scene
+
+
+def in_steps(whole: Scenario, dt: float) -> Scenario:
+    """The scenario with a step as near to `dt` s as its duration allows, sampled at most
+    `MOST_SAMPLES` times."""
+    steps = max(1, round(whole.duration / dt))
+    every = -(-steps // MOST_SAMPLES)
+    samples = -(-steps // every)
+    return replace(whole, sample_interval=whole.duration / samples, substeps=(every,))
+
+
+def at_dt(name: str, x: float, run: int) -> Scenario:
+    """x = dt in s; the seed is the number of the run."""
+    return in_steps(scenario(name, run), x)
+
+
+def ladder(one: Scenario, an_octave: int = 1) -> tuple[float, ...]:
+    """Step sizes in s, a fixed number for each factor of two, from an eighth of the sample
+    interval to a tenth of the duration."""
+    steps = [one.sample_interval * 2.0 ** (k / an_octave - 3) for k in range(23 * an_octave)]
+    return tuple(dt for dt in steps if dt <= one.duration / 10)
+
+
+def dense_ladder(one: Scenario) -> tuple[float, ...]:
+    """Step sizes in s, as `ladder`, and from the sample interval on four for each factor of two
+    (two where a run is long).
+
+    In a scene without random numbers each dt puts the collisions at other places within their
+    steps: failures appear at scattered step sizes, and only a dense scan finds the first. Finer
+    steps seldom fail and cost most. Both forms scan the same step sizes.
+    """
+    steps = one.duration / one.sample_interval * 8
+    close = ladder(one, 2 if one.scene.n * steps > LONG else 4)
+    return tuple(sorted({*ladder(one), *(dt for dt in close if dt > one.sample_interval)}))
+
+
+SUITE = tuple(
+    Case(
+        f"dt_{name}",
+        partial(at_dt, name),
+        "dt",
+        dense_ladder(build()),
+        USABLE,
+        build().asks,
+        unit="s",
+        runs=SEEDS if name in RANDOM else 1,
+        ratio=1.2,
+        refines=False,
+        report=name,
+    )
+    for name, build in SCENARIOS.items()
+    if not build().scene.friction  # the kept limits are of the scenes without
+)
+
+
+def with_scene(one: Scenario, **fields: Any) -> Scenario:
+    """The scenario with other fields of its scene, and the exact answer to that."""
+    return with_oracle(replace(one, scene=replace(one.scene, **fields)))
+
 
 def at_speed(one: Scenario, x: float) -> Scenario:
     """All initial velocities and spins times x."""
-    scene = one.scene
-    faster: Scene = replace(
-        scene, velocity=scene.velocity * x, angular_velocity=scene.angular_velocity * x
-    )
-    return with_oracle(replace(one, scene=faster))
+    velocity, spin = one.scene.velocity * x, one.scene.angular_velocity * x
+    return with_scene(one, velocity=velocity, angular_velocity=spin)
 
 
 def at_mass_ratio(one: Scenario, x: float) -> Scenario:
@@ -42,8 +101,8 @@ def at_mass_ratio(one: Scenario, x: float) -> Scenario:
     scene, disk = one.scene, heaviest(one.scene)
     factor = np.where(np.arange(scene.n) == disk, x, 1.0)
     thrusts = [scaled_thrust(t, x, x) if t.disk == disk else t for t in one.thrusts]
-    heavier: Scene = replace(scene, mass=scene.mass * factor, inertia=scene.inertia * factor)
-    return with_oracle(replace(one, scene=heavier, thrusts=thrusts))
+    heavier = replace(one, thrusts=thrusts)
+    return with_scene(heavier, mass=scene.mass * factor, inertia=scene.inertia * factor)
 
 
 def heaviest(scene: Scene) -> int:
@@ -53,14 +112,8 @@ def heaviest(scene: Scene) -> int:
     return int(np.lexsort(keys)[0])
 
 
-def at_restitution(one: Scenario, x: float) -> Scenario:
-    """e = x."""
-    return with_oracle(replace(one, scene=replace(one.scene, restitution=x)))
-
-
-def similar(one: Scenario, size: float = 1.0, tempo: float = 1.0, shift: float = 0.0) -> Scenario:
-    """The same motion, `size` times as large, `tempo` times as fast in steps that are shorter by
-    the same factor, and moved by `shift` m to the right.
+def similar(one: Scenario, size: float = 1.0, shift: float = 0.0) -> Scenario:
+    """The same motion, `size` times as large, and moved by `shift` m to the right.
 
     The exact answer is computed from that of the scene itself. It is exact except for the last
     digit of the scene's numbers; the oracle does not accept scenes whose scale is far from 1.
@@ -69,51 +122,27 @@ def similar(one: Scenario, size: float = 1.0, tempo: float = 1.0, shift: float =
     changed: Scene = replace(
         scene,
         position=scene.position * size + by,
-        velocity=scene.velocity * (size * tempo),
-        angular_velocity=scene.angular_velocity * tempo,
+        velocity=scene.velocity * size,
         radius=scene.radius * size,
         inertia=scene.inertia * size**2,
         walls=scene.walls * size + by,
-        gravity=scene.gravity * (size * tempo**2),
+        gravity=scene.gravity * size,
         wrap=None if scene.wrap is None else scene.wrap * size + by,
     )
-    thrusts = [
-        replace(
-            scaled_thrust(t, size * tempo**2, size**2 * tempo**2),
-            start=t.start / tempo,
-            stop=t.stop / tempo,
-        )
-        for t in one.thrusts
-    ]
 
     def answer(t: Array) -> Trajectory:
         assert truth is not None
-        was = truth(t * tempo)
-        collisions = was.collisions
+        was = truth(t)
         return replace(
             was,
-            t=was.t / tempo,
             position=was.position * size + by,
-            velocity=was.velocity * (size * tempo),
-            angular_velocity=was.angular_velocity * tempo,
-            horizon=was.horizon / tempo,
+            velocity=was.velocity * size,
             error_bound=was.error_bound * size,
-            collisions=Collisions(
-                frozen(collisions.t / tempo),
-                collisions.i,
-                collisions.j,
-                frozen(collisions.impulse * (size * tempo)),
-            ),
+            collisions=replace(was.collisions, impulse=frozen(was.collisions.impulse * size)),
         )
 
-    return replace(
-        one,
-        scene=changed,
-        thrusts=thrusts,
-        duration=one.duration / tempo,
-        sample_interval=one.sample_interval / tempo,
-        truth=None if truth is None else answer,
-    )
+    thrusts = [scaled_thrust(t, size, size**2) for t in one.thrusts]
+    return replace(one, scene=changed, thrusts=thrusts, truth=None if truth is None else answer)
 
 
 def scaled_thrust(thrust: Thrust, force: float, torque: float) -> Thrust:
@@ -152,7 +181,7 @@ VARIES = {
         "restitution",
         "1",
         (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0),
-        at_restitution,
+        lambda one, x: with_scene(one, restitution=x),
     ),
     "scale": Varied(
         "all lengths / the file's",

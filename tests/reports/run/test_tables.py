@@ -56,7 +56,7 @@ def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.Mo
     monkeypatch.setattr(comparing, "compute_answer", None)
     made = make_tables(RunResults.read(store), silent)
 
-    assert len(made.scene_tables) == len(made.answers) == 2
+    assert len(made.scenes.tables) == len(made.scenes.answers) == 2
 
 
 def test_what_is_kept_is_what_is_compared(store: Store):
@@ -68,7 +68,7 @@ def test_what_is_kept_is_what_is_compared(store: Store):
         source = results.sources[scene]
         csv = CompareTask(store, source, records, comparing.compute_answer(source))()
 
-        assert csv == made.scene_tables[scene].csv
+        assert csv == made.scenes.tables[scene].csv
         assert all(run.trajectory for run in comparison.middle_runs)
         assert np.array_equal(comparing.read_scene_table(csv).columns, comparison.table.columns)
 

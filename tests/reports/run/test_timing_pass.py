@@ -152,7 +152,7 @@ def test_what_takes_long_has_three_rounds_and_leaves_the_others_to_the_rest(
     ]
     monkeypatch.setattr(timing_pass, "overheads_of", lambda _: what)
     monkeypatch.setattr(timing_pass, "ROUNDS", 9)  # which is 1 in all other tests
-    lines = timing_pass.Pass([], 5.0, 0)()
+    lines = timing_pass.time_cells([], 5.0, 0)
 
     assert {line["overhead"]: len(line["cost"]) for line in lines} == {"long": 3, "short": 9}
 
@@ -166,7 +166,7 @@ def test_what_is_slow_has_the_cost_of_when_it_was_played():
     )
     costs = {
         line["timing"]: line["cost"]
-        for line in timing_pass.Pass([quick, slow], 5.0, 0)()
+        for line in timing_pass.time_cells([quick, slow], 5.0, 0)
         if "timing" in line
     }
 
@@ -210,7 +210,7 @@ def test_what_an_engine_refuses_is_left_out_and_not_the_rest(monkeypatch: pytest
         "key", "pymunk:matched", ENGINES["pymunk:matched"], scenario("near_miss"), 1, 0.0
     )
     monkeypatch.setattr("crosscheck2d.reports.run.stepping.empty_world", partial(int, "no world"))
-    lines = timing_pass.Pass([refusing], 5.0, 0)()
+    lines = timing_pass.time_cells([refusing], 5.0, 0)
 
     assert [line.get("timing") or line["overhead"] for line in lines].count("key") == 1
     assert {line["overhead"] for line in lines if "overhead" in line} == {"read"}

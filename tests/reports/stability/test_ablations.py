@@ -27,11 +27,9 @@ from crosscheck2d.reports.compare.causes import (
     by_mechanisms,
     mechanism_words,
 )
-from crosscheck2d.reports.stability.ablations import Ablations, sufficient_mechanisms
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.explain import explained
-from crosscheck2d.reports.stability.limits import QUICK, Limit, Trial
-from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.explain import Ablations, explained, sufficient_mechanisms
+from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch, Trial
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as
 from crosscheck2d.scenarios.catalogue import scenario
 

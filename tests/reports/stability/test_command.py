@@ -20,17 +20,15 @@ from crosscheck2d.reports.page.links import PAGES
 from crosscheck2d.reports.run.store import reading, writing
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.command import STABILITY, write_files
-from crosscheck2d.reports.stability.limits import QUICK
-from crosscheck2d.reports.stability.maps import MAPS
+from crosscheck2d.reports.stability.limits import QUICK, LimitSearch
 from crosscheck2d.reports.stability.results import (
     COLUMNS,
     StabilityPlan,
     Task,
     expected,
     read,
-    tasks_of,
 )
-from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.tables import MAPS
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.page.browsing import opened
 from tests.reports.terminal.command_line import crosscheck
@@ -90,8 +88,8 @@ def test_the_first_failing_run_is_kept(results: Path):
 
 def test_what_a_run_takes_is_said_before_it(tmp_path: Path):
     """How many searches, and about how long; a full form and fewer processes take longer."""
-    plan = StabilityPlan([*CASES], [*MAPS], [], ["pymunk:matched"], "quick", 1, "")
-    quick, full = (tasks_of(replace(plan, form=form)) for form in ("quick", "full"))
+    plan = StabilityPlan([*CASES, *MAPS], ["pymunk:matched"], "quick")
+    quick, full = (replace(plan, form=form).tasks() for form in ("quick", "full"))
     minutes = [
         int(re.search(r"(\d+) minute", expected(tasks, workers))[1])
         for tasks, workers in ((quick, 1), (full, 1), (full, 2))
@@ -123,9 +121,9 @@ def test_a_task_has_another_key_where_anything_that_decides_it_is_other(
 ):
     """Another form, version or scene file."""
     monkeypatch.chdir(tmp_path)
-    plan = StabilityPlan(["slow_collision"], [], [], ["box2d:shipped"], "quick", 1, "")
+    plan = StabilityPlan(["slow_collision"], ["box2d:shipped"], "quick")
     tasks = [
-        Task("limit", name, "box2d:shipped", form)
+        Task(name, "box2d:shipped", form)
         for name in ("slow_collision", "two.toml:speed")
         for form in ("quick", "full")
     ]

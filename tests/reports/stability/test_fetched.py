@@ -13,9 +13,8 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.limits import QUICK, Limit
+from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch
 from crosscheck2d.reports.stability.results import StabilityPlan, Task
-from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, taking_part
 from tests.reports.stability.kept_limits import FILE_OF_FETCHED, Kept, agrees, kept
 from tests.reports.terminal.command_line import crosscheck
@@ -41,8 +40,8 @@ def test_planck_is_driven_to_its_threshold():
 def test_a_report_of_a_package_names_its_version_and_no_file():
     """So that another version is not taken for what an interrupted run finished."""
     with taking_part({"planck:shipped": FETCHED["planck:shipped"]}):
-        plan = StabilityPlan(["spin"], [], [], ["planck:shipped"], "quick", 1, "")
-        alone = StabilityPlan(["spin"], [], [], ["pymunk:matched"], "quick", 1, "")
+        plan = StabilityPlan(["spin"], ["planck:shipped"], "quick")
+        alone = StabilityPlan(["spin"], ["pymunk:matched"], "quick")
 
         assert set(plan.versions) - set(alone.versions) == {"planck"}
         assert (list(plan.added), list(alone.added)) == (["planck:shipped"], [])
@@ -54,7 +53,7 @@ def found(cases: Sequence[str], engines: Sequence[str]) -> dict[tuple[str, str],
     limits = {}
     for case in cases:
         for name in engines:
-            limit = Task("limit", case, name, "quick")(added)
+            limit = Task(case, name, "quick")(added)
             assert isinstance(limit, Limit)
             limits[case, name] = limit
     return limits

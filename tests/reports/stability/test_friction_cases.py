@@ -27,11 +27,10 @@ from crosscheck2d.reports.stability.cases_friction import (
     in_corner,
     rough_bounce,
 )
-from crosscheck2d.reports.stability.limits import NEVER_FAILS, QUICK, Limit, engines_of
+from crosscheck2d.reports.stability.limits import NEVER_FAILS, QUICK, Limit, LimitSearch, engines_of
 from crosscheck2d.reports.stability.overview import findings
 from crosscheck2d.reports.stability.predicates import judge, truth_of
 from crosscheck2d.reports.stability.scenes import phase
-from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import play_as
 
 MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")

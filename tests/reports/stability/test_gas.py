@@ -16,7 +16,7 @@ from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.stability import variants
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_gas import RADIUS, gas, wrapped_run
-from crosscheck2d.reports.stability.limits import QUICK
+from crosscheck2d.reports.stability.limits import QUICK, LimitSearch
 from crosscheck2d.reports.stability.predicates import judge
 from crosscheck2d.reports.stability.predicates_gas import (
     BLOCKS,
@@ -32,7 +32,6 @@ from crosscheck2d.reports.stability.predicates_gas import (
     literature,
     shares_of_speeds,
 )
-from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.model import Scenario, Trajectory, frozen

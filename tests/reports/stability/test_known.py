@@ -12,11 +12,10 @@ import pytest
 
 from crosscheck2d.adapters.engines import changed
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.cases_alone import ball, far, on_spring, oscillator
-from crosscheck2d.reports.stability.limits import QUICK, Limit
+from crosscheck2d.reports.stability.cases_few import ball, far, on_spring, oscillator
+from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch
 from crosscheck2d.reports.stability.predicates import apexes
-from crosscheck2d.reports.stability.search import LimitSearch
-from crosscheck2d.reports.stability.touching import (
+from crosscheck2d.reports.stability.tables import (
     AT_ONCE,
     GAPS,
     PAIRS,

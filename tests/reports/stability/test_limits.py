@@ -14,8 +14,14 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES, UNASKED
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.limits import FULL, NEVER_FAILS, QUICK, Limit, engines_of
-from crosscheck2d.reports.stability.search import LimitSearch
+from crosscheck2d.reports.stability.limits import (
+    FULL,
+    NEVER_FAILS,
+    QUICK,
+    Limit,
+    LimitSearch,
+    engines_of,
+)
 from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
 from tests.measured import MEASURED
 from tests.reports.stability.kept_limits import (

@@ -23,12 +23,20 @@ from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_gas import gas
 from crosscheck2d.reports.stability.explain import explained
-from crosscheck2d.reports.stability.failures import AFTER, BEFORE, near, part_of, with_failure
-from crosscheck2d.reports.stability.limits import FULL, QUICK, Case, Limit, Trial
+from crosscheck2d.reports.stability.limits import FULL, QUICK, Case, Limit, LimitSearch, Trial
 from crosscheck2d.reports.stability.predicates import Predicate, judge, read
-from crosscheck2d.reports.stability.results import Task, failed, limit_from, row_of
+from crosscheck2d.reports.stability.results import (
+    AFTER,
+    BEFORE,
+    RESULTS,
+    Task,
+    failed,
+    near,
+    part_of,
+    row_of,
+    with_failure,
+)
 from crosscheck2d.reports.stability.scenes import DT, RADIUS, flyby
-from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import DrivenEngine, play_as
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Trajectory
@@ -251,7 +259,7 @@ def test_one_phase_alone_would_overlook_the_limit():
 
 def test_a_worker_that_dies_is_a_row_of_the_table():
     """The case is then known to have no result, and why."""
-    task = Task("limit", "slow_collision", "pymunk:matched", "quick")
+    task = Task("slow_collision", "pymunk:matched", "quick")
     [(_, failure)] = run_all({task: abort}, workers=1)
     assert isinstance(failure, Failure)
     limit = failed(task, failure)
@@ -268,7 +276,7 @@ def test_a_limit_comes_back_from_its_row_as_it_was():
         limit_of(case(lambda x, _: x / 17, UP)),
         limit_of(case(lambda _x, _run: 2.0, UP)),
     ):
-        again = limit_from(json.loads(json.dumps(asdict(found))))
+        again = RESULTS["limit"].validate_python(json.loads(json.dumps(asdict(found))))
         assert repr(again) == repr(found)
 
 

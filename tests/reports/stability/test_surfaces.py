@@ -17,10 +17,9 @@ from crosscheck2d.reports.compare.causes import CauseKind
 from crosscheck2d.reports.compare.faces import first_on_line, on_faces, thrown_off
 from crosscheck2d.reports.stability.cases import CASES as LIMITS_OF
 from crosscheck2d.reports.stability.explain import explained, with_replays
-from crosscheck2d.reports.stability.limits import QUICK, Limit
+from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch
 from crosscheck2d.reports.stability.predicates import judge
 from crosscheck2d.reports.stability.predicates_usable import USABLE
-from crosscheck2d.reports.stability.search import LimitSearch
 from crosscheck2d.reports.stability.variants import taking_part
 from crosscheck2d.reports.stability.vary import case_of_file, heaviest
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
