@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # importing numpy takes 0.2 s, and the process of an Exercise
 NOT_READABLE = "not readable"  # the binding has no getter
 PASSED = "passed with every step"  # an argument of the step, which the engine does not store
 KEPT = "kept by the adapter"  # the adapter does it, the engine has no such setting
+NO_SUCH = "no such setting"  # another version of the library has it, not this one: it is left out
 NOT_REPORTED = (NOT_READABLE, PASSED, KEPT)
 SILENT = "not reported"  # the setting "collisions" of an engine that reports none
 

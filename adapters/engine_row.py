@@ -94,8 +94,10 @@ class EngineRow:
             the cause.
         package: the npm package, pinned in adapters/host/package.json, that it uses and that
             is fetched once; "": it needs none.
-        source: a hash of a solver's file, which changes when the file is saved with another text;
-            "" for an engine of this program.
+        wheel: the distribution of which another version is fetched as a wheel, NAME@VERSION; "":
+            there is none.
+        source: a hash of a solver's file, which changes when the file is saved with another text,
+            or of a fetched version; "" for any other engine.
         exercise: it is a solver's file with the functions of the exercise, which `crosscheck check`
             judges.
     """
@@ -119,5 +121,6 @@ class EngineRow:
     orders_collisions: bool = False
     departs: Mapping[str, str] = field(default_factory=dict, hash=False)
     package: str = ""
+    wheel: str = ""
     source: str = ""
     exercise: bool = False

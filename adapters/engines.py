@@ -4,6 +4,7 @@ row."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +21,7 @@ from crosscheck2d.adapters.engine_row import (
     Mark,
     Variant,
 )
+from crosscheck2d.adapters.library_at_version import FORM, LibraryAtVersion
 from crosscheck2d.adapters.library_versions import BOX2D
 from crosscheck2d.adapters.matched import Searched
 from crosscheck2d.scenarios.model import Scene
@@ -49,6 +51,10 @@ def _javascript_searched(name: str) -> Searched:
     return SEARCHED[name]
 
 
+def _at_version(library: LibraryAtVersion, *arguments: Any, **settings: Any) -> Engine:
+    return _made("crosscheck2d.adapters.host.apart.EngineApart", library, *arguments, **settings)
+
+
 def _javascript(name: str, profile: str, **settings: Any) -> Engine:
     package = FETCHED[f"{name}:{profile}"].package
     return _made(
@@ -68,6 +74,7 @@ _Pymunk = partial(
     EngineRow,
     outside=True,
     distributions=("pymunk",),
+    wheel="pymunk",
     mark=Mark("#d1540a", "#ff9a4d", "triangle-up"),
     searched=partial(_searched, "crosscheck2d.adapters.pymunk"),
     work=AccuracyParameter("iterations", "iterations", (1, 2, 5, 10, 20, 50, 100, 200)),
@@ -76,6 +83,7 @@ _Box2D = partial(
     EngineRow,
     outside=True,
     distributions=(BOX2D,),
+    wheel="box2d",
     mark=Mark("#00876c", "#5be0b5", "square"),
     searched=partial(_searched, "crosscheck2d.adapters.box2d"),
     work=AccuracyParameter("iterations", "velocity_iterations", (1, 2, 4, 8, 16, 32, 64)),
@@ -84,6 +92,7 @@ _Box2DV3 = partial(
     EngineRow,
     outside=True,
     distributions=("pyb2d3",),
+    wheel="pyb2d3",
     mark=Mark("#b84fb0", "#c46bd8", "diamond"),
     searched=partial(_searched, "crosscheck2d.adapters.box2d_v3"),
     work=AccuracyParameter("substeps", "substeps", (1, 2, 4, 8, 16)),
@@ -298,18 +307,60 @@ _read: dict[str, EngineRow] = {}  # the rows of solvers' files, as they were whe
 
 
 def row_of(name: str) -> EngineRow:
-    """The row of an engine: from `ENGINES`, from `FETCHED`, or for a solver's file `PATH:own`,
-    which is read once.
+    """The row of an engine: from `ENGINES`, from `FETCHED`, of one of them at another version, or
+    for a solver's file `PATH:own`, which is read once.
 
     Raises:
-        KeyError: it is neither.
+        KeyError: it is none of them.
         NotASolver: the file cannot be one.
     """
-    if name in FETCHED:
-        return FETCHED[name]
-    if name in ENGINES or not name.endswith(OWN):
-        return ENGINES[name]
-    return _read.get(name) or read_row(name)
+    row = known_row(name)
+    if row is None and name.endswith(OWN):
+        return _read.get(name) or read_row(name)
+    return row or ENGINES[name]
+
+
+def packages() -> dict[str, tuple[str, bool]]:
+    """Engine -> the package that other versions of it come in, and whether it is npm's."""
+    rows = ((name.partition(":")[0], row) for name, row in (ENGINES | FETCHED).items())
+    return {
+        name: (row.package or row.wheel, bool(row.package))
+        for name, row in rows
+        if row.package or row.wheel
+    }
+
+
+def parsed(name: str) -> tuple[str, LibraryAtVersion | None]:
+    """A name of an engine or a row without its version, and its library at that version; None for
+    a name without one, or of another form."""
+    engine, _, rest = name.partition("@")
+    version, colon, profile = rest.partition(":")
+    if not FORM.fullmatch(version) or engine not in (known := packages()):
+        return name, None
+    package, npm = known[engine]
+    return f"{engine}{colon}{profile}", LibraryAtVersion(package, version, npm)
+
+
+def known_row(name: str) -> EngineRow | None:
+    """The row of a name of the tables, or of NAME@VERSION:PROFILE; None for any other name."""
+    usual, library = parsed(name)
+    row = ENGINES.get(usual) or FETCHED.get(usual)
+    if row is None or library is None:
+        return row
+    assert isinstance(row.make, partial)
+    return replace(
+        row,
+        make=partial(row.make, library=library)
+        if row.package
+        else partial(_at_version, library, *row.make.args),
+        summary=f"{library.package} {library.version}, {usual.partition(':')[2]}",
+        mark=None,
+        distributions=(),
+        package="",
+        wheel="",
+        source=library.recorded,
+        bits_of="",
+    )
 
 
 def told_apart(rows: Mapping[str, EngineRow], scene: Scene) -> list[str]:

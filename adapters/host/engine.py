@@ -31,6 +31,7 @@ from crosscheck2d.adapters.host.file import (
 from crosscheck2d.adapters.host.process import SolverProcess
 from crosscheck2d.adapters.host.restitution import EXERCISE, restitution_of
 from crosscheck2d.adapters.host.surface import ENGINE, HOW, holder_of, is_engine, must_be_either
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion
 from crosscheck2d.adapters.npm_packages import NotInstalled, text_of, version_of
 from crosscheck2d.scenarios.model import Array, Scene, State
 
@@ -223,8 +224,8 @@ class GuestEngine:
 class PackageEngine(GuestEngine):
     """planck, matter or Rapier: `NAME.js` of this folder, which drives an npm package.
 
-    Its file says what the profiles choose; `changed` are keys of that choice. The driver does the
-    wrap, and its time is in that of `step`.
+    Its file says what the profiles choose; `changed` are keys of that choice; `library` is another
+    version than the pinned one. The driver does the wrap, and its time is in that of `step`.
 
     Attributes:
         inside: s that V8 took for the steps so far, of the time of `step`: the rest is the exchange
@@ -234,9 +235,17 @@ class PackageEngine(GuestEngine):
     load_limit = 2 * STEP_LIMIT
 
     def __init__(
-        self, name: str, package: str, profile: str, *, float32: bool = False, **changed: Any
+        self,
+        name: str,
+        package: str,
+        profile: str,
+        *,
+        float32: bool = False,
+        library: LibraryAtVersion | None = None,
+        **changed: Any,
     ) -> None:
         self.package, self.profile, self.changed = package, profile, changed
+        self.library = library
         self.float32, self.inside = float32, 0.0
         file = HERE / f"{name}.js"
         text = file.read_text(encoding="utf-8")
@@ -247,10 +256,11 @@ class PackageEngine(GuestEngine):
     def process(self) -> SolverProcess:
         """The process, with the package's text; raises `NotLoaded` if it is not installed."""
         if self.started is None:
-            name = self.package
+            name, library = self.package, self.library
             try:
-                versions = {name: version_of(name)}
-                self.solver = replace(self.solver, package=text_of(name), versions=versions)
+                text = library.text() if library else text_of(name)
+                versions = library.versions if library else {name: version_of(name)}
+                self.solver = replace(self.solver, package=text, versions=versions)
             except NotInstalled as reason:
                 raise NotLoaded(f"{name}: {reason}") from None
         return super().process

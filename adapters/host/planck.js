@@ -35,7 +35,7 @@
       settings.maxTranslation = settings.maxRotation = 1e9;
     }
     for (const name of Object.keys(DEFAULTS)) if (name in chosen) settings[name] = chosen[name];
-    Object.assign(planck.Settings, settings);
+    for (const name of Object.keys(settings)) if (name in planck.Settings) planck.Settings[name] = settings[name];
   }
 
   globalThis.models = "disks walls gravity static forces rotation friction wrap";

@@ -19,13 +19,15 @@
     const fixed = (i) => scene.mass[i] === Infinity;
     const space = new RAPIER.World(vector(scene.gravity));
     space.timestep = dt;
-    if (chosen.length_unit) space.lengthUnit = chosen.length_unit * Math.min(...scene.radius);
-    if (chosen.iterations !== null) space.numSolverIterations = chosen.iterations;
     const parameters = space.integrationParameters;
-    if (chosen.continuous_steps !== null) parameters.maxCcdSubsteps = chosen.continuous_steps;
-    if (chosen.pgs_iterations !== null) parameters.numInternalPgsIterations = chosen.pgs_iterations;
-    if (chosen.hertz !== null) parameters.contact_natural_frequency = chosen.hertz;
-    if (chosen.prediction !== null) parameters.normalizedPredictionDistance = chosen.prediction;
+    set(space, {
+      lengthUnit: chosen.length_unit ? chosen.length_unit * Math.min(...scene.radius) : null,
+      numSolverIterations: chosen.iterations,
+    });
+    set(parameters, {
+      maxCcdSubsteps: chosen.continuous_steps, numInternalPgsIterations: chosen.pgs_iterations,
+      contact_natural_frequency: chosen.hertz, normalizedPredictionDistance: chosen.prediction,
+    });
     const stated = chosen.matched || scene.friction > 0 ? scene.friction : null;
     const friction = chosen.friction === null ? stated : chosen.friction;
     const index = new Map();
@@ -39,8 +41,8 @@
     };
     const bodies = scene.position.map(([x, y], i) => {
       const kind = fixed(i) ? RAPIER.RigidBodyDesc.fixed() : RAPIER.RigidBodyDesc.dynamic();
-      kind.setTranslation(x, y).setRotation(scene.angle[i]).setCanSleep(chosen.sleeping).setCcdEnabled(chosen.continuous)
-        .setSoftCcdPrediction(chosen.soft_ccd * Math.min(...scene.radius));
+      kind.setTranslation(x, y).setRotation(scene.angle[i]).setCanSleep(chosen.sleeping).setCcdEnabled(chosen.continuous);
+      if (chosen.soft_ccd) kind.setSoftCcdPrediction(chosen.soft_ccd * Math.min(...scene.radius));
       if (!fixed(i)) {
         kind.setLinvel(...scene.velocity[i]).setAngvel(scene.angular_velocity[i]);
         kind.setAdditionalMassProperties(scene.mass[i], { x: 0, y: 0 }, chosen.turning ? finite(scene.inertia[i]) : 0);
@@ -62,15 +64,14 @@
   };
 
   function mustNotBeCut({ chosen, caps, space }, what, value, unit) {
+    // float32 leaves what was cut a little below the cap
+    if (!chosen.matched || !(Math.abs(value) > caps[what] * (1 - 1e-5))) return;
     const cap = {
       speed: `at which Rapier cuts speeds: 400 of its length units of ${+space.lengthUnit.toPrecision(4)} m a second`
         + " (normalized_max_linear_velocity of the crate, which the npm package does not hand on)",
       spin: "the most that Rapier allows at this dt: an eighth of a turn",
     };
-    // float32 leaves what was cut a little below the cap
-    if (chosen.matched && Math.abs(value) > caps[what] * (1 - 1e-5)) {
-      throw new Refused(`a disk reaches a ${what} of ${+caps[what].toPrecision(6)} ${unit}, ${cap[what]}`);
-    }
+    throw new Refused(`a disk reaches a ${what} of ${+caps[what].toPrecision(6)} ${unit}, ${cap[what]}`);
   }
 
   function angle({ turned, bodies, steps, dt }, i) {
@@ -143,6 +144,11 @@
       ["continuous collision", chosen.matched ? chosen.continuous : null, bodies.some((body) => body.isCcdEnabled())],
     ];
   };
+
+  // What is chosen, of the settings that this version has.
+  function set(target, values) {
+    for (const [name, value] of Object.entries(values)) if (value !== null && name in target) target[name] = value;
+  }
 
   const vector = ([x, y]) => ({ x, y });
   const finite = (I) => (I < Infinity ? I : 1);

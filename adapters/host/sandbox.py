@@ -156,18 +156,8 @@ def walls(
         command += ["--tmpfs", str(installed)]
     for path in dict.fromkeys(parts_of(files)):
         command += ["--ro-bind", path, f"/pkgs/{Path(path).name}"]
-    command += [
-        "--ro-bind",
-        str(GUEST),
-        "/host",
-        "--ro-bind",
-        str(SYSTEM),
-        "/system.py",
-        "--dir",
-        "/proc",
-        "--dir",
-        "/dev",
-    ]
+    command += ["--ro-bind", str(GUEST), "/host", "--ro-bind", str(SYSTEM), "/system.py"]
+    command += ["--dir", "/proc", "--dir", "/dev"]
     for device in ("/dev/null", "/dev/urandom"):
         command += ["--dev-bind", device, device]
     command += ["--size", "20000000", "--tmpfs", "/tmp"]

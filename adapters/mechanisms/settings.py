@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck2d.adapters.engines import row_of
+from crosscheck2d.adapters.engines import parsed, row_of
 from crosscheck2d.scenarios.model import Scene
 
 MOST = 3  # settings that are changed one after the other
@@ -63,7 +63,7 @@ def plain(value: Any) -> str:
 def settings_of(name: str, scene: Scene, dt: float) -> list[Setting]:
     """The settings of the engine `name` in which it differs from what the scene needs; none for an
     engine that has none."""
-    library, _, profile = name.partition(":")
+    library, _, profile = parsed(name)[0].partition(":")
     row, settings = row_of(name), list[Setting]()
     if profile == "shipped" and library in SETTINGS:
         settings = [each for each in SETTINGS[library](scene, dt) if each.shipped != each.value]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, packages
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.reports.compare.metrics import METRICS, SCALES, Metric
 from crosscheck2d.reports.compare.verdicts import VERDICTS, Kind
@@ -15,6 +15,8 @@ from crosscheck2d.reports.terminal.exits import refuse
 from crosscheck2d.reports.terminal.tables import print_texts
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.truth.exact import answered_by
+
+VERSIONS = f"Any version of {', '.join(packages())} plays as NAME@VERSION: --engine pymunk@6.8.1"
 
 
 def explain(what: str) -> None:
@@ -33,6 +35,8 @@ def explain(what: str) -> None:
     for kind, lines in kinds.items():
         if what in ("", kind):
             print_texts(console, lines, f"{len(lines)} {kind}")
+            if kind == "engines":
+                console.print(VERSIONS, highlight=False)
             console.print()
     if what in ("", "metrics"):
         print_texts(console, SCALES, "Scales, by which errors are divided")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.adapters.engine_row import FLOAT64
-from crosscheck2d.adapters.engines import ENGINES, FETCHED
+from crosscheck2d.adapters.engines import known_row
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.collisions import Matched, match
@@ -255,7 +255,7 @@ def beside(
 def rounding_of(name: str) -> float:
     """The relative rounding of the numbers of an `engine:profile`; those of a solver's file are
     float64."""
-    row = (ENGINES | FETCHED).get(name)
+    row = known_row(name)
     return row.rounding if row else FLOAT64
 
 

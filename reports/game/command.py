@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import cast
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.adapters.host.engine import GuestEngine, row_of_file
 from crosscheck2d.adapters.host.file import KINDS
 from crosscheck2d.adapters.host.restitution import EXERCISE
@@ -41,7 +41,7 @@ def game_of(flight: Path | None, engines: Sequence[str]) -> Game:
     # A solver's file is a row like any other while it flies; one that cannot fly at all is reported
     # before.
     rows, restitution = own_rows(own)
-    ENGINES.update(rows | {name: FETCHED[name] for name in chosen if name in FETCHED})
+    ENGINES.update(rows | {name: row_of(name) for name in others if name not in ENGINES})
     beside = others or BESIDE[: MOST_ENGINES - len(own)]
     return Game([*own, *beside], file, restitution)
 

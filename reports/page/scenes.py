@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.engines import OWN, known_row
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.against import ITSELF, TRUTH
 from crosscheck2d.reports.compare.comparison import Comparison
@@ -216,7 +216,7 @@ def smooth(scenes: Sequence[SceneScores]) -> list[SceneScores]:
 
 def is_library(name: str) -> bool:
     """Whether an engine is a library, or an engine of the reader's that plugs in like one."""
-    row = {**FETCHED, **ENGINES}.get(name)
+    row = known_row(name)
     return name.partition(":")[0] in LIBRARIES if row is None else row.outside
 
 

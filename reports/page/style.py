@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from zlib import crc32
 
 from crosscheck2d.adapters.engine_row import Mark
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, known_row
 from crosscheck2d.reports.compare.against import (
     TRUTH as TRUTH,  # its curve is drawn like that of an engine
 )
@@ -78,7 +78,7 @@ CHANGED = (1, 2)  # a profile with one thing changed, `matched+...`
 def look(engine: str, profile: str = "") -> Look:
     """How `engine:profile`, or the truth, is drawn."""
     light, dark, shape = OF_TRUTH if engine == TRUTH else mark_of(engine)
-    row = {**FETCHED, **ENGINES}.get(f"{engine}:{profile}")
+    row = known_row(f"{engine}:{profile}")
     dash = CHANGED if "+" in profile else row.dash if row else ()
     return Look(light, dark, dash, row.shape or shape if row else shape, not dash)
 

@@ -10,8 +10,17 @@ from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, read_row
+from crosscheck2d.adapters.engines import (
+    ENGINES,
+    FETCHED,
+    OWN,
+    UNASKED,
+    packages,
+    parsed,
+    read_row,
+)
 from crosscheck2d.adapters.host.file import HINTS, KINDS, NotASolver
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion
 from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
 from crosscheck2d.reports.run.store import Store, reading, writing
@@ -75,11 +84,12 @@ def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed
 
 
 def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) -> list[str]:
-    """The rows of the requested engines: NAME, NAME:PROFILE or a solver's FILE, which is read now.
-    Files come last. A NAME alone gives its rows of `unasked` or `FETCHED`; without a request all of
-    `unasked` are used. A missing package is fetched."""
+    """The rows of the requested engines: NAME[@VERSION][:PROFILE], or a solver's FILE, which is
+    read now. A version comes after the pinned one, files come last. A NAME alone gives its rows of
+    `unasked` or `FETCHED`; without a request all of `unasked` are used. A missing package is
+    fetched."""
     known = [*ENGINES, *FETCHED]
-    chosen: set[str] = set()
+    chosen: dict[str, list[str]] = {}  # row -> itself, and it at other versions
     own: list[str] = []
     faults: list[str] = []
     for name in asked:
@@ -87,17 +97,23 @@ def checked_engines(asked: Sequence[str], unasked: Collection[str] = UNASKED) ->
             own += [f"{file}{OWN}"]
             faults += faults_of_file(file)
             continue
-        matching = {row for row in (*unasked, *FETCHED) if row.split(":")[0] == name}
-        matching |= {row for row in known if row == name}
+        usual, library = parsed(name)
+        matching = {row for row in (*unasked, *FETCHED) if row.split(":")[0] == usual}
+        matching |= {row for row in known if row == usual}
         if not matching:
-            faults.append(unknown("engine", name, {*known, *(row.split(":")[0] for row in known)}))
-        faults += [f"--engine {name}: {fault}" for fault in faults_of_packages(matching)]
-        chosen |= matching
+            faults.append(unknown_engine(name, known))
+            continue
+        found = faults_of_packages(matching) if library is None else faults_of_version(library)
+        faults += [f"--engine {name}: {fault}" for fault in found]
+        for row in matching:
+            at = row if library is None else row.replace(":", f"@{library.version}:")
+            chosen.setdefault(row, []).insert(0 if at == row else len(known), at)
     if not asked:
-        chosen.update(unasked)
+        chosen = {row: [row] for row in unasked}
     if faults:
         refuse(faults)
-    return [row for row in known if row in chosen] + list(dict.fromkeys(own))
+    rows = [at for row in known for at in chosen.get(row, ())]
+    return list(dict.fromkeys([*rows, *own]))
 
 
 def default_engines() -> list[str]:
@@ -143,6 +159,21 @@ def faults_of_packages(rows: Iterable[str]) -> list[str]:
     return []
 
 
+def faults_of_version(library: LibraryAtVersion) -> list[str]:
+    """Fetches another version of a library, if it is not there; returns why it cannot be
+    played."""
+    try:
+        if not library.recorded:
+            with Progress() as progress:
+                progress.note(f"fetching {library.package} {library.version}, once")
+                progress.begin("fetching")
+                library.fetch()
+        library.checked()
+    except NotInstalled as reason:
+        return [str(reason)]
+    return []
+
+
 @contextmanager
 def started_where(folder: str) -> Iterator[None]:
     """Context in the folder in which a run was started, to which the paths of solvers' files are
@@ -165,6 +196,21 @@ def faults_of_file(file: Path) -> list[str]:
     except NotASolver as refusal:
         return [str(refusal)]
     return []
+
+
+def unknown_engine(name: str, known: Collection[str]) -> str:
+    """A sentence that an engine is unknown, or that it has no such versions."""
+    names = {*known, *(row.split(":")[0] for row in known)}
+    engine, at, _ = name.partition("@")
+    if not at or (engine not in names and Path(engine).suffix.lower() not in KINDS):
+        return unknown("engine", name, names)
+    if engine not in packages():
+        of = ", ".join(packages())
+        return f"--engine {name}: {engine} is in no package that has versions, as those of {of} are"
+    return (
+        f"--engine {name}: write {engine}@VERSION[:PROFILE], a version such as 1.0.0 and one of the"
+        f" profiles {', '.join(row.split(':')[1] for row in known if row.split(':')[0] == engine)}"
+    )
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

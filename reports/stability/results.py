@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from crosscheck2d.adapters.engine_row import EngineRow
-from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.page.replay import COLLISIONS, pack_layers, ratio_of
@@ -98,9 +98,12 @@ class StabilityPlan:
 
     @property
     def added(self) -> dict[str, EngineRow]:
-        """The rows of engines' own files, `PATH:own`, and those of `FETCHED`, among `engines`."""
+        """The rows of engines' own files, `PATH:own`, of `FETCHED` and of other versions, among
+        `engines`."""
         return {
-            name: ENGINES[name] for name in self.engines if name.endswith(OWN) or name in FETCHED
+            name: ENGINES[name]
+            for name in self.engines
+            if name.endswith(OWN) or name in FETCHED or parsed(name)[1]
         }
 
     @property

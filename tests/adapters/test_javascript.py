@@ -491,7 +491,7 @@ def test_without_the_extra_a_row_says_how_it_is_installed(empty):
             "code EINTEGRITY\nsha512-dl== integrity checksum failed when using sha512: wanted",
             r"\(what it sent differs from what is pinned \(SHA-512\)\)",
         ),
-        ("", "npm failed"),
+        ("", "no reason given"),
     ],
 )
 def test_without_a_network_one_sentence_says_so(empty, monkeypatch, said, why):

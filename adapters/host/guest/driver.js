@@ -509,7 +509,8 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
         if (hears) hear();
         if (wrap && typeof file.place === "function") wrapAll();
       },
-      settings: () => (typeof file.settings === "function" ? stringify(file.settings(made)) : "[]"),
+      settings: () => (typeof file.settings === "function"
+        ? stringify(file.settings(made), (_, x) => (x === undefined ? "no such setting" : x)) : "[]"),
     };
   }
 

@@ -1,0 +1,166 @@
+"""An adapter of this program in a process of its own, in which another version of its library is
+imported: `pymunk@6.8.1`."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from crosscheck2d.adapters import system
+from crosscheck2d.adapters.engine import ContactImpulse, NotLoaded
+from crosscheck2d.adapters.host.file import SolverFailed
+from crosscheck2d.adapters.host.process import end
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion
+from crosscheck2d.adapters.library_versions import BOX2D
+from crosscheck2d.adapters.npm_packages import NotInstalled
+from crosscheck2d.adapters.safe_path import python
+from crosscheck2d.scenarios.model import Array, Scene, State
+
+Call = tuple[Any, ...]
+"""A method of the engine and its arguments; of "make" the class of the adapter and its own."""
+
+# (this process, folder) -> a process that waits for the next engine; it ends with this one
+waiting: dict[tuple[int, Path], subprocess.Popen[bytes]] = {}
+
+
+class EngineApart:
+    """The engine of `place`, "module.Class", made with `arguments` and `settings`.
+
+    It is the same code as in this process, so what it raises is raised here. It is as trusted as
+    any installed package: the process is no sandbox.
+    """
+
+    listening, wrapping = True, 0.0
+
+    def __init__(
+        self, library: LibraryAtVersion, place: str, *arguments: Any, **settings: Any
+    ) -> None:
+        self.library, self.made = library, ("make", place, arguments, settings)
+        self.process: subprocess.Popen[bytes] | None = None
+        self.calls: list[Call] = []  # they have no result, and are made before the next
+
+    def load(self, scene: Scene, dt: float) -> None:
+        """Start the process if there is none; raises `NotLoaded` if the version is not there, or
+        cannot be imported."""
+        if self.process is None:
+            self.start()
+            self.ask(*self.made)
+        self.calls.clear()
+        self.ask("load", scene, dt, self.listening)
+
+    def start(self) -> None:
+        """A process with the library, or one that waits."""
+        try:
+            folder = self.library.checked()
+        except NotInstalled as reason:
+            raise NotLoaded(f"{self.library.package} {self.library.version}: {reason}") from None
+        self.process = waiting.pop((os.getpid(), folder), None)
+        if self.process is not None and self.process.poll() is None:
+            return
+        self.process = subprocess.Popen(
+            python(f"from {__name__} import serve; serve({str(folder)!r})"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def ask(self, *call: Any) -> Any:
+        """The result of a call, or what it raised."""
+        process, calls = self.process, [*self.calls, call]
+        self.process = None  # until there is an answer: one that is interrupted is not used again
+        self.calls.clear()
+        assert process is not None
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            pickle.dump(calls, process.stdin)
+            process.stdin.flush()
+            result, raised = pickle.load(process.stdout)
+        except (EOFError, OSError):
+            end(process)
+            library = f"{self.library.package} {self.library.version}"
+            what = f"the process of {library} ended (exit status {process.returncode})"
+            raise SolverFailed("crashed", what) from None
+        except BaseException:
+            end(process)
+            raise
+        self.process = process
+        if raised is not None:
+            raise raised
+        return result
+
+    def apply_force(self, disk: int, force: Array, torque: float) -> None:
+        """Sent with the next step."""
+        self.calls.append(("apply_force", disk, force, torque))
+
+    def step(self, count: int = 1) -> None:
+        """One exchange with the process."""
+        self.wrapping += self.ask("step", count)
+
+    def read(self) -> State:
+        """One exchange with the process."""
+        state: State = self.ask("read")
+        return state
+
+    def collisions(self) -> list[ContactImpulse]:
+        """Those of the engine."""
+        return list(self.ask("collisions"))
+
+    def settings(self) -> dict[str, tuple[Any, Any]]:
+        """Those of the engine."""
+        return dict(self.ask("settings"))
+
+    def versions(self) -> dict[str, str]:
+        """Those of the engine, with the hash of what was fetched."""
+        versions: dict[str, str] = self.ask("versions")
+        versions.pop(BOX2D, None)  # of the distribution that is installed
+        return versions | self.library.versions
+
+    def close(self) -> None:
+        """Let the process wait for its next use."""
+        if self.process is not None:
+            key = os.getpid(), self.library.folder
+            if before := waiting.pop(key, None):
+                end(before)
+            waiting[key] = self.process
+            self.process = None
+
+
+def serve(folder: str) -> None:
+    """In the process: answer calls until the other side ends."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # a library may write to it
+    system.end_with_parent()
+    sys.path.insert(0, folder)
+    engine: Any = None
+    while True:
+        try:
+            calls = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        result, raised = None, None
+        try:
+            for verb, *arguments in calls:
+                if verb == "make":
+                    place, given, settings = arguments
+                    module, _, name = place.rpartition(".")
+                    engine = getattr(import_module(module), name)(*given, **settings)
+                elif verb == "load":
+                    *given, engine.listening = arguments
+                    engine.load(*given)
+                elif verb == "step":
+                    engine.wrapping = 0.0
+                    engine.step(*arguments)
+                    result = engine.wrapping
+                else:
+                    result = getattr(engine, verb)(*arguments)
+        except Exception as error:
+            raised = error
+        pickle.dump((result, raised), answers)
+        answers.flush()
