@@ -231,7 +231,7 @@ def commands_section() -> Section:
     code = [Markup("<code>{}</code>").format(command) for command in COMMANDS]
     frame = pd.DataFrame({"": list(COMMANDS.values())}, code, dtype=object)
     return Section(
-        "Your solver, your scene, the reasons",
+        "Your solver, your scene",
         "commands",
         [Table(frame, css="plain text")],
         folded=True,

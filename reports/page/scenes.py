@@ -153,6 +153,14 @@ class SceneScores:
         key = (name, self.comparison.middle_dt)
         return self.numbers.get(key, {}).get(ERROR, np.nan) if self.counts else np.nan
 
+    def refuses(self, name: str) -> bool:
+        """Whether an engine refuses the scene."""
+        return self.statuses.get((name, self.comparison.middle_dt)) == "unsupported"
+
+    def is_lost(self, name: str) -> bool:
+        """Whether an engine fails, or is more than a radius off; a refusal is neither."""
+        return self.error(name) > LOST and not self.refuses(name)
+
     def verdicts(self, name: str) -> list[tuple[str, float]]:
         """(id, value) of the verdicts that an engine fails at the middle step size."""
         return self.failed.get((name, self.comparison.middle_dt), [])
