@@ -184,7 +184,8 @@ def settings_section(summary: Summary) -> list[Section]:
                 name, scene.comparison.scenario.scene, scene.comparison.middle_dt
             )
             code = [Code(snippet)]
-        parts.append(Section(label(name), note if len(of) > 1 else "", [*code, table], folded=True))
+        says = note if len(of) > 1 else ""
+        parts.append(Section(label(name), says, [*code, table], True, f"settings_{engine}"))
     intro = Text(
         [
             f"The settings that each library has in {title_of(scene)}, as code to copy, and those"
@@ -252,8 +253,8 @@ def trust_section(summary: Summary, known_answers: pd.DataFrame) -> Section:
         " that stays, energy, momentum, rest. A run that fails one counts as infinitely far off"
         " (crosscheck list verdicts).",
         "<b>Medians hide failures</b>: the red words name the worst scene of a row, and the map"
-        " shows every scene. In crowds an error doubles with every few collisions, so that all"
-        " libraries part from the exact answer; what counts there is when.",
+        " shows every scene. In crowds an error doubles with every few collisions, so that most"
+        " engines part from the exact answer; what counts there is when.",
         "<b>Our own engines</b> are never nearest, and the exact answers import none of their code."
         " The reference does not model friction; in scenes with friction its copy that does stands"
         " for it.",

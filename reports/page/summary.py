@@ -232,7 +232,8 @@ class Summary:
             about += f", {profile}"
         version = self.versions.get(engine, "")
         title = label(name) + (f" {version}" if is_library(name) and version else "")
-        return TableCell(title, name, notes=(TableCell(about, css="soft"),))
+        link = f"#settings_{engine}" if name in self.libraries else ""
+        return TableCell(title, name, link, notes=(TableCell(about, css="soft"),))
 
     @cached_property
     def versions(self) -> dict[str, str]:
@@ -311,7 +312,7 @@ class Summary:
         cost = "Small: the time of a step. " if self.costs else ""
         fault = "" if self.costs else self.clock.fault or "No scene was timed."
         matched = all(name.endswith(":matched") for name in self.libraries)
-        settings = " Libraries have their <a href='#settings'>matched settings</a>."
+        settings = " Libraries have <a href='#settings'>matched settings</a>: click a name."
         says = Markup(
             "Large: how far a disk is from its exact place at worst, in radii of the disk, at the"
             " usual step ({}); median of the scenes. {}<span class='best'>Green</span>: nearest;"

@@ -130,8 +130,8 @@ def limits(summary: Summary) -> Section | None:
     frame = pd.DataFrame(rows, index, [label(name) for name in names], dtype=object)
     says = (
         "One quantity is made harsher until the engine fails; the number is the last that works."
-        " Holds: at all values tried; never: at none. Small: the other settings, where they reach"
-        " less far. Found by crosscheck stability --full, not in this run."
+        " Holds: at all values tried; never: at none; –: not measured. Small: the other settings,"
+        " where they reach less far. Found by crosscheck stability --full, not in this run."
     )
     return Section("Where each method fails", says, [Table(frame, css="fixed limits")], id="limits")
 

@@ -135,6 +135,17 @@ def test_failing_one_more_scene_never_lowers_a_median(comparisons: list[Comparis
     assert cell.notes[0].link == "#oblique_e09"
 
 
+def test_the_last_row_counts_the_scenes_that_the_rows_and_the_sentence_count(summary: Summary):
+    """A scene is lost where an engine fails or is a radius off, once."""
+    for name in ("box2d:shipped", "pymunk:matched"):
+        lost = [s.name for s in summary.situations[WITHOUT] if s.is_lost(name)]
+        words = [note.text for note in summary.words(name, WITHOUT)]
+        assert (f"lost in {len(lost)} of 3" in words) == bool(lost)
+    assert summary.situations[WITHOUT][-1].is_lost("box2d:shipped")  # it does not bounce
+    assert not summary.scenes[-1].is_lost("reference:exercise")  # it refuses friction
+    assert summary.scenes[-1].refuses("reference:exercise")
+
+
 def test_scenes_with_friction_count_in_their_own_row_only(summary: Summary):
     """There the reference that has friction stands for the exercise, which refuses them."""
     assert [scene.name for scene in summary.situations[FRICTION]] == [SCENES[-1]]
