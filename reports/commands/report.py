@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import NoReturn
 
 from crosscheck2d.adapters.engines import OWN, row_of
-from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.commands.medians import medians
@@ -57,7 +56,7 @@ def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
     it, unless engines were asked for `by_name`."""
     runs = [run for comparison in comparisons for run in comparison.runs]
     played = {run.name for run in runs if run.status == "ok"}
-    asked = {run.name for run in runs if by_name or REFUSAL not in run.reason}
+    asked = {run.name for run in runs if by_name or not run.frictionless}
     return sorted(asked - played)
 
 

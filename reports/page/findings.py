@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from crosscheck2d.adapters.engines import OWN
-from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.verdicts import in_words
 from crosscheck2d.reports.page.scenes import LOST, SceneScores
@@ -76,7 +75,7 @@ def nearest(summary: Summary) -> str:
 
 def median_error(name: str, scenes: Sequence[SceneScores]) -> float:
     """The median error of an engine in scenes whose friction, if they have some, it models."""
-    asked = [scene for scene in scenes if REFUSAL not in scene.refused.get(name, "")]
+    asked = [scene for scene in scenes if name not in scene.frictionless]
     errors = [error for scene in asked if not np.isnan(error := scene.error(name))]
     return float(np.median(errors)) if errors else np.nan
 
@@ -134,7 +133,7 @@ def refusals(comparisons: Sequence[Comparison]) -> list[str]:
     whose: dict[str, list[str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
-            if run.status == "unsupported" and REFUSAL not in run.reason:
+            if run.status == "unsupported" and not run.frictionless:
                 whose.setdefault(run.reason, []).append(run.name.removesuffix(OWN))
     return [
         f"{listed(list(dict.fromkeys(names)))} refused {counted(len(names), 'cell')}: {reason}."

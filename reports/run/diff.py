@@ -140,7 +140,8 @@ def difference(before: Path, after: Path) -> Difference:
     # of these scene, settings and versions are the same
     alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
     numbers, same = changed_numbers(*tables, alike if like else set(), edited)
-    statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, both, edited)
+    played = {name for name in both if all(side[name]["status"] == "ok" for side in cells)}
+    statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, played, edited)
     busy = [results for results in (one, other) if results.timings and is_busy(results)]
     warnings += [
         f"{results.folder}: its times are not compared: two timings of the same engine"
@@ -218,13 +219,13 @@ def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> li
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name], edited: Collection[str]
+    before: pd.DataFrame, after: pd.DataFrame, played: Collection[Name], edited: Collection[str]
 ) -> list[Change]:
-    """The cells that `both` runs played but only one judged, so that only that one has numbers."""
+    """The cells that both runs `played` but only one judged, so that only that one has numbers."""
     was, now = reasons(before), reasons(after)
     changes = []
     for cell, versus in sorted(was.keys() ^ now.keys()):
-        if cell in both:
+        if cell in played:
             scenario, engine, dt = cell
             what, key = f"{scenario}  dt {dt:.4g} s  against {versus}: status", (cell, versus)
             verdict = "other" if scenario in edited else "worse" if key in now else "better"
@@ -235,10 +236,8 @@ def changed_judgement(
 
 
 def reasons(table: pd.DataFrame) -> dict[tuple[Name, str], str]:
-    """((scenario, `engine:profile`, dt in s), `versus`) -> why it is not judged."""
-    rows = table[(table.metric == "status") & table.note.str.startswith(NOT_JUDGED)].to_dict(
-        "records"
-    )
+    """((scenario, `engine:profile`, dt in s), `versus`) -> why it has no numbers."""
+    rows = table[table.metric == "status"].to_dict("records")
     return {
         ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), str(r["versus"])): str(
             r["note"]
@@ -294,8 +293,8 @@ def changed_numbers(
         )
         note = " (same cell, other bits)" if must else ""
         was_said, now_said = (
-            said_of(row["value"], row["note"]),
-            said_of(row["value_after"], row["note_after"]),
+            row["value"] or NOT_JUDGED,
+            row["value_after"] or NOT_JUDGED,
         )
         if NOT_JUDGED in (was_said, now_said):
             verdict, note = "other", ""
@@ -313,11 +312,6 @@ def changed_numbers(
     equal_rows = both[~differs]
     between = equal_rows.versus.str.contains(":", regex=False)
     return changes, Counter([*equal_rows.name, *equal_rows.versus[between]])
-
-
-def said_of(value: str, note: str) -> str:
-    """A number as in the table, or "not judged"."""
-    return NOT_JUDGED if note.startswith(NOT_JUDGED) else value
 
 
 def engines_of(row: Mapping[Hashable, Any]) -> list[str]:
