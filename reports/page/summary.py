@@ -60,7 +60,8 @@ class Summary:
     Attributes:
         scenes: all of them.
         names: every `engine:profile` that was played.
-        untrusted: those that break the protocol or a law, which are not ranked.
+        untrusted: those that broke the protocol, and the reader's own that break a law: their rows
+            stay in the tables, but they are not ranked.
         clock: the times of the run.
     """
 
