@@ -17,7 +17,6 @@ from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.verdicts import VERDICTS, in_words
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.page.cost_points import NO_CLOCK, RunTimes
-from crosscheck2d.reports.page.drawing import tick_text
 from crosscheck2d.reports.page.kit import Section, Table, TableCell
 from crosscheck2d.reports.page.scenes import (
     ANGLE,
@@ -210,7 +209,7 @@ class Summary:
             text = f"{better[0].partition(':')[2]} {error_text(self.error(better[0], kind))}"
             notes.append(TableCell(text, "the other settings are nearer here", css="soft"))
         css = "best" if self.is_near(name, kind) else ""
-        side = "" if np.isnan(cost) else tick_text(cost, "µs")
+        side = "" if np.isnan(cost) else f"{style.number(cost, 2)} µs"
         return TableCell(error_text(error), css=css, side=side or " ", notes=tuple(notes))
 
     def table(self) -> Table:
@@ -296,7 +295,7 @@ class Summary:
             third = f"A solver that takes collisions in order of time (ordered) is exact in {of}"
             told.append(
                 Markup(
-                    third + (f" and costs {tick_text(cost, 'µs')} a step." if cost == cost else ".")
+                    third + (f" and costs {style.number(cost, 2)} µs a step." if cost == cost else ".")
                 )
             )
         return [each for each in told if each]
