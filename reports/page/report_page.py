@@ -144,10 +144,10 @@ def engines_table(summary: Summary) -> Table:
         words = "; ".join(scene.words(name))
         rows.append([*errors, cost, TableCell(words, css="bad")])
     heads = [f"error at {step_text(dt)}" for dt in steps]
-    heads += ["µs a step", "what goes wrong" + f", at {step_text(comparison.middle_dt)}"]
+    heads += ["µs a step", f"what goes wrong, at {step_text(comparison.middle_dt)}"]
     frame = pd.DataFrame(rows, [long_label(name) for name in order], heads, dtype=object)
-    if not summary.costs:
-        frame = frame.drop(columns="µs a step")
+    wrong = any(row[-1].text for row in rows)
+    frame = frame.drop(columns=heads[-2:-1] * (not summary.costs) + heads[-1:] * (not wrong))
     return Table(frame, css="stack engines", corner="engine")
 
 

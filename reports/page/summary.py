@@ -292,12 +292,9 @@ class Summary:
             exact = sum(scene.error(OURS[1]) < EXACT for scene in scenes)
             cost = self.cost(OURS[1], WITHOUT)
             of = f"{exact} of {len(scenes)}"
+            costs_text = "" if np.isnan(cost) else f" and costs {style.number(cost, 2)} µs a step"
             third = f"A solver that takes collisions in order of time (ordered) is exact in {of}"
-            told.append(
-                Markup(
-                    third + (f" and costs {style.number(cost, 2)} µs a step." if cost == cost else ".")
-                )
-            )
+            told.append(Markup(f"{third}{costs_text}."))
         return [each for each in told if each]
 
     def nearest(self, kind: str) -> list[str]:
