@@ -135,7 +135,7 @@ def engines_table(summary: Summary) -> Table:
     for name in order:
         errors = [
             TableCell(
-                "refuses" if name in scene.refused else error_text(scene.error(name, dt)),
+                "refuses" if scene.refuses(name) else error_text(scene.error(name, dt)),
                 css="best" * (dt == comparison.middle_dt and scene.error(name) == best),
             )
             for dt in steps
@@ -146,7 +146,7 @@ def engines_table(summary: Summary) -> Table:
     heads = [f"error at {step_text(dt)}" for dt in steps]
     heads += ["µs a step", f"what goes wrong, at {step_text(comparison.middle_dt)}"]
     frame = pd.DataFrame(rows, [long_label(name) for name in order], heads, dtype=object)
-    wrong = any(row[-1].text for row in rows)
+    wrong = any(scene.words(name) for name in order)
     frame = frame.drop(columns=heads[-2:-1] * (not summary.costs) + heads[-1:] * (not wrong))
     return Table(frame, css="stack engines", corner="engine")
 
