@@ -175,6 +175,7 @@ def first_due(  # type: ignore[no-untyped-def]
 ):
     """(s, i, j) of the first meeting from `now` on: of two disks, of a disk and wall j = -1 - w, or
     the edge. Of meetings at the same instant, that of the least i; of a disk, before a wall."""
+    asked_earlier = agenda.length[CHANGED] > 0
     ask_changed(disks, world, acceleration, near, agenda, now)
     while True:
         soon = inf
@@ -188,8 +189,10 @@ def first_due(  # type: ignore[no-untyped-def]
             if agenda.time[c] <= soon:
                 row = int(agenda.due[c])
                 i, j = bodies_of(near, row)
-                s = meeting_of(disks, world, acceleration, near, i, j, now)
-                agenda.time[c] = s
+                s = agenda.time[c]
+                if asked_earlier:
+                    s = meeting_of(disks, world, acceleration, near, i, j, now)
+                    agenda.time[c] = s
                 if s < first[0] or (s == first[0] < inf and (i, row) < (first[1], least)):
                     first, least = (s, i, j), row
         if first[0] <= soon:
