@@ -5,8 +5,6 @@ from __future__ import annotations
 from crosscheck2d.adapters.engine import Unsupported
 from crosscheck2d.scenarios.model import Scene
 
-REFUSAL = "does not model friction"
-
 
 class Frictionless(Unsupported):
     """The engine does not model friction, and need not."""
@@ -15,7 +13,7 @@ class Frictionless(Unsupported):
 def must_be_frictionless(scene: Scene, who: str) -> None:
     """Raise `Frictionless` for a scene with friction, which the engine `who` does not model."""
     if scene.friction:
-        raise Frictionless(f"{who} {REFUSAL}, the scene has {scene.friction:g}")
+        raise Frictionless(f"{who} does not model friction, the scene has {scene.friction:g}")
 
 
 def of_shapes(scene: Scene, matched: bool, asked: float | None) -> float | None:

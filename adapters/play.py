@@ -9,6 +9,7 @@ from dataclasses import replace
 from crosscheck2d.adapters.advance import advanced
 from crosscheck2d.adapters.engine import Engine, NotStarted, Unsupported
 from crosscheck2d.adapters.first_collisions import collisions_of
+from crosscheck2d.adapters.friction import Frictionless
 from crosscheck2d.adapters.run import Run, gather, substeps_of, unplayed_run
 from crosscheck2d.adapters.runaway import RUNAWAY, fault_of, reach
 from crosscheck2d.scenarios.model import Scenario, State
@@ -61,7 +62,9 @@ def play(engine: Engine, name: str, scenario: Scenario, dt: float, watch: Watch 
             states.append(state)
             watch(state)
     except Unsupported as refusal:
-        run = replace(run, status="unsupported", reason=str(refusal))
+        frictionless = isinstance(refusal, Frictionless)
+        status, reason = "unsupported", str(refusal)
+        run = replace(run, status=status, reason=reason, frictionless=frictionless)
     except (MemoryError, NotStarted):
         raise
     except Exception as error:  # an engine may raise anything; the run records it

@@ -26,6 +26,7 @@ class Run:
     seconds: float = 0.0  # wall time inside `step` while collisions are recorded; not a benchmark
     settings: dict[str, tuple[Any, Any]] = field(default_factory=dict)  # (asked for, resolved)
     versions: dict[str, str] = field(default_factory=dict)  # library -> version
+    frictionless: bool = False  # whether it is refused because the engine models no friction
 
     @property
     def name(self) -> str:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.adapters.engines import OWN
-from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.reports.page.scenes import SceneScores, values
 from crosscheck2d.reports.page.style import number
 
@@ -43,7 +42,7 @@ def medians(
     own file refuses does not count, as the exercise does not ask for it. Engines in `untrusted`
     broke the protocol or a law, and are not scored.
     """
-    without = [name for name in names if all(REFUSAL in s.refused.get(name, "") for s in scenes)]
+    without = [name for name in names if all(name in s.frictionless for s in scenes)]
     names = [name for name in names if name not in without]
     pools = {(name, column): pool(scenes, name, column) for name in names for column in COLUMNS}
     columns = [column for column in COLUMNS if any(pools[name, column] for name in names)]

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from crosscheck2d.adapters.engines import OWN, row_of
-from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.adapters.thrust_grid import off_grid_note
 from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.commands.own_solvers import lines
-from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times
 from crosscheck2d.reports.page.scenes import SceneScores
@@ -42,7 +40,7 @@ def finish(report: Report, status: int = DONE) -> NoReturn:
     folder = report.results.folder
     print_summary(report, str((folder / PAGE).resolve()))
     by_name = report.results.header["engines"] != default_engines()
-    if lost := never_played(report.comparisons, by_name):
+    if lost := never_played(report.summary.scenes, by_name):
         say(
             f"no cell of {', '.join(lost)} was played to its end: see the status column of"
             f" {folder / 'runs.csv'}"
@@ -52,12 +50,12 @@ def finish(report: Report, status: int = DONE) -> NoReturn:
     sys.exit(FAILED if lost or report.unjudged else status)
 
 
-def never_played(comparisons: Sequence[Comparison], by_name: bool) -> list[str]:
+def never_played(scenes: Sequence[SceneScores], by_name: bool) -> list[str]:
     """The engines of which no cell was played to its end. One that models no friction may refuse
     it, unless engines were asked for `by_name`."""
-    runs = [run for comparison in comparisons for run in comparison.runs]
+    runs = [run for scene in scenes for run in scene.comparison.runs]
     played = {run.name for run in runs if run.status == "ok"}
-    asked = {run.name for run in runs if by_name or REFUSAL not in run.reason}
+    asked = {run.name for run in runs if by_name or not run.frictionless}
     return sorted(asked - played)
 
 
@@ -97,7 +95,7 @@ def print_summary(report: Report, page: str) -> None:
     for scene in report.summary.scenes:
         of_kind[bool(scene.comparison.scenario.scene.friction)].append(scene)
     for rough, scenes in of_kind.items():
-        headings, rows, without = medians(scenes, report.summary.names, report.untrusted)
+        headings, rows, without = medians(scenes, report.summary.names, report.summary.untrusted)
         if rows and scenes:
             print_table(console, headings, rows, title_of(len(scenes), rough))
         if without and scenes:
@@ -126,9 +124,9 @@ def notes(report: Report) -> list[str]:
     """A sentence for each scene whose thrusts start or stop inside a step, or whose disks are fast
     for their step."""
     found = [
-        (comparison.scenario.name, note)
-        for comparison in report.comparisons
-        for note in (off_grid_note(comparison.scenario), fast_note(comparison))
+        (scene.name, note)
+        for scene in report.summary.scenes
+        for note in (off_grid_note(scene.comparison.scenario), fast_note(scene.comparison))
     ]
     return [f"{name}: {note.removesuffix('.')}." for name, note in found if note]
 

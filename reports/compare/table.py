@@ -1,5 +1,6 @@
 """The tidy table deviations.csv: a row for each number, with its run and what it is measured
-against; a verdict fails above its bound, other numbers have none."""
+against; a verdict fails above its bound, other numbers have none. A value is NaN only where it is
+not judged, and in the row of a run without numbers; the note says why."""
 
 from __future__ import annotations
 
@@ -31,9 +32,10 @@ TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str, fl
 
 
 def deviation_row(run: Run, metric: str, value: Value, unit: str, versus: str) -> TableRow:
-    """The row of one metric of a run."""
+    """The row of one metric of a run; what is judged and no number is infinitely far off."""
     whose = (run.scenario, run.engine, run.profile, run.dt, metric)
-    return (*whose, value.disk, value.value, unit, versus, value.at, value.note, np.nan)
+    number = np.inf if value.judged and np.isnan(value.value) else value.value
+    return (*whose, value.disk, number, unit, versus, value.at, value.note, np.nan)
 
 
 def verdict_row(run: Run, verdict: Verdict) -> TableRow:
@@ -46,7 +48,7 @@ def verdict_row(run: Run, verdict: Verdict) -> TableRow:
 
 def status_row(run: Run, why: str, versus: str = ITSELF) -> TableRow:
     """The row of a run without numbers, with the reason."""
-    return deviation_row(run, "status", Value(np.nan, note=why), "", versus)
+    return deviation_row(run, "status", Value(np.nan, note=why, judged=False), "", versus)
 
 
 def table_of(rows: Sequence[TableRow]) -> pd.DataFrame:

@@ -33,23 +33,24 @@ LEAST_SHARE = 0.1
 number to be judged. Engines err in collisions. Less than a tenth of the samples is mostly the
 flight before the first collision, where no engine errs; less than a tenth of the collisions are the
 easiest ones, those that a step can resolve."""
-# starts the note of a number that is NaN because too few samples are judged
 NOT_JUDGED = "not judged"
 
 
 class Value(NamedTuple):
-    """A number and where it comes from: the disk (-1: all), the instant in s, a remark."""
+    """A number and where it comes from: the disk (-1: all), the instant in s, a remark; and whether
+    it is judged."""
 
     value: float
     disk: int = -1
     at: float = np.nan
     note: str = ""
+    judged: bool = True
 
 
 def not_judged(why: str) -> Value:
     """The value of a metric that applies, but for which too few samples or collisions are
     judged."""
-    return Value(np.nan, note=f"{NOT_JUDGED}: {why}")
+    return Value(np.nan, note=f"{NOT_JUDGED}: {why}", judged=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,6 @@ class Line(NamedTuple):
         label: stands at an end of the line; "" for none.
         filled: the point with a filled marker; -1 for none.
         faint: drawn thin, without markers.
-        look: how it is drawn, if not by `style.look(name)`.
     """
 
     name: str
@@ -62,7 +61,11 @@ class Line(NamedTuple):
     label: str = ""
     filled: int = -1
     faint: bool = False
-    look: style.Look | None = None
+
+    @property
+    def look(self) -> style.Look:
+        """How it is drawn."""
+        return style.look(*self.name.partition(":")[::2])
 
 
 def new_figure(width: float = 5.8, height: float = 3.6, **grid: Any) -> tuple[Figure, Any]:
@@ -101,7 +104,7 @@ def draw_lines(
 
 def draw_line(axes: Axes, line: Line) -> None:
     """One line in the look of its engine."""
-    look = line.look or style.look(*line.name.partition(":")[::2])
+    look = line.look
     x, y = (np.asarray(values, float) for values in (line.x, line.y))
     seen = np.isfinite(x) & np.isfinite(y)
     filled = [k for k in (line.filled,) if 0 <= k < len(x) and seen[k]]
@@ -247,7 +250,7 @@ def write_label(
     lead: bool = False,
 ) -> None:
     """The label of a line, this far from its end in points, in its colour."""
-    colour = (line.look or style.look(*line.name.partition(":")[::2])).light
+    colour = line.look.light
     arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4}
     axes.annotate(
         line.label, end, offset, textcoords="offset points", color=colour, weight="bold",

@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from crosscheck2d.adapters.engines import OWN
-from crosscheck2d.adapters.friction import REFUSAL
+from crosscheck2d.adapters.engines import ENGINES, OWN
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.compare.verdicts import in_words
-from crosscheck2d.reports.page.scenes import LOST, SceneScores
-from crosscheck2d.reports.page.situations import EXACT, YOURS, grouped
+from crosscheck2d.reports.page.scenes import LOST, SceneScores, is_library
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.page.summary import Summary
 from crosscheck2d.reports.terminal.counts import counted, listed
@@ -39,10 +37,9 @@ def findings(summary: Summary) -> list[str]:
 def ranked(summary: Summary) -> list[str]:
     """The engines that are ranked: not the reader's own solvers, and not those that take collisions
     in order of time; if nothing else was played, these."""
-    groups = grouped(name for name in summary.names if name not in summary.untrusted)
-    apart = [*groups.get(YOURS, []), *groups.get(EXACT, [])]
-    names = [name for of in groups.values() for name in of]
-    return [name for name in names if name not in apart] or names
+    names = [name for name in summary.names if name not in summary.untrusted]
+    in_order = [name for name in names if name in ENGINES and ENGINES[name].orders_collisions]
+    return [name for name in names if not name.endswith(OWN) and name not in in_order] or names
 
 
 def nearest(summary: Summary) -> str:
@@ -66,7 +63,7 @@ def nearest(summary: Summary) -> str:
             "No engine was played to its end, without breaking a law, in half of the scenes with an"
             " exact answer, so engines are not ranked."
         )
-    names.sort(key=medians.__getitem__)
+    names.sort(key=lambda name: (medians[name], not is_library(name)))
     best, *others = (f"{name} ({number(medians[name], 2)} radii)" for name in names)
     then = f", then {', '.join(others[:2])}" if others else ""
     last = f", last {others[-1]}" if len(others) > 2 else ""
@@ -76,7 +73,7 @@ def nearest(summary: Summary) -> str:
 
 def median_error(name: str, scenes: Sequence[SceneScores]) -> float:
     """The median error of an engine in scenes whose friction, if they have some, it models."""
-    asked = [scene for scene in scenes if REFUSAL not in scene.refused.get(name, "")]
+    asked = [scene for scene in scenes if name not in scene.frictionless]
     errors = [error for scene in asked if not np.isnan(error := scene.error(name))]
     return float(np.median(errors)) if errors else np.nan
 
@@ -134,7 +131,7 @@ def refusals(comparisons: Sequence[Comparison]) -> list[str]:
     whose: dict[str, list[str]] = {}
     for comparison in comparisons:
         for run in comparison.runs:
-            if run.status == "unsupported" and REFUSAL not in run.reason:
+            if run.status == "unsupported" and not run.frictionless:
                 whose.setdefault(run.reason, []).append(run.name.removesuffix(OWN))
     return [
         f"{listed(list(dict.fromkeys(names)))} refused {counted(len(names), 'cell')}: {reason}."

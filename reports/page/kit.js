@@ -26,7 +26,7 @@ async function openRow(row, open = row.nextElementSibling?.className !== "opened
 async function follow() {
   const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
   if (!target) return;
-  if (target.matches("details")) target.open = true;
+  for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
   if (target.matches("tr.opens")) await openRow(target, true);
   target.scrollIntoView({ block: "start" });
 }

@@ -159,11 +159,9 @@ class Text:
 
 @dataclass(frozen=True, eq=False)
 class Code:
-    """Lines to copy, with a button that does, below a title."""
+    """Lines to copy, with a button that does."""
 
     source: str
-    title: str = ""
-    note: str = ""
     kind: ClassVar[str] = "code"
 
 

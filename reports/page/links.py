@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 
 class Neighbour(NamedTuple):
-    """Another page: its question, the command that makes it, and its address relative to this page,
-    "" if it does not exist.
-    """
+    """A page: its title and content, the command that makes it, and its address; in `PAGES` below
+    the folder of all results, in a page relative to it, "" if it does not exist."""
 
     title: str
     says: str
@@ -17,31 +16,23 @@ class Neighbour(NamedTuple):
     href: str
 
 
-class Place(NamedTuple):
-    """The defaults of a page: title, content, the command that makes it, and its path below the
-    folder of all results."""
-
-    title: str
-    says: str
-    command: str
-    place: str
-
-
 PAGES = {
-    "report": Place("Report", "every scene, engine by engine", "crosscheck", "latest/report.html"),
-    "speed": Place(
+    "report": Neighbour(
+        "Report", "every scene, engine by engine", "crosscheck", "latest/report.html"
+    ),
+    "speed": Neighbour(
         "Speed",
         "the cost of an accuracy, and what each error is made of",
         "crosscheck speed",
         "speed/speed.html",
     ),
-    "stability": Place(
+    "stability": Neighbour(
         "Limits",
         "the speed, density or distance at which an engine fails",
         "crosscheck stability",
         "stability/stability.html",
     ),
-    "lessons": Place(
+    "lessons": Neighbour(
         "Lessons",
         "why engines differ, with scenes that run",
         "crosscheck lesson",
@@ -58,7 +49,7 @@ def neighbours(page: Path, own: str) -> list[Neighbour]:
     """
     beside = page.absolute().parent.parent
     return [
-        Neighbour(title, says, command, f"../{place}" if (beside / place).is_file() else "")
-        for key, (title, says, command, place) in PAGES.items()
+        other._replace(href=f"../{other.href}" if (beside / other.href).is_file() else "")
+        for key, other in PAGES.items()
         if key != own
     ]

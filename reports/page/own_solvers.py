@@ -4,16 +4,11 @@ evidence."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from markupsafe import Markup
 
-
-class Said(NamedTuple):
-    """A sentence of the check, and the lines of the file and the exercise's formula behind it."""
-
-    sentence: str
-    shown: Sequence[str]
+Said = tuple[str, Sequence[str]]
+"""A sentence of the check, and the lines of the file and the exercise's formula behind it."""
 
 
 def sourced(sentence: str, lines: Sequence[str]) -> Markup:
@@ -28,4 +23,4 @@ def sourced(sentence: str, lines: Sequence[str]) -> Markup:
 def with_lines(says: Sequence[str], shown: Sequence[Sequence[str]]) -> list[Said]:
     """Each sentence with what is shown of it; a sentence that is no fault has nothing."""
     none: list[Sequence[str]] = [[]] * len(says)
-    return [Said(*each) for each in zip(says, [*shown, *none])]
+    return list(zip(says, [*shown, *none]))

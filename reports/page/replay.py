@@ -33,11 +33,6 @@ GRID = 16383  # steps of the position grid over the box of a layer: fractions of
 STEPS = 65535  # of instants, and of a turn less one
 
 
-def pack(comparison: Comparison) -> str:
-    """The middle dt's trajectories and the truth, packed, as base64; "" if nothing was played."""
-    return pack_layers(comparison.scenario, played(comparison))
-
-
 def pack_layers(
     scenario: Scenario,
     layers: list[tuple[Run | None, Trajectory]],

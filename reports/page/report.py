@@ -11,7 +11,6 @@ from typing import Any
 import pandas as pd
 
 from crosscheck2d.adapters.engines import OWN
-from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.page.cost_points import RunTimes
 from crosscheck2d.reports.page.findings import findings, not_counted
 from crosscheck2d.reports.page.own_engines import is_lawless, own_engine_sentences
@@ -32,23 +31,18 @@ class Report:
 
     Attributes:
         results: what it was made from.
-        comparisons: one for each scenario, in reading order.
         runs: runs.csv.
-        summary: what the first table says of them.
+        summary: its scenes, and what the first table says of them.
         findings: its sentences, which the command prints.
-        untrusted: the engines that broke the protocol, and the reader's own that break a law:
-            their rows stay in the tables, but they are not scored.
         unjudged: name of a scene -> why it is not compared with its answer, or not at all, though
             it should be.
         said: a solver's file, `PATH:own` -> what `crosscheck check` says of it.
     """
 
     results: RunResults
-    comparisons: list[Comparison]
     runs: pd.DataFrame
     summary: Summary
     findings: list[str]
-    untrusted: set[str]
     unjudged: Mapping[str, str]
     said: Mapping[str, list[str]]
 
@@ -101,9 +95,7 @@ def make_report(results: RunResults, say: Callable[[str], None]) -> Report:
     results.store.export(PAGE, page)
     says = {name: one["says"] for name, one in checks.items()}
     told = [*first, *findings(summary), *last]
-    return Report(
-        results, comparisons, tables.runs, summary, told, untrusted, tables.unjudged, says
-    )
+    return Report(results, tables.runs, summary, told, tables.unjudged, says)
 
 
 def take_times(folder: Path) -> str:

@@ -135,7 +135,7 @@ def engines_table(summary: Summary) -> Table:
     for name in order:
         errors = [
             TableCell(
-                "refuses" if name in scene.refused else error_text(scene.error(name, dt)),
+                "refuses" if scene.refuses(name) else error_text(scene.error(name, dt)),
                 css="best" * (dt == comparison.middle_dt and scene.error(name) == best),
             )
             for dt in steps
@@ -144,10 +144,10 @@ def engines_table(summary: Summary) -> Table:
         words = "; ".join(scene.words(name))
         rows.append([*errors, cost, TableCell(words, css="bad")])
     heads = [f"error at {step_text(dt)}" for dt in steps]
-    heads += ["µs a step", "what goes wrong" + f", at {step_text(comparison.middle_dt)}"]
+    heads += ["µs a step", f"what goes wrong, at {step_text(comparison.middle_dt)}"]
     frame = pd.DataFrame(rows, [long_label(name) for name in order], heads, dtype=object)
-    if not summary.costs:
-        frame = frame.drop(columns="µs a step")
+    wrong = any(scene.words(name) for name in order)
+    frame = frame.drop(columns=heads[-2:-1] * (not summary.costs) + heads[-1:] * (not wrong))
     return Table(frame, css="stack engines", corner="engine")
 
 
@@ -184,7 +184,8 @@ def settings_section(summary: Summary) -> list[Section]:
                 name, scene.comparison.scenario.scene, scene.comparison.middle_dt
             )
             code = [Code(snippet)]
-        parts.append(Section(label(name), note if len(of) > 1 else "", [*code, table], folded=True))
+        says = note if len(of) > 1 else ""
+        parts.append(Section(label(name), says, [*code, table], True, f"settings_{engine}"))
     intro = Text(
         [
             f"The settings that each library has in {title_of(scene)}, as code to copy, and those"
@@ -231,7 +232,7 @@ def commands_section() -> Section:
     code = [Markup("<code>{}</code>").format(command) for command in COMMANDS]
     frame = pd.DataFrame({"": list(COMMANDS.values())}, code, dtype=object)
     return Section(
-        "Your solver, your scene, the reasons",
+        "Your solver, your scene",
         "commands",
         [Table(frame, css="plain text")],
         folded=True,
@@ -252,8 +253,8 @@ def trust_section(summary: Summary, known_answers: pd.DataFrame) -> Section:
         " that stays, energy, momentum, rest. A run that fails one counts as infinitely far off"
         " (crosscheck list verdicts).",
         "<b>Medians hide failures</b>: the red words name the worst scene of a row, and the map"
-        " shows every scene. In crowds an error doubles with every few collisions, so that all"
-        " libraries part from the exact answer; what counts there is when.",
+        " shows every scene. In crowds an error doubles with every few collisions, so that most"
+        " engines part from the exact answer; what counts there is when.",
         "<b>Our own engines</b> are never nearest, and the exact answers import none of their code."
         " The reference does not model friction; in scenes with friction its copy that does stands"
         " for it.",

@@ -198,7 +198,7 @@ def remarks(scene: SceneScores) -> list[Part]:
     it may miss."""
     comparison = scene.comparison
     scenario, truth = comparison.scenario, comparison.truth
-    told = [f"Exact answer: {scenario.source}."] if scenario.source and truth is not None else []
+    told = [f"Source: {scenario.source}."] if scenario.source and truth is not None else []
     if truth is None:
         told.append(f"No exact answer: {scenario.without_truth}.")
     elif truth.reason:
@@ -241,7 +241,7 @@ def numbers(scene: SceneScores) -> list[Section]:
     index = [heading(each) for each in ids]
     heads = [TableCell(label(name), name, notes=(TableCell(profile(name)),)) for name in names]
     frame = pd.DataFrame(rows, index, dtype=object)
-    decide = ", ".join(VERDICTS[each].means for each in VERDICTS if each in failed)
+    decide = "; ".join(VERDICTS[each].means for each in VERDICTS if each in failed)
     says = f"at a step of {step_text(comparison.middle_dt)}; what fails: {decide or 'nothing'}"
     table = Table(frame.set_axis(heads, axis="columns"), css="plain number")
     return [Section("Numbers of all engines", says, [table], folded=True)]

@@ -40,12 +40,15 @@ WITH_FRICTION = {"reference:exercise": "reference:coulomb"}
 
 
 class TableNumber(NamedTuple):
-    """A number of the tables: value, remark, and whether it is judged; if not, the remark says
-    why."""
+    """A number of the tables, and a remark; NaN is not judged, the remark says why."""
 
     value: float
     remark: str
-    judged: bool
+
+    @property
+    def judged(self) -> bool:
+        """Whether it counts."""
+        return not np.isnan(self.value)
 
     @property
     def text(self) -> str:
@@ -72,9 +75,8 @@ def values(comparison: Comparison) -> Numbers:
             )
             when = f"at {row['at_s']:.4g} s" if np.isfinite(row["at_s"]) else ""
             remark = ", ".join(filter(None, (where, when, str(row["note"]))))
-            judged = not str(row["note"]).startswith(NOT_JUDGED)
             found[f"{row['engine']}:{row['profile']}", str(row["metric"])] = TableNumber(
-                row["value"], remark, judged
+                row["value"], remark
             )
     return found
 
@@ -102,7 +104,7 @@ class SceneScores:
         where they are judged."""
         table = self.comparison.table
         rows = table[(table.versus == TRUTH) & table.metric.isin([ERROR, ANGLE])]
-        rows = rows[~rows.note.astype(str).str.startswith(NOT_JUDGED)]
+        rows = rows[rows.value.notna()]
         found: dict[tuple[str, float], dict[str, float]] = {}
         for name, profile, dt, metric, value in zip(
             rows.engine, rows.profile, rows.dt_s, rows.metric, rows.value
@@ -133,6 +135,11 @@ class SceneScores:
         return {run.name: run.reason for run in self.comparison.middle_runs if run.status != "ok"}
 
     @cached_property
+    def frictionless(self) -> set[str]:
+        """`engine:profile` of those that refuse the scene because they model no friction."""
+        return {run.name for run in self.comparison.middle_runs if run.frictionless}
+
+    @cached_property
     def counts(self) -> bool:
         """Whether it has enough of an exact answer to score engines."""
         return scored(self.comparison)
@@ -152,6 +159,14 @@ class SceneScores:
         """The position error of a run at the middle step size, whatever verdict it fails."""
         key = (name, self.comparison.middle_dt)
         return self.numbers.get(key, {}).get(ERROR, np.nan) if self.counts else np.nan
+
+    def refuses(self, name: str) -> bool:
+        """Whether an engine refuses the scene."""
+        return self.statuses.get((name, self.comparison.middle_dt)) == "unsupported"
+
+    def is_lost(self, name: str) -> bool:
+        """Whether an engine fails, or is more than a radius off; a refusal is neither."""
+        return self.error(name) > LOST and not self.refuses(name)
 
     def verdicts(self, name: str) -> list[tuple[str, float]]:
         """(id, value) of the verdicts that an engine fails at the middle step size."""

@@ -1,14 +1,9 @@
-"""Each scene belongs to a situation; engines, the reader's own solvers and this project's solvers
-are groups that are ranked apart."""
+"""The situation to which each scene belongs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.engines import OWN as OWN_PROFILE
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION = (
@@ -20,7 +15,6 @@ FLIGHT, SINGLE, ROWS, STACKS, CROWDS, SPIN, FRICTION = (
     "Spin",
     "Friction",
 )
-ALL = "All scenes"
 SITUATIONS = {
     FLIGHT: "no collisions in the exact answer",
     SINGLE: "at most two disks move, or no disk meets two others",
@@ -28,12 +22,8 @@ SITUATIONS = {
     STACKS: "gravity and e = 0: contacts that last",
     CROWDS: "disks that meet many others",
     SPIN: "a disk turns; these scenes also count above",
-    ALL: "all situations above",
     FRICTION: "with friction; these scenes count in no other row",
 }
-YOURS, ENGINE = "Your solver", "Engines"
-OWN, EXACT = "Solvers of this project", "Solvers of this project that order collisions by time"
-FAR_OFF = 1.0  # radii: a larger error is visible
 
 
 def situations_of(scenario: Scenario, truth: Trajectory | None) -> list[str]:
@@ -78,22 +68,3 @@ def on_one_line(scenario: Scenario) -> bool:
     along = [spread, scene.velocity, scene.gravity[None]]
     rows = np.vstack([each / (np.abs(each).max() or 1.0) for each in along])
     return int(np.linalg.matrix_rank(rows, tol=1e-9)) <= 1
-
-
-def grouped(names: Iterable[str]) -> dict[str, list[str]]:
-    """`YOURS`, `ENGINE`, `OWN`, `EXACT` -> their names in the given order; empty groups are left
-    out.
-
-    `YOURS` are solvers' files; `ENGINE` are libraries. This project's solvers belong to `EXACT` if
-    their row says so, whatever scenes were played.
-    """
-    groups: dict[str, list[str]] = {YOURS: [], ENGINE: [], OWN: [], EXACT: []}
-    for name in names:
-        row = ENGINES.get(name)
-        if name.endswith(OWN_PROFILE):
-            groups[YOURS].append(name)
-        elif row is None or row.outside:
-            groups[ENGINE].append(name)
-        else:
-            groups[EXACT if row.orders_collisions else OWN].append(name)
-    return {group: members for group, members in groups.items() if members}

@@ -60,7 +60,8 @@ class Summary:
     Attributes:
         scenes: all of them.
         names: every `engine:profile` that was played.
-        untrusted: those that break the protocol or a law, which are not ranked.
+        untrusted: those that broke the protocol, and the reader's own that break a law: their rows
+            stay in the tables, but they are not ranked.
         clock: the times of the run.
     """
 
@@ -114,7 +115,7 @@ class Summary:
         scenes = smooth(self.scenes)
         if len(scenes) < MANY:
             return set()
-        lost = {name: sum(scene.error(name) > LOST for scene in scenes) for name in self.names}
+        lost = {name: sum(scene.is_lost(name) for scene in scenes) for name in self.names}
         return {name for name, count in lost.items() if count > len(scenes) / 2}
 
     def error(self, name: str, kind: str) -> float:
@@ -175,8 +176,8 @@ class Summary:
             for verdict, value in scene.verdicts(played(name, scene)):
                 count[verdict] += 1
                 worst[verdict] = max(worst.get(verdict, (-1.0, "")), (value, scene.name))
-        lost = [s for s in scenes if s.raw_error(played(name, s)) > LOST]
-        refused = [s for s in scenes if played(name, s) in s.refused]
+        lost = [s for s in scenes if s.is_lost(played(name, s))]
+        refused = [s for s in scenes if s.refuses(played(name, s))]
         told = []
         for verdict in [verdict for verdict in VERDICTS if verdict in worst]:
             value, where = worst[verdict]
@@ -187,12 +188,12 @@ class Summary:
             words = f"refuses {len(refused)} of {len(scenes)}"
             told.append(TableCell(words, why, f"#{refused[0].name}", "bad"))
         if lost:
-            far = max(lost, key=lambda s: s.raw_error(played(name, s)))
+            far = max(lost, key=lambda s: np.nan_to_num(s.raw_error(played(name, s))))
             words = f"lost in {len(lost)} of {len(scenes)}"
             if len(lost) == len(scenes) and all(scene.hopeless for scene in scenes):
-                part = [s.follows[played(name, s)] / s.known_until for s in lost]
+                part = [min(s.follows[played(name, s)] / s.known_until, 1) for s in lost]
                 words = f"lost after {100 * float(np.median(part)):.0f} %"
-            title = f"more than a radius off, farthest in {far.name}"
+            title = f"fails, or is more than a radius off; farthest in {far.name}"
             told.append(TableCell(words, title, f"#{far.name}", "bad"))
         return told if len(told) <= MOST_WORDS else [told[0], told[-1]]
 
@@ -227,12 +228,13 @@ class Summary:
         engine, _, profile = name.rpartition(":")
         about = LIBRARIES.get(engine, ("", "yours" if name.endswith(OWN) else ""))[1]
         if name in OURS:
-            about = "our exercise, float64" if name == OURS[0] else "ours, collisions in order"
+            about = "our exercise, float64" if name == OURS[0] else "ours, ordered by time"
         if name in self.libraries and profile != "matched":
             about += f", {profile}"
         version = self.versions.get(engine, "")
         title = label(name) + (f" {version}" if is_library(name) and version else "")
-        return TableCell(title, name, notes=(TableCell(about, css="soft"),))
+        link = f"#settings_{engine}" if name in self.libraries else ""
+        return TableCell(title, name, link, notes=(TableCell(about, css="soft"),))
 
     @cached_property
     def versions(self) -> dict[str, str]:
@@ -251,7 +253,9 @@ class Summary:
             return []
         told = []
         near = self.nearest(WITHOUT)
-        first = Markup("Without friction {}").format(tied(near))
+        rough = self.nearest(FRICTION) if FRICTION in self.situations else None
+        where = ", with friction and without" if near == rough else " without friction"
+        first = tied(near) + where
         costs = {name: self.cost(name, WITHOUT) for name in self.libraries}
         costs = {name: cost for name, cost in costs.items() if not np.isnan(cost)}
         if costs:
@@ -259,8 +263,8 @@ class Summary:
                 label(min(costs, key=costs.__getitem__))
             )
         first += "."
-        if FRICTION in self.situations:
-            first += Markup(" With friction {}.").format(tied(self.nearest(FRICTION)))
+        if rough not in (None, near):
+            first += Markup(" With friction {}.").format(tied(rough))
         told.append(first)
         lost = [kind for kind in self.situations if kind != SPIN and not self.best(kind) < LOST]
         second = Markup("")
@@ -271,7 +275,7 @@ class Summary:
         scenes = smooth(self.scenes)
         ranges = {
             profile: sorted(
-                sum(scene.error(f"{engine}:{profile}") > LOST for scene in scenes)
+                sum(scene.is_lost(f"{engine}:{profile}") for scene in scenes)
                 for engine, of in self.profiles.items()
                 if f"{engine}:{profile}" in of
             )
@@ -288,13 +292,9 @@ class Summary:
             exact = sum(scene.error(OURS[1]) < EXACT for scene in scenes)
             cost = self.cost(OURS[1], WITHOUT)
             of = f"{exact} of {len(scenes)}"
-            third = f"A solver that takes collisions in order of time is exact in {of}"
-            told.append(
-                Markup(
-                    third
-                    + (f" and costs {style.number(cost, 2)} µs a step." if cost == cost else ".")
-                )
-            )
+            costs_text = "" if np.isnan(cost) else f" and costs {style.number(cost, 2)} µs a step"
+            third = f"A solver that takes collisions in order of time (ordered) is exact in {of}"
+            told.append(Markup(f"{third}{costs_text}."))
         return [each for each in told if each]
 
     def nearest(self, kind: str) -> list[str]:
@@ -306,18 +306,18 @@ class Summary:
         """The first section of the report."""
         steps = Counter(step_text(scene.comparison.middle_dt) for scene in self.scenes)
         step = steps.most_common(1)[0][0] + (" in most scenes" if len(steps) > 1 else "")
-        cost = (
-            "Small: the time of a step."
-            if self.costs
-            else escape(self.clock.fault or "No scene was timed.")
-        )
+        cost = "Small: the time of a step. " if self.costs else ""
+        fault = "" if self.costs else self.clock.fault or "No scene was timed."
+        matched = all(name.endswith(":matched") for name in self.libraries)
+        settings = " Libraries have <a href='#settings'>matched settings</a>: click a name."
         says = Markup(
             "Large: how far a disk is from its exact place at worst, in radii of the disk, at the"
-            " usual step ({}); median of the scenes. {} <span class='best'>Green</span>: nearest;"
+            " usual step ({}); median of the scenes. {}<span class='best'>Green</span>: nearest;"
             " within a factor of {:.0f} is a tie, as half the step changes as much. <span"
-            " class='bad'>Red</span>: what goes wrong in the worst scene, a click shows it; lost:"
-            " more than a radius off. A run that fails so counts as infinitely far off."
-        ).format(step, cost, TIE)
+            " class='bad'>Red</span>: what goes wrong, a click shows the worst scene; lost: a disk"
+            " is more than a radius off, or the run fails (sinks, tunnels, gains energy, ...),"
+            " which counts as infinitely far off.{} {}"
+        ).format(step, cost, TIE, Markup(settings * (matched and bool(self.libraries))), fault)
         return Section("", says, [self.table()])
 
 

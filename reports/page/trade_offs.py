@@ -57,7 +57,7 @@ def error_against_cost(summary: Summary) -> Section | None:
     says = f"Medians of {len(scenes)} scenes, at all step sizes; filled: the usual one.{thin}"
     if not timed:
         says += f" {summary.clock.fault}"
-    return Section("Error against cost", says, [Chart(svg_of(figure, says))], css="pair")
+    return Section("Error against cost", says, [Chart(svg_of(figure, says))], css="pair", id="cost")
 
 
 def line(summary: Summary, scenes: Sequence[SceneScores], name: str, faint: bool = False) -> Line:
@@ -106,6 +106,9 @@ def cost_against_size(summary: Summary) -> Section | None:
         "A gas that covers 30 % of a box, by crosscheck speed on another machine. The reference"
         " tests every pair, the others only neighbours."
     )
+    drawn = {each.name for each in lines}
+    if missing := [label(name) for name in summary.libraries if name not in drawn]:
+        says += f" Not measured: {', '.join(missing)}."
     chart = Chart(svg_of(figure, f"Time of a step against the number of disks. {says}"))
     return Section("Cost against the number of disks", says, [chart], css="pair")
 
@@ -127,8 +130,8 @@ def limits(summary: Summary) -> Section | None:
     frame = pd.DataFrame(rows, index, [label(name) for name in names], dtype=object)
     says = (
         "One quantity is made harsher until the engine fails; the number is the last that works."
-        " Holds: at all values tried; never: at none. Small: the other settings, where they reach"
-        " less far. Found by crosscheck stability --full, not in this run."
+        " Holds: at all values tried; never: at none; –: not measured. Small: the other settings,"
+        " where they reach less far. Found by crosscheck stability --full, not in this run."
     )
     return Section("Where each method fails", says, [Table(frame, css="fixed limits")], id="limits")
 

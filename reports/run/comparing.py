@@ -243,6 +243,7 @@ def run_of(record: Record, file: bytes) -> Run:
         seconds=record["seconds"],
         settings={name: tuple(pair) for name, pair in record["settings"].items()},
         versions=record["versions"],
+        frictionless=record.get("frictionless", False),  # a run of before has none
     )
 
 

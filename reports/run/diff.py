@@ -140,7 +140,8 @@ def difference(before: Path, after: Path) -> Difference:
     # of these scene, settings and versions are the same
     alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
     numbers, same = changed_numbers(*tables, alike if like else set(), edited)
-    statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, both, edited)
+    played = {name for name in both if all(side[name]["status"] == "ok" for side in cells)}
+    statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, played, edited)
     busy = [results for results in (one, other) if results.timings and is_busy(results)]
     warnings += [
         f"{results.folder}: its times are not compared: two timings of the same engine"
@@ -216,20 +217,19 @@ def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> li
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, both: Collection[Name], edited: Collection[str]
+    before: pd.DataFrame, after: pd.DataFrame, played: Collection[Name], edited: Collection[str]
 ) -> list[Change]:
-    """The cells that `both` runs played but only one judged, so that only that one has numbers."""
+    """The cells that both runs `played` but only one judged, so that only that one has numbers."""
     reasons = [
         {
             ((r["scenario"], f"{r['engine']}:{r['profile']}", float(r["dt_s"])), r["versus"]): r
             for r in table[table.metric == "status"].to_dict("records")
-            if r["note"].startswith(NOT_JUDGED)
         }
         for table in (before, after)
     ]
     changes = []
     for cell, versus in sorted(reasons[0].keys() ^ reasons[1].keys()):
-        if cell in both:
+        if cell in played:
             scenario, engine, dt = cell
             what = f"{scenario}  dt {dt:.4g} s  against {versus}: status"
             was, now = (of.get((cell, versus), {"note": "judged"})["note"] for of in reasons)
@@ -270,10 +270,7 @@ def changed_numbers(
         engines = [row["name"], beside] if beside else [row["name"]]
         was, now = (float(row[key] or "nan") for key in ("value", "value_after"))
         must = all((scenario, name, dt) in equal for name in engines)
-        first, second = (
-            NOT_JUDGED if row[f"note{end}"].startswith(NOT_JUDGED) else row[f"value{end}"]
-            for end in ("", "_after")
-        )
+        first, second = (row[key] or NOT_JUDGED for key in ("value", "value_after"))
         what = f"{scenario}  dt {dt:.4g} s  {row['metric']} against {row['versus']}"
         if NOT_JUDGED in (first, second):
             verdict = "other"

@@ -177,6 +177,7 @@ class Suite:
             "dt_s": run.dt,
             "status": run.status,
             "reason": run.reason,
+            "frictionless": run.frictionless,
             "step": (samples - 1) * cell.substeps if samples else -1,
             "until_s": float(scenario.times[samples - 1]) if samples else nan,
             "seconds": run.seconds,

@@ -431,7 +431,7 @@ class Inquiry:
         """What each engine, of which all attempts are given, coarse to fine, comes to; until when
         it keeps the error; and the cause of its error, at the coarsest step that has at most twice
         its least error."""
-        best = [min(each, key=smallest) for each in ladders]
+        best = [min(each, key=lambda x: inf if isnan(x.error) else x.error) for each in ladders]
         usual = [next((x for x in each if x.dt <= self.usual), each[-1]) for each in ladders]
         longest = [max(each, key=lambda one: (reach(one), one.dt)) for each in ladders]
         if purpose in LASTING:
@@ -444,7 +444,8 @@ class Inquiry:
         for least, each in zip(best, ladders):
             if isfinite(least.error):
                 at = next(one for one in each if one.error <= 2 * least.error)
-                asked = played_as(least.name), at.substeps, purpose, bound
+                bits = row_of(least.name).bits_of or least.name  # what plays the same
+                asked = bits, at.substeps, purpose, bound
                 tasks[least.task] = partial(cause, self.scene, self.seed, *asked)
         causes = self.done(tasks, "cause of the error", SEARCH)
         rows = []
@@ -473,11 +474,6 @@ class Inquiry:
     ) -> dict[Any, Any]:
         """The outcome of each task, from worker processes; each may take `patience` s."""
         return dict(done(tasks, self.workers, self.progress, what, patience))
-
-
-def smallest(one: Attempt) -> float:
-    """Sort key: the error; an attempt that failed or cannot be judged comes last."""
-    return one.error if isfinite(one.error) else inf
 
 
 def reach(one: Attempt) -> float:
@@ -573,8 +569,3 @@ def times_of_whole(
         for key, make in makes.items()
     ]
     return interleaved(what, ROUNDS, BUDGET, seed)
-
-
-def played_as(name: str) -> str:
-    """The engine whose bits this engine gives in the scene, which may be itself."""
-    return row_of(name).bits_of or name

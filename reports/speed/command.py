@@ -21,10 +21,10 @@ from crosscheck2d.reports.speed import figures
 from crosscheck2d.reports.speed.effort import FULL, QUICK
 from crosscheck2d.reports.speed.explained import sentence
 from crosscheck2d.reports.speed.kept import Kept
-from crosscheck2d.reports.speed.measure import Measured, Measuring
+from crosscheck2d.reports.speed.measure import Measuring
 from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_page
 from crosscheck2d.reports.speed.plan import SpeedPlan
-from crosscheck2d.reports.speed.results import QUIET, Results
+from crosscheck2d.reports.speed.results import Results
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
 from crosscheck2d.reports.terminal.progress import Progress
@@ -61,9 +61,16 @@ def run_speed(
     with opening(out, SPEED, fresh) as store:
         kept = kept_of(plan, header, store)
         with keeping(out, lambda: "The finished part is kept: give the same command again"):
-            measured, header = carry_out(plan, header, kept)
+            with Progress() as progress:
+                measured = Measuring(plan, progress, kept).run()
+                progress.say("writing the tables and the page")
+                header |= {"seconds": progress.seconds, "load": measured.busy}
+            header["measured"] = kept.first
             if measured.errors.empty:
-                nothing_measured(measured)
+                for what, why in measured.left_out:
+                    say(f"{what}: {why}")
+                say("no scene that was asked for has an exact answer, so no error can be measured")
+                sys.exit(FAILED)
             results = Results(plan, measured)
             write_all(store, results, header)
         print_summary(results, str(store.folder / PAGE))
@@ -73,14 +80,6 @@ def run_speed(
                 highlight=False,
             )
     sys.exit(DONE)
-
-
-def nothing_measured(measured: Measured) -> NoReturn:
-    """Print why no error can be measured; exits 1."""
-    for what, why in measured.left_out:
-        say(f"{what}: {why}")
-    say("no scene that was asked for has an exact answer, so no error can be measured")
-    sys.exit(FAILED)
 
 
 def kept_of(plan: SpeedPlan, header: Mapping[str, Any], store: Store) -> Kept:
@@ -96,17 +95,6 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], store: Store) -> Kept:
         "whole": plan.whole,
     }
     return Kept(store, asked | {key: header[key] for key in ("seed", "versions", "machine")})
-
-
-def carry_out(
-    plan: SpeedPlan, header: dict[str, Any], kept: Kept
-) -> tuple[Measured, dict[str, Any]]:
-    """What was measured, and the header of tables and page."""
-    with Progress() as progress:
-        measured = Measuring(plan, progress, kept).run()
-        progress.say("writing the tables and the page")
-        times = {"seconds": progress.seconds, "load": measured.busy}
-        return measured, header | times | {"measured": kept.first}
 
 
 def write_all(store: Store, results: Results, header: Mapping[str, Any]) -> None:
@@ -141,8 +129,8 @@ def print_summary(results: Results, page: str) -> None:
     said += filter(None, [said_of_cheaper(results.pooled_reached)])
     if len(results.explained):
         said.append(f"Error budget: {sentence(results.explained)}.")
-    said.append(said_of_noise(results))
-    said += [f"Left out: {what}: {why}." for what, why in results.left_out]
+    said.append(results.noise_sentence)
+    said += [f"Left out: {what}: {why}." for what, why in results.measured.left_out]
     print_list(console, said)
     console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
 
@@ -159,21 +147,3 @@ def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
     if any(" of " in cell for cell in cells):
         found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few to compare"
     return found
-
-
-def said_of_noise(results: Results) -> str:
-    """The noise floor in a sentence, and what to do where it is too loud."""
-    noise = results.noise_floor()
-    if not noise.pairs:
-        return "No engine was timed against itself, so the noise floor is not known."
-    said = (
-        f"Noise floor: the time of an engine over its own time again is {noise.median:.3f}; for"
-        f" half of {noise.pairs} pairs it is from {noise.low:.3f} to"
-        f" {noise.high:.3f}."
-    )
-    if noise.floor <= QUIET:
-        return said
-    return (
-        f"{said} It must stay between 0.95 and 1.05: measure again while nothing else runs before"
-        " you quote a time."
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS
+from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.model import Scenario
 
 FEWEST_STEP_SIZES, MOST_STEP_SIZES = 3, 9
@@ -48,10 +48,6 @@ class Effort:
         "line_gas",
         "column_of_ten",
     )
-
-    def seeds_of(self, scene: str, seed: int) -> list[int]:
-        """The seeds of a random scene; one of another."""
-        return list(range(seed, seed + self.seeds)) if scene in RANDOM else [seed]
 
     def ladder(self, scenario: Scenario) -> tuple[int, ...]:
         """Steps in a sample interval, as `doublings` with `most_steps`."""

@@ -34,7 +34,7 @@ from crosscheck2d.reports.speed import explained, tables
 from crosscheck2d.reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
 from crosscheck2d.reports.speed.explained import LEAST
 from crosscheck2d.reports.speed.plan import PLAIN
-from crosscheck2d.reports.speed.results import QUIET, Results
+from crosscheck2d.reports.speed.results import Results
 from crosscheck2d.reports.speed.scored_part import scored
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import put_text
@@ -109,15 +109,16 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         driving_section(results),
         scenes_section(results),
     ]
-    if results.left_out:
-        items = [f"{what}: {reason}" for what, reason in results.left_out]
+    if results.measured.left_out:
+        items = [f"{what}: {reason}" for what, reason in results.measured.left_out]
         sections.append(Section(f"Left out: {len(items)}", "", [Text(items=items)], True))
+    names = [*results.plan.engines, *(sweep.name for sweep in results.plan.sweeps)]
     page = Page(
         "Speed against accuracy",
         [*sections, run_section(about)],
         GENERATOR,
         lead,
-        looks=style.looks_of([*results.names, *(sweep.name for sweep in results.plan.sweeps)]),
+        names=names,
         links=neighbours(path, "speed"),
         footer=f"Made by {about['command']}. The errors come out the same, bit for bit; the times"
         " are this machine's. Every sample is in speed_samples.csv, every error in"
@@ -227,20 +228,8 @@ def chart_of(lines: Sequence[Line], label: str, title: str, caption: str, **axes
 
 def pooled_section(results: Results) -> Section:
     """All scenarios at once."""
-    noise, pooled = results.noise_floor(), results.pooled
+    pooled = results.pooled
     steps, scenes = pooled.step_size.nunique(), counted(len(results.scenes), "scene")
-    floor = "No engine was timed against itself, so the noise floor is not known."
-    if noise.pairs:
-        floor = (
-            f"Noise floor: an engine against itself in the same rounds reads"
-            f" {number(noise.median)}, half of {noise.pairs} pairs from {number(noise.low)} to"
-            f" {number(noise.high)}, the worst {number(noise.least)} and {number(noise.most)}."
-        )
-        if noise.floor > QUIET:
-            floor += (
-                " It should stay within 0.95 and 1.05. Differences of time below this floor mean"
-                " nothing."
-            )
     caption = (
         f"Each point is an engine at one of the {counted(steps, 'step size')} that all scenes have:"
         f" error and cost are geometric means of the middle half of {scenes}:"
@@ -251,22 +240,16 @@ def pooled_section(results: Results) -> Section:
         f" {LOWEST:g} are drawn there."
     )
     chart = chart_of(drawn_lines(pooled), "error against cost", "Error against cost", caption)
-    return Section("All scenes pooled", floor, [chart, reached_table(results)], id="pooled")
+    parts: list[Part] = [chart, reached_table(results)]
+    return Section("All scenes pooled", results.noise_sentence, parts, id="pooled")
 
 
 def reached_table(results: Results) -> Table:
     """What each accuracy costs, over the scenes."""
-    found = results.pooled_reached.assign(name=results.pooled_reached.apply(name_of, axis=1))
-    cells = {
-        (row["name"], row["accuracy"]): TableCell(cost_of(row), row["why"])
-        for row in found.to_dict("records")
-    }
-    names = list(dict.fromkeys(found.name))
-    frame = pd.DataFrame(
-        {accuracy: [cells[name, accuracy] for name in names] for accuracy in ACCURACIES},
-        index=names,
-        dtype=object,
-    )
+    rows: dict[str, dict[str, TableCell]] = {}
+    for row in to_rows(results.pooled_reached):
+        rows.setdefault(name_of(row), {})[row["accuracy"]] = TableCell(cost_of(row), row["why"])
+    frame = pd.DataFrame.from_dict(rows, "index", dtype=object)[list(ACCURACIES)]
     caption = (
         "What an error, in radii, costs: µs per simulated second (in how many of the scenes), at"
         " the cheapest step size from which on all finer steps keep it, too. Each engine is"
@@ -348,7 +331,7 @@ def budget_sections(results: Results) -> list[Section]:
     budget, found = results.measured.budget, results.explained
     if budget.empty:
         return []
-    absent = [n for n in results.names if n not in set(found.engine + ":" + found.profile)]
+    absent = [n for n in results.plan.engines if n not in set(found.engine + ":" + found.profile)]
     closed = number(float(budget.closed_deviation_radii.max()), 1)
     texts = [
         "The ablated reference is the hand-written solver with an option for every mechanism by"
@@ -568,19 +551,13 @@ def size_sections(results: Results) -> list[Section]:
     words = {"x": "disks", "y": "engine time of a step, µs", "unit": ""}
     title = "Cost of a step against the number of disks"
     chart = chart_of(lines, title, title, caption, **words)
-    wide = costs.assign(name=costs.engine + ":" + costs.profile)
-    cells = {
-        (row["name"], row["n"]): TableCell(
-            row["cost"], side=f"worst {number(row['worst'])}", title=quartiles(row)
-        )
-        for row in to_rows(wide)
-    }
-    names, numbers = list(dict.fromkeys(wide.name)), sorted(set(costs.n))
-    steps = pd.DataFrame(
-        {f"{n} disks": [cells.get((name, n), "") for name in names] for n in numbers},
-        index=names,
-        dtype=object,
-    )
+    rows: dict[str, dict[str, TableCell]] = {}
+    for row in to_rows(costs):
+        worst = f"worst {number(row['worst'])}"
+        cell = TableCell(row["cost"], quartiles(row), side=worst)
+        rows.setdefault(name_of(row), {})[f"{row['n']} disks"] = cell
+    steps = pd.DataFrame.from_dict(rows, "index", dtype=object).fillna("")
+    steps = steps[[f"{n} disks" for n in sorted(set(costs.n))]]
     parts: list[Part] = [chart, Table(steps, corner="µs a step"), growth_table(growth)]
     pile = results.pile
     if len(pile):

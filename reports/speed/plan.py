@@ -13,6 +13,7 @@ from crosscheck2d.adapters.mechanisms.options import OPTIONS, SWEEPS, Option, Sw
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import ladder
 from crosscheck2d.reports.speed.effort import Effort
+from crosscheck2d.scenarios.catalogue import RANDOM
 
 SCENE, OPTION, SWEEP = "scene", "option", "sweep"
 PLAIN = ""  # the change of an engine that is not changed
@@ -93,7 +94,9 @@ class SpeedPlan:
         """(scene, seed) for which an exact answer is needed."""
         scenes = dict.fromkeys((*self.scenes, *self.option_scenes, *self.sweep_scenes))
         seeded = [
-            (scene, seed) for scene in scenes for seed in self.effort.seeds_of(scene, self.seed)
+            (scene, self.seed + k)
+            for scene in scenes
+            for k in range(self.effort.seeds if scene in RANDOM else 1)
         ]
         return seeded + [(scene, self.seed) for scene in self.budget_scenes if scene not in scenes]
 

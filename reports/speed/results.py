@@ -60,16 +60,6 @@ class Results:
         self.noise = tables.noise(measured)
 
     @property
-    def names(self) -> list[str]:
-        """`engine:profile` of every engine, in the order of `ENGINES`."""
-        return list(self.plan.engines)
-
-    @property
-    def left_out(self) -> list[tuple[str, str]]:
-        """(what, why) of what could not be measured."""
-        return self.measured.left_out
-
-    @property
     def scenes(self) -> list[str]:
         """The measured scenarios."""
         return list(self.asks)
@@ -78,6 +68,25 @@ class Results:
         """That of an engine against itself, in one scene or in all; quiet up to `QUIET`."""
         ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
         return noise_of(ratios.to_numpy(float))
+
+    @property
+    def noise_sentence(self) -> str:
+        """The noise floor of all scenes, and what to do where it is too loud."""
+        noise = self.noise_floor()
+        if not noise.pairs:
+            return "No engine was timed against itself, so the noise floor is not known."
+        said = (
+            "Noise floor: the time of an engine over its own time again, in the same rounds, is"
+            f" {noise.median:.3f}; for half of {noise.pairs} pairs it is from {noise.low:.3f} to"
+            f" {noise.high:.3f}, at worst {noise.least:.3f} and {noise.most:.3f}."
+        )
+        if noise.floor > QUIET:
+            said += (
+                f" It must stay between {1 - QUIET:g} and {1 + QUIET:g}: differences of time below"
+                " this floor mean nothing. Measure again while nothing else runs before you quote"
+                " a time."
+            )
+        return said
 
     @property
     def files(self) -> dict[str, pd.DataFrame]:

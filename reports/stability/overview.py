@@ -10,7 +10,7 @@ from math import isnan
 import numpy as np
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.page.situations import ENGINE, FAR_OFF, grouped
+from crosscheck2d.reports.page.scenes import LOST, is_library
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability.cases_friction import FRICTION
 from crosscheck2d.reports.stability.limits import (
@@ -121,7 +121,7 @@ def in_report(case: Case) -> str:
         differ += f" {varies}"
     return (
         f"{case.report} is {differ}. In the report an engine fails if a disk is more than"
-        f" {number(FAR_OFF)} radius from its exact position, or if there is no result. Here it"
+        f" {number(LOST)} radius from its exact position, or if there is no result. Here it"
         f" fails if {case.predicate.means}. So an engine may fail here and not in the report, or"
         " the other way round."
     )
@@ -184,7 +184,7 @@ def fewest_and_most(limits: Sequence[Limit], which: str) -> list[str]:
     these = f"the {cases} cases{which}" if which else f"these {cases} cases"
     sentence = f"In {these} the fewest failures are those of {engines_with(fails, min)}, the most"
     sentence += f" are those of {engines_with(fails, max)}. A refusal counts as a failure."
-    libraries = {engine: fails[engine] for engine in grouped(fails).get(ENGINE, [])}
+    libraries = {engine: count for engine, count in fails.items() if is_library(engine)}
     if libraries and min(libraries.values()) > min(fails.values()):
         sentence += f" Of the libraries, the fewest are those of {engines_with(libraries, min)}."
     return [sentence]

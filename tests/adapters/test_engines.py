@@ -142,6 +142,7 @@ def test_an_engine_plays_friction_or_says_that_it_does_not(name):
     run = played(name, one, one.dt(1))
     if run.status == "unsupported":
         assert "does not model friction, the scene has 0.2" in run.reason
+        assert run.frictionless
     else:
         assert run.trajectory is not None
         # By the exact answer it rolls at 8 rad/s. pymunk as shipped has friction 0.2 times 0.2, and

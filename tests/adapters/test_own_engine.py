@@ -182,6 +182,7 @@ def test_a_scene_with_more_is_refused_by_name(scene: str, words: str, reason: st
     run = played(path, scene)
 
     assert (run.status, run.reason.startswith(reason)) == ("unsupported", True), run.reason
+    assert run.frictionless == (reason == "ball.js does not model friction")
 
 
 QUICK = 3  # of the faults that the fast suite plays

@@ -219,6 +219,20 @@ def test_a_velocity_that_overflows_is_judged_and_bad():
     assert NOT_JUDGED not in found.note
 
 
+def test_a_number_of_the_table_is_nan_only_where_it_is_not_judged():
+    """An overflow is infinitely far off, so that no reader takes it for a number that is left
+    out."""
+    one, truth = truth_of("wall_to_wall")
+    huge = replace(truth, velocity=truth.velocity * 1e200)
+    run = Run("pymunk", "matched", one.name, one.dt(1), trajectory=huge)
+    with np.errstate(over="ignore", invalid="ignore"):
+        table = compare(one, [run]).table
+    unjudged = table.note.str.startswith(NOT_JUDGED)
+
+    assert np.isinf(table.value).any()
+    assert (table.value.isna() == unjudged).all()
+
+
 def test_a_failed_run_is_no_number_that_is_not_judged():
     """Its row is a status."""
     one = scenario("wall_to_wall")

@@ -50,7 +50,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sections = [
         kit.Section("Table", HOSTILE, [kit.Table(frame, ["G", "G"], opens=opens, sortable=True)]),
         kit.Section("Chart", "", [some_chart()], css="pair"),
-        kit.Section("Fold", "folded", [kit.Code("a = 1 < 2", "Code"), some_replay()], True, "fold"),
+        kit.Section("Fold", "folded", [kit.Code("a = 1 < 2"), some_replay()], True, "fold"),
     ]
     page = kit.Page("A page", sections, "test", [HOSTILE], [*NAMES, style.TRUTH])
     path = tmp_path_factory.mktemp("kit") / "page.html"

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from crosscheck2d.adapters.friction import REFUSAL
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.page.findings import early_ends, not_counted, refusals
@@ -47,13 +46,13 @@ def test_each_sentence_has_its_lines():
 def test_a_reason_to_refuse_is_said_once_with_its_cells():
     """Whoever gave it; a scene with friction that an engine does not model has its own place."""
     walls, other = "the exercise has no walls", "the file has e = 0.9, the scene needs 0.5"
-    friction = f"it {REFUSAL}, the scene has 0.2"
     refused = [("a.js", walls), ("b.js", walls), ("a.js", walls), ("a.js", other)]
     scene = scenario("head_on_equal_e05")
     runs = [
         Run(file, "own", scene.name, 0.1 / k, "unsupported", why)
-        for k, (file, why) in enumerate([*refused, ("a.js", friction)], 1)
+        for k, (file, why) in enumerate(refused, 1)
     ]
+    runs.append(replace(runs[0], reason="it models none", frictionless=True))
 
     assert refusals([compare(scene, runs)]) == [
         f"a.js and b.js refused 3 cells: {walls}.",

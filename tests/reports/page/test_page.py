@@ -143,6 +143,22 @@ def test_a_word_of_the_table_opens_its_worst_scene(page: Page):
     page.locator(f"#{name} + tr.opened canvas").first.wait_for()
 
 
+def test_a_click_on_a_library_opens_its_settings(page: Page):
+    """Though both the section and its part are folded."""
+    page.locator("table.main thead a", has_text="pymunk").click()
+    page.locator("#settings_pymunk pre").wait_for()
+
+
+def test_every_titled_section_is_one_click_from_the_first_screen(page: Page):
+    """Also the folded ones; a click opens them."""
+    links = page.locator("nav a[href^='#']")
+    titles = links.all_inner_texts()
+    links.filter(has_text="How far to trust this").click()
+    page.get_by_text("They share no code with any engine").wait_for()
+
+    assert {"Settings", "All scenes", "Your solver, your scene"} < {*titles}
+
+
 @pytest.mark.slow
 def test_the_page_never_scrolls_sideways(browser: Browser, path: Path):
     """Narrow, wide or on paper, with all of it open, however long a word is."""

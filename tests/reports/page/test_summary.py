@@ -12,20 +12,17 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.findings import ranked
 from crosscheck2d.reports.page.scene_map import map_section
 from crosscheck2d.reports.page.scenes import ANGLE, scenes_of
 from crosscheck2d.reports.page.situations import (
     CROWDS,
-    ENGINE,
-    EXACT,
     FLIGHT,
     FRICTION,
-    OWN,
     ROWS,
     SINGLE,
     SPIN,
     STACKS,
-    grouped,
     situations_of,
 )
 from crosscheck2d.reports.page.summary import WITHOUT, Summary, summarize
@@ -85,11 +82,12 @@ def test_without_an_answer_all_disks_may_meet():
     assert situations_of(scenario("head_on_equal_e1"), None)[0] == SINGLE
 
 
-def test_an_engine_stands_in_one_group_whatever_was_played():
-    """That it orders collisions is said in its row, and not read off errors."""
+def test_an_engine_that_orders_collisions_is_ranked_apart_whatever_was_played():
+    """That it does is said in its row, and not read off errors."""
     names = ["pymunk:matched", "reference:exercise", "reference:ordered", "event_driven:float64"]
 
-    assert grouped(names) == {ENGINE: names[:1], OWN: names[1:2], EXACT: names[2:]}
+    assert ranked(Summary([], ["a.js:own", *names])) == names[:2]
+    assert ranked(Summary([], names[2:])) == names[2:]
 
 
 def test_a_library_has_one_profile_the_nearer_in_more_scenes(summary: Summary):
@@ -133,6 +131,17 @@ def test_failing_one_more_scene_never_lowers_a_median(comparisons: list[Comparis
     cell = after.cell("pymunk:matched", SINGLE)
     assert cell.notes[0].text == "momentum off by 100 %"
     assert cell.notes[0].link == "#oblique_e09"
+
+
+def test_the_last_row_counts_the_scenes_that_the_rows_and_the_sentence_count(summary: Summary):
+    """A scene is lost where an engine fails or is a radius off, once."""
+    for name in ("box2d:shipped", "pymunk:matched"):
+        lost = [s.name for s in summary.situations[WITHOUT] if s.is_lost(name)]
+        words = [note.text for note in summary.words(name, WITHOUT)]
+        assert (f"lost in {len(lost)} of 3" in words) == bool(lost)
+    assert summary.situations[WITHOUT][-1].is_lost("box2d:shipped")  # it does not bounce
+    assert not summary.scenes[-1].is_lost("reference:exercise")  # it refuses friction
+    assert summary.scenes[-1].refuses("reference:exercise")
 
 
 def test_scenes_with_friction_count_in_their_own_row_only(summary: Summary):

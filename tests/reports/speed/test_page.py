@@ -3,6 +3,7 @@ offline."""
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -167,6 +168,20 @@ def test_the_page_of_speed_opens_with_which_engine_for_what(
     assert len(costs) == 3 * len(PLAYED)
     assert any("crosscheck advise my_scene.toml --error 1%" in text for text in lead)
     assert heard == []
+
+
+def test_times_that_mean_nothing_are_called_so(results: Results):
+    """By how far an engine is from itself; without a pair nothing is known."""
+    loud, quiet, alone = copy(results), copy(results), copy(results)
+    loud.noise, quiet.noise = (
+        pd.DataFrame({"scenario": "free_fall", "ratio": ratios}) for ratios in ([0.8, 1.3], [1.01])
+    )
+    alone.noise = loud.noise.head(0)
+
+    assert "below this floor mean nothing" in loud.noise_sentence
+    assert "is 1.010" in quiet.noise_sentence
+    assert "mean nothing" not in quiet.noise_sentence
+    assert "not known" in alone.noise_sentence
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):

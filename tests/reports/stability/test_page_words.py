@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from crosscheck2d.reports.page.situations import FAR_OFF
+from crosscheck2d.reports.page.scenes import LOST
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import LIMIT, Case, Limit, Trial
@@ -62,6 +62,6 @@ def test_the_column_of_the_report_and_that_of_the_limits_are_told_apart():
     assert f"{len(one.scene.walls)} wall for {number(one.duration)} s, at dt {dt} ms" in said
     assert f"here {len(mine.scene.walls)} walls for {number(mine.duration)} s" in said
     assert f"dt is {held(CASES['column'])['dt']}" in said
-    assert f"more than {number(FAR_OFF)} radius" in said
+    assert f"more than {number(LOST)} radius" in said
     assert CASES["column"].predicate.means in said
     assert f"{COLUMN} is the same scene, at dt {dt} ms; here dt is varied." in same
