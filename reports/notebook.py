@@ -108,7 +108,9 @@ def run(
     seed: int = 0,
     timeout: float = 60.0,
 ) -> ShownRuns:
-    """Run scenes through engines and compare: one number a row, as in deviations.csv.
+    """Run scenes through engines and compare: one number a row, as in deviations.csv. A notebook
+    shows the score of each engine, its chart if there are several step sizes, and a replay; a
+    script can write this page, `_repr_html_()`, to a file.
 
     Args:
         engines: NAME, NAME:PROFILE or a FILE of your own; default: those of `crosscheck`.

@@ -10,7 +10,7 @@ FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 
 
 class Departure(NamedTuple):
-    """One probe that an engine does not keep.
+    """One probe that an engine refuses or does not keep.
 
     Attributes:
         engine: a key of `ENGINES`.

@@ -1,7 +1,7 @@
 """The metrics: the function, the unit, and what each is measured against.
 
 To add one, write `def name(view) -> Value | None` and its row in `METRICS`. A metric that does not
-apply to a scene returns None.
+apply to a scene returns None. CONTRIBUTING.md says which tests it must pass.
 """
 
 from __future__ import annotations

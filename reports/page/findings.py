@@ -91,7 +91,7 @@ def own_sentence(name: str, summary: Summary) -> str:
     if lost:
         told += f", not in {', '.join(lost[:3])}{f' and {len(lost) - 3} more' * (len(lost) > 3)}"
     if refused:
-        told += f", not played in {refused}"
+        told += f", not counting {refused} that it refuses"
     return f"{told}. It is not ranked among the engines."
 
 

@@ -111,6 +111,8 @@ def unfinished(results: RunResults) -> str:
 
 
 def how_broken(row: Mapping[str, Any]) -> str:
-    """The probe of the protocol that an engine failed: question and answer."""
+    """The probe of the protocol that an engine failed: question and answer, or what it raised."""
+    if row["got"] == "raised":
+        return f"It raised {row['note']}. The probe was: {row['asked']}"
     note = f" ({row['note']})" if row["note"] else ""
     return f"{row['asked']} {str(row['got']).capitalize()}{note}; expected: {row['expected']}."

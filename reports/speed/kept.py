@@ -56,5 +56,5 @@ class Kept:
 
 
 def now() -> str:
-    """The date and time."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
+    """The date and time, in the form of `started` of a header, with which it is compared."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")

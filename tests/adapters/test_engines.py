@@ -310,12 +310,20 @@ def test_a_dt_that_does_not_divide_the_sample_interval_is_not_played():
         played("reference:exercise", asked(one_disk()), 0.03)
 
 
+def told_or_skipped(name, scene):
+    """The settings and versions of an engine in a scene that it may refuse."""
+    try:
+        with loaded(ENGINES[name], scene) as engine:
+            return engine.settings(), engine.versions()
+    except Unsupported as refusal:
+        pytest.skip(str(refusal))
+
+
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_what_was_asked_of_an_engine_is_what_it_resolved(name, e):
     """Every setting has a resolved value, and it is the one asked for, where one was."""
-    with loaded(ENGINES[name], replace(plain(), restitution=e)) as engine:
-        settings, versions = engine.settings(), engine.versions()
+    settings, versions = told_or_skipped(name, replace(plain(), restitution=e))
     assert settings
     assert versions
     for setting, (wanted, resolved) in settings.items():
@@ -370,8 +378,7 @@ def test_box2d_v3_reads_its_length_unit_off_the_engine():
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_setting_that_cannot_be_read_back_says_so(name):
     """An argument of every step is kept by nobody, so it is not what was asked for."""
-    with loaded(ENGINES[name], plain()) as engine:
-        settings = engine.settings()
+    settings, _ = told_or_skipped(name, plain())
     for setting in ("substeps", "velocity, position iterations"):
         if setting in settings and "box2d" in name:
             assert settings[setting][1] == "passed with every step"

@@ -44,11 +44,13 @@ def torus(**changed: object) -> Scenario:
 
 
 def run_of(name: str, scenario: Scenario, substeps: int) -> Run:
-    """A run on a fresh engine; a test of an npm package that is not there is skipped."""
+    """A run on a fresh engine; skipped if its npm package is not there, or it refuses the scene."""
     if name in FETCHED and (reason := missing(FETCHED[name].package)):
         pytest.skip(reason)
     with closing(row_of(name).make()) as engine:
         run = play(engine, name, scenario, scenario.dt(substeps))
+    if run.status == "unsupported":
+        pytest.skip(run.reason)
     assert run.trajectory is not None, run.reason
     return run
 

@@ -31,6 +31,10 @@ def test_who_is_not_counted_is_named_with_the_probe_that_it_missed():
         "Not counted: a.js breaks the protocol of the harness. Where does a used engine differ"
         " from a fresh one after load? Position after 10 steps; expected: nowhere."
     ]
+    assert how_broken(row | {"got": "raised", "note": "NameError: no q"}) == (
+        "It raised NameError: no q. The probe was:"
+        " Where does a used engine differ from a fresh one after load?"
+    )
     assert not_counted({}) == []
 
 

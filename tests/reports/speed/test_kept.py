@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import read_row
+from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure
 from crosscheck2d.reports.speed.command import SPEED, kept_of
@@ -63,6 +64,16 @@ def test_what_has_ended_is_not_measured_again(tmp_path: Path):
         assert TASK not in other
         other.add(TASK, [])
         assert (again[TASK][0]["status"], other[TASK]) == ("error", [])
+
+
+def test_a_new_measurement_is_not_older_than_its_command(tmp_path: Path):
+    """Both times are texts of one form: "12:00:00+" is less than "12:00:00.5+"."""
+    started = about("crosscheck speed", 0)["started"]
+    with writing(tmp_path / "out", SPEED) as store:
+        new = Kept(store, HEADER)
+
+        assert new.first >= started
+        assert len(new.first) == len(started)
 
 
 def test_what_was_measured_of_a_solver_that_was_saved_since_is_measured_again(tmp_path: Path):
