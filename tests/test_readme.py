@@ -93,6 +93,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (where / "class" / "anna").mkdir(parents=True)
     for path in (where, where / "class" / "anna"):
         shutil.copy(solver, path / "Exercise.js")
+    balls = ROOT / "tests" / "adapters" / "strangers" / "canvas_per_frame.js"
+    shutil.copy(balls, where / "page.js")
     return where
 
 

@@ -255,8 +255,8 @@ def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_ma
     )
     parameter = inspect.signature(cli.stability).parameters["out"].default
     assert (cli.DEFAULT_OUT, parameter) == (report.parent, limits.parent)
-    assert PAGES["report"].place == "latest/report.html"
-    assert PAGES["stability"].place == "stability/stability.html"
+    assert PAGES["report"].href == "latest/report.html"
+    assert PAGES["stability"].href == "stability/stability.html"
     assert not (results.parent / "latest").exists()
     assert 'href="../' not in (results / "stability.html").read_text()  # none that leads nowhere
 
