@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import PathFinder
 from pathlib import Path
+from threading import Lock
 
 from crosscheck2d.adapters.safe_path import PACKAGE
 
@@ -58,15 +59,26 @@ def reference_modules(text: str) -> dict[str, str]:
     return {f"{folder}/{file}": texts.get(file, "") for folder in folders for file in files}
 
 
+# One text at a time: Python before 3.11.8 counts the depth of its parser over all threads together
+# (gh-106905).
+PARSING = Lock()
+
+
+def module_of(text: str) -> ast.Module | None:
+    """The syntax tree of a text; None if it is not Python, which is reported when it is run."""
+    try:
+        with PARSING, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # warnings about the text, meant for its author
+            return ast.parse(text)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
+
+
 def imported_by(text: str) -> set[str]:
     """The top-level names of all modules in the import statements of a text; none if it is not
     Python."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # warnings about the text, meant for its author
-            nodes = list(ast.walk(ast.parse(text)))
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # reported when it is run
-        return set()
+    module = module_of(text)
+    nodes = list(ast.walk(module)) if module else []
     named = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     named += [
         node.module

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ast
 import re
-import warnings
 from collections.abc import Iterable, Iterator
 
+from crosscheck2d.adapters.host.beside import module_of
 from crosscheck2d.adapters.host.file import NotASolver, SolverText
 from crosscheck2d.adapters.host.restitution import code_of
 
@@ -42,10 +42,8 @@ def holder_of(solver: SolverText) -> str | None:
     if defined_in(solver.text, solver.kind).issuperset(ENGINE):
         return None
     if solver.kind == "python":
-        try:
-            classes = [x for x in ast.parse(solver.text).body if isinstance(x, ast.ClassDef)]
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            return None
+        module = module_of(solver.text)
+        classes = [x for x in module.body if isinstance(x, ast.ClassDef)] if module else []
         return next((c.name for c in classes if {*ENGINE} <= {*names_of(c.body)}), None)
     for name, body in CLASS.findall(code_of(solver.text)):
         methods = re.findall(r"^\s+(?:static\s+)?(\w+)\s*\(", body, re.MULTILINE)
@@ -70,12 +68,9 @@ def defined_in(text: str, kind: str) -> set[str]:
     """The names that a text defines: for valid Python those of the module, else everything that
     looks like a definition."""
     if kind == "python":
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # warnings about the text, meant for its author
-                return set(names_of(ast.parse(text).body))
-        except (SyntaxError, ValueError, RecursionError, MemoryError):  # reported when it is run
-            return set(re.findall(r"^(?:async\s+)?def\s+(\w+)", text, re.MULTILINE))
+        if module := module_of(text):
+            return set(names_of(module.body))
+        return set(re.findall(r"^(?:async\s+)?def\s+(\w+)", text, re.MULTILINE))
     code = code_of(text)
     functions = re.findall(r"\bfunction\s*\*?\s*(\w+)\s*\(", code)
     values = re.findall(r"(?<![\w.])(?:(?:const|let|var|class)\s+|globalThis\.)(\w+)", code)
