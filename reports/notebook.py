@@ -29,8 +29,8 @@ from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.playing import play_cell
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene, with_steps
-from crosscheck2d.reports.speed.advice import Inquiry, NoAdvice
-from crosscheck2d.reports.speed.purposes import PURPOSES
+from crosscheck2d.reports.speed.advice import Inquiry, NoAdvice, Question
+from crosscheck2d.reports.speed.ladder import PURPOSES
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.files.scene_file import scenario_of, scene_text
 from crosscheck2d.scenarios.model import Scenario, Trajectory
@@ -172,13 +172,13 @@ def advise(
         file = Path(folder) / f"{scenario.name}.toml"
         file.write_text(scene_text(scenario), encoding="utf-8")
         try:
-            inquiry = Inquiry(str(file), 0, os.cpu_count() or 1, progress)
-            advice = inquiry.advice(purpose, error, names)
+            question = Question(str(file), 0, purpose, error)
+            advice = Inquiry(question, os.cpu_count() or 1, progress).advise(names)
         except NoAdvice as refusal:
             raise ValueError(str(refusal)) from None
     tried = [(attempt, "") for attempt in advice.keeping]
     tried += [(attempt, attempt.reason) for attempt in advice.partial]
-    tried += [(short.best, short.why) for short in advice.short]
+    tried += [(short.best, short.reason) for short in advice.short]
     rows = [
         (attempt.name, attempt.dt, attempt.error, attempt.cost * 1e6, reason)
         for attempt, reason in tried

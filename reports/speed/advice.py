@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from math import ceil, inf, isfinite, isnan, log, nan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,17 +28,19 @@ from crosscheck2d.reports.run.machine import busy_cores
 from crosscheck2d.reports.run.playing import LOADING, clocked
 from crosscheck2d.reports.run.pool import Failure, allow
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.run.stepping import step_through
-from crosscheck2d.reports.run.timing import Sample, Timed, interleaved
 from crosscheck2d.reports.speed.causes import cause_of
-from crosscheck2d.reports.speed.effort import doublings
+from crosscheck2d.reports.speed.ladder import (
+    PURPOSES,
+    STARTS,
+    Scored,
+    scored,
+    starts_within_a_step,
+    times_of,
+)
 from crosscheck2d.reports.speed.measure import done
-from crosscheck2d.reports.speed.plan import PLAIN
-from crosscheck2d.reports.speed.purposes import PURPOSES
-from crosscheck2d.reports.speed.scored_part import STARTS, Scored, scored, starts_within_a_step
+from crosscheck2d.reports.speed.plan import PLAIN, doublings
 from crosscheck2d.reports.speed.tables import summed_up
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.no_truth import NoTruth
 
 PATIENCE, ALL_ROUNDS = 60.0, 600.0  # s that a run, and all timings together, may take
@@ -96,13 +98,11 @@ class Attempt:
 
     @property
     def make(self) -> Callable[[], Engine]:
-        """A function that makes the engine."""
         options = {option.change: option.make for option in OPTIONS if option.engine == self.name}
         return options.get(self.change) or row_of(self.name).make
 
     @property
     def task(self) -> tuple[str, str, int]:
-        """The key of the attempt among those of its scene."""
         return (self.name, self.change, self.substeps)
 
     @property
@@ -125,17 +125,92 @@ class Attempt:
         return self.error <= bound and self.kept_in(bound) >= NINE_TENTHS * len(self.starts)
 
 
+class Question(NamedTuple):
+    """A scene, a key of `PURPOSES`, and how large its error may be. The methods are what a worker
+    does."""
+
+    scene: str
+    seed: int
+    purpose: str
+    bound: float
+
+    def play(self, attempt: Attempt) -> Attempt:
+        """The attempt from the beginning of the scene up to the horizon."""
+        return self.play_part(scored(self.scene, self.seed), attempt)
+
+    def play_part(self, part: Scored, attempt: Attempt) -> Attempt:
+        """The attempt with its error in a part of the scene, and until when, s, it keeps the
+        bound."""
+        scenario, truth = part
+        allow(LOADING)  # a kernel's first compilation is no time of an engine
+        run = play_once(attempt.make, attempt.name, scenario, attempt.dt, clocked())
+        until = nan
+        if run.trajectory is not None and len(run.trajectory) > 1:
+            jumps = jumps_of(truth, scenario) if self.purpose == "energy" else None
+            view = beside(scenario, run, truth, jumps)
+            until = self.kept_until(view) if self.purpose in LASTING else nan
+        if run.status != "ok" or run.trajectory is None:
+            failure = f"{run.status}: {run.reason}"
+            return replace(attempt, error=inf, reason=failure, until=until)
+        error = PURPOSES[self.purpose].error(view)
+        reason = "" if not isnan(error) else "too little of it can be judged"
+        return replace(attempt, error=error, reason=reason, until=until)
+
+    def kept_until(self, view: View) -> float:
+        """s, the last sample up to which a run keeps the bound; found by bisection, as its error
+        only grows."""
+        assert view.other is not None
+        low, high = 1, len(view.played)  # samples: the start is given
+        while low < high:
+            k = (low + high + 1) // 2
+            early = replace(view, played=cut(view.played, k), other=cut(view.other, k))
+            far_off = PURPOSES[self.purpose].error(early) > self.bound
+            low, high = (low, k - 1) if far_off else (k, high)
+        return float(view.played.t[low - 1])
+
+    def play_starts(self, attempt: Attempt, every: int = 1) -> Attempt:
+        """The attempt with its errors from every `every`-th of the starts within a step, and until
+        when nine tenths of these keep the bound."""
+        errors, until = list[float](), list[float]()
+        whole = scored(self.scene, self.seed).scenario.duration
+        starts = starts_within_a_step(self.scene, self.seed, attempt.dt)
+        for begin, part in islice(starts, 0, None, every):
+            played = self.play_part(part, attempt)
+            errors.append(played.error)
+            keeps = played.error <= self.bound
+            until.append(whole if keeps else played.until and begin + played.until)
+        count = len(errors) - ceil(NINE_TENTHS * len(errors))
+        lasting = float(np.sort(np.nan_to_num(until, nan=0.0))[count])
+        lasting = lasting if self.purpose in LASTING else nan
+        return replace(attempt, starts=tuple(errors), lasting=lasting)
+
+    def play_to_the_end(self, attempt: Attempt) -> Attempt:
+        """The attempt in the whole scene, beyond the horizon of its exact answer, too: with the
+        reason why it ends early, and how far it gets, or with the verdict that it fails."""
+        scenario = open_scene(self.scene, self.seed)
+        allow(LOADING)
+        run = play_once(attempt.make, attempt.name, scenario, attempt.dt, clocked())
+        if run.status != "ok":
+            until = f", up to {run.trajectory.t[-1]:.3g} s" if run.trajectory is not None else ""
+            return replace(attempt, reason=f"{run.status}{until}: {run.reason}")
+        failed = first_failed(run, scenario, scored(self.scene, self.seed).truth)
+        reason = f"{failed.text} at {failed.at:.3g} s" if failed else ""
+        return replace(attempt, reason=reason, broken=failed is not None)
+
+    def find_cause(self, name: str, substeps: int) -> str:
+        allow(LOADING + SEARCH)  # with time to compile the ablated reference
+        return cause_of(self.scene, self.seed, name, substeps, self.purpose, self.bound)
+
+
 class ChangedOption(NamedTuple):
-    """An engine with one option changed, and the engine without the change, at the same step
-    size."""
+    """An engine without a change of an option, and with it, at the same step size."""
 
     plain: Attempt
     changed: Attempt
 
     @property
     def errors(self) -> tuple[float, float]:
-        """The medians, without the change and with it, over the starts that both were played
-        from."""
+        """The medians over the starts that both were played from."""
         every = len(self.plain.starts) // len(self.changed.starts)
         return float(np.median(self.plain.starts[::every])), float(np.median(self.changed.starts))
 
@@ -161,12 +236,12 @@ class OutOfReach(NamedTuple):
     finest: float
     usual: Attempt
     longest: Attempt
-    why: str
+    reason: str
 
 
 @dataclass(frozen=True)
 class Advice:
-    """The result of `Inquiry.advice`.
+    """The result of `Inquiry.advise`.
 
     Attributes:
         scene: the name of the scene.
@@ -225,49 +300,48 @@ class Advice:
         rows = list[tuple[int, Attempt]]()
         for library in (True, False):
             rank, least = 0, -inf
-            group = [one for one in self.keeping if one.is_library is library]
-            for k, one in enumerate(group, 1):
-                if not one.cost <= least * (1 + self.floor):
-                    rank, least = k, one.cost
-                rows.append((rank, one))
+            group = [attempt for attempt in self.keeping if attempt.is_library is library]
+            for k, attempt in enumerate(group, 1):
+                if not attempt.cost <= least * (1 + self.floor):
+                    rank, least = k, attempt.cost
+                rows.append((rank, attempt))
         return rows
 
 
 @dataclass(frozen=True)
 class Inquiry:
-    """A scene about which is asked: which engine keeps an error at the least cost.
+    """Which engine answers a question at the least cost.
 
     Raises:
         NoAdvice: the scene has no exact answer.
     """
 
-    scene: str
-    seed: int
+    question: Question
     workers: int
     progress: Progress
 
     def __post_init__(self) -> None:
+        scene, seed, *_ = self.question
         try:
-            scored(self.scene, self.seed)
+            scored(scene, seed)
         except NoTruth as refusal:
             raise NoAdvice(
                 f"no exact answer: {refusal}. To compare the engines with each other and with the"
-                f" laws of physics: crosscheck run {shlex.quote(self.scene)}"
+                f" laws of physics: crosscheck run {shlex.quote(scene)}"
             ) from refusal
 
     @property
-    def scenario(self) -> Scenario:
-        """The scenario up to the horizon of its exact answer."""
-        return scored(self.scene, self.seed).scenario
+    def part(self) -> Scored:
+        return scored(self.question.scene, self.question.seed)
 
     @property
     def ladder(self) -> tuple[int, ...]:
         """Steps in a sample interval, coarse to fine."""
-        return doublings(self.scenario, MOST_WORK // max(self.scenario.scene.n, FEW))
+        scenario = self.part.scenario
+        return doublings(scenario, MOST_WORK // max(scenario.scene.n, FEW))
 
-    def advice(self, purpose: str, bound: float, names: Sequence[str]) -> Advice:
-        """Which of the engines `names` keeps the error of `purpose`, a key of `PURPOSES`, within
-        `bound` at the least cost.
+    def advise(self, names: Sequence[str]) -> Advice:
+        """Which of the engines `names` keeps the error at the least cost.
 
         Every engine is played at every step size of the scene's ladder, up to the horizon of the
         exact answer. Those that keep the error play the whole scene, and from several instants of
@@ -276,84 +350,85 @@ class Inquiry:
         Raises:
             NoAdvice: the timing failed.
         """
-        wanted = [(name, PLAIN, k) for name in names for k in self.ladder]
-        tried = self.attempts(wanted, purpose, bound)
-        by_engine = {name: [one for one in tried if one.name == name] for name in names}
+        question, (scenario, truth) = self.question, self.part
+        tried = self.attempts((name, PLAIN, k) for name in names for k in self.ladder)
+        ladders = {name: [each for each in tried if each.name == name] for name in names}
         keeping, partly, unsteady = self.confirmed(
-            [rest for each in by_engine.values() if (rest := those_that_keep(each, bound))],
-            purpose,
-            bound,
+            [rest for each in ladders.values() if (rest := those_that_keep(each, question.bound))]
         )
-        at = {one.name: one.substeps for one in keeping}
-        optional = self.attempts(
-            [(x.engine, x.change, at[x.engine]) for x in OPTIONS if x.engine in at], purpose, bound
-        )
-        able, _ = self.to_the_end(self.from_every_start(optional, purpose, bound, FOURTH))
+        at = {attempt.name: attempt.substeps for attempt in keeping}
+        changed = (x for x in OPTIONS if x.engine in at)
+        optional = self.attempts((x.engine, x.change, at[x.engine]) for x in changed)
+        able, _ = self.to_the_end(self.from_every_start(optional, FOURTH))
         priced, differences, busy = self.timed([*keeping, *able])
-        plain = {one.name: one for one in priced if one.change == PLAIN}
-        ended = {one.name for one in (*keeping, *partly)}
+        plain = {attempt.name: attempt for attempt in priced if attempt.change == PLAIN}
+        ended = {attempt.name for attempt in (*keeping, *partly)}
         advice = Advice(
-            self.scenario.name,
-            purpose,
-            bound,
-            self.scenario.duration,
-            open_scene(self.scene, self.seed).duration,
-            len(scored(self.scene, self.seed).truth.collisions),
-            [self.scenario.dt(k) for k in self.ladder],
-            sorted(plain.values(), key=lambda one: one.cost),
+            scenario.name,
+            question.purpose,
+            question.bound,
+            scenario.duration,
+            open_scene(question.scene, question.seed).duration,
+            len(truth.collisions),
+            [scenario.dt(k) for k in self.ladder],
+            sorted(plain.values(), key=lambda attempt: attempt.cost),
             self.out_of_reach(
-                [each for name, each in by_engine.items() if name not in ended],
-                {one.name: one for one in unsteady},
-                purpose,
-                bound,
+                [ladder for name, ladder in ladders.items() if name not in ended],
+                {attempt.name: attempt for attempt in unsteady},
             ),
             partly,
-            [ChangedOption(plain[one.name], one) for one in priced if one.change != PLAIN],
+            [ChangedOption(plain[each.name], each) for each in priced if each.change != PLAIN],
             float(np.percentile([*differences.values()], 75)) if differences else nan,
             busy,
         )
-        if purpose == STATISTICS or any(one.is_library for one in keeping):
+        libraries = [name for name, (first, *_) in ladders.items() if first.is_library]
+        if question.purpose == STATISTICS or not libraries or at.keys() & set(libraries):
             return advice
-        libraries = [name for name, (first, *_) in by_engine.items() if first.is_library]
-        also = self.advice(STATISTICS, bound, libraries) if libraries else None
-        return replace(advice, statistics=also)
+        averages = replace(self, question=question._replace(purpose=STATISTICS))
+        return replace(advice, statistics=averages.advise(libraries))
 
-    def attempts(
-        self, asked: Iterable[tuple[str, str, int]], purpose: str, bound: float
-    ) -> list[Attempt]:
+    def attempts(self, asked: Iterable[tuple[str, str, int]]) -> list[Attempt]:
         """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
-        dt = self.scenario.dt
+        dt = self.part.scenario.dt
         wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
-        tasks = {
-            one.task: partial(play_scene, self.scene, self.seed, purpose, bound, one)
-            for one in wanted
-        }
-        outcomes = self.done(tasks, "playing")
         return [
-            replace(one, error=inf, reason=f"{outcome.status}: {outcome.reason}")
-            if isinstance(outcome := outcomes[one.task], Failure)
+            replace(attempt, error=inf, reason=f"{outcome.status}: {outcome.reason}")
+            if isinstance(outcome, Failure)
             else outcome
-            for one in wanted
+            for attempt, outcome in self.outcomes(wanted, self.question.play, "playing")
         ]
 
-    def from_every_start(
-        self, wanted: Sequence[Attempt], purpose: str, bound: float, every: int = 1
-    ) -> list[Attempt]:
+    def from_every_start(self, wanted: Sequence[Attempt], every: int = 1) -> list[Attempt]:
         """The attempts with their errors from every `every`-th of the starts within a step, and
         until when nine tenths of these keep the bound."""
-        tasks = {
-            one.task: partial(play_starts, self.scene, self.seed, purpose, bound, one, every)
-            for one in wanted
-        }
-        outcomes = self.done(tasks, f"playing from {STARTS // every} instants of a step")
+        play = partial(self.question.play_starts, every=every)
+        what = f"playing from {STARTS // every} instants of a step"
         return [
-            replace(one, starts=(inf,) * STARTS) if isinstance(outcome, Failure) else outcome
-            for one in wanted
-            for outcome in (outcomes[one.task],)
+            replace(attempt, starts=(inf,) * STARTS) if isinstance(outcome, Failure) else outcome
+            for attempt, outcome in self.outcomes(wanted, play, what)
         ]
 
+    def to_the_end(self, wanted: Sequence[Attempt]) -> tuple[list[Attempt], list[Attempt]]:
+        """The attempts that play the whole scene and fail no verdict in it; and those that do not,
+        each with the reason."""
+        able, unable = list[Attempt](), list[Attempt]()
+        play = self.question.play_to_the_end
+        for attempt, outcome in self.outcomes(wanted, play, "playing to the end"):
+            if isinstance(outcome, Failure):
+                outcome = replace(attempt, reason=f"{outcome.status}: {outcome.reason}")
+            (unable if outcome.reason else able).append(outcome)
+        return able, unable
+
+    def outcomes(
+        self, wanted: Sequence[Attempt], play: Callable[[Attempt], Attempt], what: str
+    ) -> list[tuple[Attempt, Attempt | Failure]]:
+        """Each attempt, in order, with what a worker process makes of it."""
+        tasks = {attempt.task: partial(play, attempt) for attempt in wanted}
+        results = dict(done(tasks, self.workers, self.progress, what, PATIENCE))
+        return [(attempt, results[attempt.task]) for attempt in wanted]
+
     def confirmed(
-        self, ladders: Sequence[Sequence[Attempt]], purpose: str, bound: float
+        self, ladders: Sequence[Sequence[Attempt]]
     ) -> tuple[list[Attempt], list[Attempt], list[Attempt]]:
         """Of each engine the coarsest of its attempts that is able, as in `to_the_end`, and holds
         from every start: where one fails a verdict, or holds from too few, the next finer one is
@@ -361,40 +436,28 @@ class Inquiry:
         able, unable, unsteady = list[Attempt](), list[Attempt](), list[Attempt]()
         first: dict[str, str] = {}
         while ladders:
-            finer = {each[0].name: each[1:] for each in ladders if len(each) > 1}
-            passed, failed = self.to_the_end([each[0] for each in ladders])
+            finer = {ladder[0].name: ladder[1:] for ladder in ladders if len(ladder) > 1}
+            passed, failed = self.to_the_end([ladder[0] for ladder in ladders])
             again = list[str]()
-            for one in self.from_every_start(passed, purpose, bound):
-                if one.holds(bound):
-                    able.append(one)
-                elif one.name in finer:
-                    again.append(one.name)
+            for attempt in self.from_every_start(passed):
+                if attempt.holds(self.question.bound):
+                    able.append(attempt)
+                elif attempt.name in finer:
+                    again.append(attempt.name)
                 else:
-                    unsteady.append(one)
-            for one in failed:
-                at_dt = f"{one.reason} (dt {number(one.dt * 1e3)} ms)" if one.broken else one.reason
-                coarse = first.setdefault(one.name, at_dt)
-                if one.broken and one.name in finer:
-                    again.append(one.name)
+                    unsteady.append(attempt)
+            for attempt in failed:
+                at_dt = attempt.reason
+                if attempt.broken:
+                    at_dt += f" (dt {number(attempt.dt * 1e3)} ms)"
+                coarse = first.setdefault(attempt.name, at_dt)
+                if attempt.broken and attempt.name in finer:
+                    again.append(attempt.name)
                 else:
                     both = dict.fromkeys((coarse, at_dt))
-                    unable.append(replace(one, reason="; ".join(both)))
+                    unable.append(replace(attempt, reason="; ".join(both)))
             ladders = [finer[name] for name in again]
         return able, unable, unsteady
-
-    def to_the_end(self, wanted: Sequence[Attempt]) -> tuple[list[Attempt], list[Attempt]]:
-        """The attempts that play the whole scene, beyond the horizon of its exact answer, too, and
-        fail no verdict in it; and those that do not, each with the reason."""
-        tasks = {one.task: partial(end_of, self.scene, self.seed, one) for one in wanted}
-        outcomes = self.done(tasks, "playing to the end")
-        able, unable = list[Attempt](), list[Attempt]()
-        for one in wanted:
-            outcome = outcomes[one.task]
-            if isinstance(outcome, Failure):
-                outcome = f"{outcome.status}: {outcome.reason}", False
-            reason, broken = outcome
-            (unable if reason else able).append(replace(one, reason=reason, broken=broken))
-        return able, unable
 
     def timed(
         self, played: Sequence[Attempt]
@@ -404,168 +467,70 @@ class Inquiry:
         of cores that others used."""
         if not played:
             return [], {}, nan
-        makes = {(one.task, one.substeps, 0): one.make for one in played}
-        twice = {(one.task, one.substeps, 1): one.make for one in played if one.change == PLAIN}
-        task = partial(times_of_whole, self.scene, self.seed, makes | twice)
+        makes = {(attempt.task, attempt.substeps, 0): attempt.make for attempt in played}
+        twice = [attempt for attempt in played if attempt.change == PLAIN]
+        makes |= {(attempt.task, attempt.substeps, 1): attempt.make for attempt in twice}
+        scene, seed, *_ = self.question
+        task = partial(times_of, scene, seed, makes, ROUNDS, BUDGET, whole=True)
         busy = busy_cores()
         [(_, samples)] = done({("time",): task}, 1, self.progress, "timing", ALL_ROUNDS)
         if isinstance(samples, Failure):
             raise NoAdvice(f"the timing ended: {samples.status}: {samples.reason}")
         times = summed_up(pd.DataFrame(samples), ["key"])
         cost = dict(zip(times.key, times.cost))
-        priced = [replace(one, cost=cost[one.task, one.substeps, 0]) for one in played]
+        priced = [replace(each, cost=cost[each.task, each.substeps, 0]) for each in played]
         differences = {
-            (one.name, one.substeps): abs(log(cost[one.task, one.substeps, 1] / one.cost))
-            for one in priced
-            if one.change == PLAIN
+            (each.name, each.substeps): abs(log(cost[each.task, each.substeps, 1] / each.cost))
+            for each in priced
+            if each.change == PLAIN
         }
         return priced, differences, busy
 
     def out_of_reach(
-        self,
-        ladders: Sequence[Sequence[Attempt]],
-        unsteady: Mapping[str, Attempt],
-        purpose: str,
-        bound: float,
+        self, ladders: Sequence[Sequence[Attempt]], unsteady: Mapping[str, Attempt]
     ) -> list[OutOfReach]:
         """What each engine, of which all attempts are given, coarse to fine, comes to; until when
         it keeps the error; and the cause of its error, at the coarsest step that has at most twice
         its least error."""
+        dt = self.part.scenario.dt(self.part.scenario.middle_substeps)
         best = [min(each, key=lambda x: inf if isnan(x.error) else x.error) for each in ladders]
-        usual = [next((x for x in each if x.dt <= self.usual), each[-1]) for each in ladders]
-        longest = [max(each, key=lambda one: (reach(one), one.dt)) for each in ladders]
-        if purpose in LASTING:
-            lasting = dict.fromkeys(one for one in (*usual, *longest) if not isnan(one.until))
-            until = {one.task: one for one in self.from_every_start([*lasting], purpose, bound)} | {
-                one.task: one for one in unsteady.values()
-            }
+        usual = [next((x for x in each if x.dt <= dt), each[-1]) for each in ladders]
+        longest = [max(each, key=lambda x: (reach(x), x.dt)) for each in ladders]
+        if self.question.purpose in LASTING:
+            lasting = dict.fromkeys(x for x in (*usual, *longest) if not isnan(x.until))
+            until = {x.task: x for x in (*self.from_every_start([*lasting]), *unsteady.values())}
             usual, longest = ([until.get(x.task, x) for x in each] for each in (usual, longest))
         tasks = {}
-        for least, each in zip(best, ladders):
+        for least, ladder in zip(best, ladders):
             if isfinite(least.error):
-                at = next(one for one in each if one.error <= 2 * least.error)
+                at = next(attempt for attempt in ladder if attempt.error <= 2 * least.error)
                 bits = row_of(least.name).bits_of or least.name  # what plays the same
-                asked = bits, at.substeps, purpose, bound
-                tasks[least.task] = partial(cause, self.scene, self.seed, *asked)
-        causes = self.done(tasks, "cause of the error", SEARCH)
+                tasks[least.task] = partial(self.question.find_cause, bits, at.substeps)
+        causes = dict(done(tasks, self.workers, self.progress, "cause of the error", SEARCH))
         rows = []
-        for row in zip(best, (each[-1].error for each in ladders), usual, longest):
+        for row in zip(best, (ladder[-1].error for ladder in ladders), usual, longest):
             name, reason = row[0].name, row[0].reason
             if not reason:
-                searched = causes[row[0].task]
-                failed = isinstance(searched, Failure)
-                reason = "not known: the search for it did not end" if failed else searched
+                cause = causes[row[0].task]
+                failed = isinstance(cause, Failure)
+                reason = "not known: the search for it did not end" if failed else cause
             if name in unsteady:
-                count = f"{unsteady[name].kept_in(bound)} of {STARTS}"
                 reason = (
-                    f"at {number(1e3 * unsteady[name].dt)} ms it keeps the error from {count}"
-                    + (f" instants of a step only; {reason}")
+                    f"at {number(1e3 * unsteady[name].dt)} ms it keeps the error from"
+                    f" {unsteady[name].kept_in(self.question.bound)} of {STARTS} instants of a step"
+                    f" only; {reason}"
                 )
             rows.append(OutOfReach(*row, reason))
         return rows
 
-    @property
-    def usual(self) -> float:
-        """s, the middle step size of the scene."""
-        return self.scenario.dt(self.scenario.middle_substeps)
 
-    def done(
-        self, tasks: Mapping[Any, Any], what: str, patience: float = PATIENCE
-    ) -> dict[Any, Any]:
-        """The outcome of each task, from worker processes; each may take `patience` s."""
-        return dict(done(tasks, self.workers, self.progress, what, patience))
-
-
-def reach(one: Attempt) -> float:
-    """Sort key: until when it keeps the error."""
-    return -inf if isnan(one.until) else one.until
+def reach(attempt: Attempt) -> float:
+    # sort key: until when it keeps the error
+    return -inf if isnan(attempt.until) else attempt.until
 
 
 def those_that_keep(ladder: Sequence[Attempt], bound: float) -> list[Attempt]:
-    """The attempts, coarse to fine, that keep the error together with all finer ones.
-
-    An attempt that keeps it by chance, with a larger error at a finer step, does not count.
-    """
-    kept = kept_from(np.array([one.error for one in ladder]), bound)
-    return [one for one, keeps in zip(ladder, kept) if keeps]
-
-
-def play_part(part: Scored, purpose: str, bound: float, one: Attempt) -> Attempt:
-    """The attempt with its error in a part of the scene, and until when, s, it keeps the bound."""
-    scenario, truth = part
-    allow(LOADING)  # a kernel's first compilation is no time of an engine
-    run = play_once(one.make, one.name, scenario, one.dt, clocked())
-    until = nan
-    if run.trajectory is not None and len(run.trajectory) > 1:
-        jumps = jumps_of(truth, scenario) if purpose == "energy" else None
-        view = beside(scenario, run, truth, jumps)
-        until = kept_until(view, purpose, bound) if purpose in LASTING else nan
-    if run.status != "ok" or run.trajectory is None:
-        return replace(one, error=inf, reason=f"{run.status}: {run.reason}", until=until)
-    error = PURPOSES[purpose].error(view)
-    reason = "" if not isnan(error) else "too little of it can be judged"
-    return replace(one, error=error, reason=reason, until=until)
-
-
-def play_scene(scene: str, seed: int, purpose: str, bound: float, one: Attempt) -> Attempt:
-    """The attempt played from the beginning of the scene up to the horizon."""
-    return play_part(scored(scene, seed), purpose, bound, one)
-
-
-def play_starts(
-    scene: str, seed: int, purpose: str, bound: float, one: Attempt, every: int = 1
-) -> Attempt:
-    """The attempt with its errors from every `every`-th of the starts within a step, and until
-    when nine tenths of these keep the bound."""
-    errors, until, whole = list[float](), list[float](), scored(scene, seed).scenario.duration
-    for begin, part in islice(starts_within_a_step(scene, seed, one.dt), 0, None, every):
-        played = play_part(part, purpose, bound, one)
-        errors.append(played.error)
-        until.append(whole if played.error <= bound else played.until and begin + played.until)
-    count = len(errors) - ceil(NINE_TENTHS * len(errors))
-    lasting = float(np.sort(np.nan_to_num(until, nan=0.0))[count])
-    return replace(one, starts=tuple(errors), lasting=lasting if purpose in LASTING else nan)
-
-
-def kept_until(view: View, purpose: str, bound: float) -> float:
-    """s, the last sample up to which a run keeps the bound; found by bisection, as its error only
-    grows."""
-    assert view.other is not None
-    low, high = 1, len(view.played)  # samples: the start is given
-    while low < high:
-        k = (low + high + 1) // 2
-        early = replace(view, played=cut(view.played, k), other=cut(view.other, k))
-        low, high = (low, k - 1) if PURPOSES[purpose].error(early) > bound else (k, high)
-    return float(view.played.t[low - 1])
-
-
-def end_of(scene: str, seed: int, one: Attempt) -> tuple[str, bool]:
-    """Why the attempt does not play the whole scene, and how far it gets, or the verdict that it
-    fails in it; "" if neither; and whether it is a verdict."""
-    scenario = open_scene(scene, seed)
-    allow(LOADING)
-    run = play_once(one.make, one.name, scenario, one.dt, clocked())
-    if run.status == "ok":
-        failed = first_failed(run, scenario, scored(scene, seed).truth)
-        return (f"{failed.text} at {failed.at:.3g} s", True) if failed else ("", False)
-    until = f", up to {run.trajectory.t[-1]:.3g} s" if run.trajectory is not None else ""
-    return f"{run.status}{until}: {run.reason}", False
-
-
-def cause(*asked: Any) -> str:
-    """As `cause_of`, with time to compile the ablated reference."""
-    allow(LOADING + SEARCH)
-    return cause_of(*asked)
-
-
-def times_of_whole(
-    scene: str, seed: int, makes: Mapping[tuple[Any, int, int], Callable[[], Engine]]
-) -> list[Sample]:
-    """Timing samples, s per simulated second, by (task, substeps, copy), over the whole scene: what
-    comes after the horizon of its exact answer may cost more than what comes before."""
-    scenario = open_scene(scene, seed)
-    what = [
-        Timed(key, partial(step_through, make, scenario, key[1]), scenario.duration)
-        for key, make in makes.items()
-    ]
-    return interleaved(what, ROUNDS, BUDGET, seed)
+    """The attempts, coarse to fine, that keep the error together with all finer ones. One that
+    keeps it by chance, with a larger error at a finer step, does not count."""
+    keeps = kept_from(np.array([attempt.error for attempt in ladder]), bound)
+    return [attempt for attempt, keep in zip(ladder, keeps) if keep]

@@ -7,7 +7,6 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from math import isfinite, isnan
 from typing import Any, NoReturn
 
@@ -25,10 +24,11 @@ from crosscheck2d.reports.speed.advice import (
     Attempt,
     Inquiry,
     NoAdvice,
+    OutOfReach,
+    Question,
     reach,
 )
-from crosscheck2d.reports.speed.purposes import PURPOSES
-from crosscheck2d.reports.speed.scored_part import STARTS
+from crosscheck2d.reports.speed.ladder import PURPOSES, STARTS
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
@@ -51,8 +51,8 @@ def give_advice(
     names = told_apart(rows, open_scene(checked, seed).scene)
     with Progress() as progress:
         try:
-            inquiry = Inquiry(checked, seed, os.cpu_count() or 1, progress)
-            advice = inquiry.advice(purpose, bound, names)
+            question = Question(checked, seed, purpose, bound)
+            advice = Inquiry(question, os.cpu_count() or 1, progress).advise(names)
         except NoAdvice as reason:
             say(f"{scene}: {reason}")
             sys.exit(FAILED)
@@ -65,7 +65,6 @@ def give_advice(
 
 
 def bound_of(error: str) -> float:
-    """The number that "1%" or "0.01" stands for; exits 2 unless it is a positive number."""
     text, scale = (error[:-1], 0.01) if error.endswith("%") else (error, 1.0)
     try:
         bound = float(text) * scale
@@ -79,15 +78,15 @@ def bound_of(error: str) -> float:
 def snippet_of(advice: Advice, scene: str, seed: int) -> str:
     """Code with the settings of the library that is advised first, in the scene itself or, where
     none is, for its averages; "" if none is."""
-    for one in (advice, advice.statistics):
-        libraries = [each for _, each in one.ranked if each.is_library] if one else []
-        for each in libraries[:1]:
-            return write_snippet(each.name, open_scene(scene, seed).scene, each.dt)
+    ranked = [*advice.ranked, *(advice.statistics.ranked if advice.statistics else ())]
+    for _, attempt in ranked:
+        if attempt.is_library:
+            return write_snippet(attempt.name, open_scene(scene, seed).scene, attempt.dt)
     return ""
 
 
 def to_json(advice: Advice) -> dict[str, Any]:
-    """The advice as JSON values; a number that is not finite is null."""
+    # a number that is not finite is null
     return {
         "scenario": advice.scene,
         "purpose": advice.purpose,
@@ -116,7 +115,7 @@ def to_json(advice: Advice) -> dict[str, Any]:
                 "longest_until_s": finite(row.longest.until),
                 "longest_from_nine_tenths_until_s": finite(row.longest.lasting),
                 "longest_at_dt_s": row.longest.dt,
-                "why": row.why,
+                "why": row.reason,
             }
             for row in advice.short
         ],
@@ -138,7 +137,6 @@ def to_json(advice: Advice) -> dict[str, Any]:
 
 
 def row_of_attempt(one: Attempt) -> dict[str, Any]:
-    """An attempt as JSON values."""
     return {
         "engine": one.name,
         "library": one.is_library,
@@ -149,13 +147,10 @@ def row_of_attempt(one: Attempt) -> dict[str, Any]:
 
 
 def finite(value: float) -> float | None:
-    """The number; None if it is not finite."""
     return value if isfinite(value) else None
 
 
 def print_advice(advice: Advice, snippet: str = "") -> None:
-    """Print the engines that keep the error, those that do not, the options, how reliable the
-    times are, and the settings of the library that is advised."""
     console = Console()
     console.print(
         f"{advice.scene}: {PURPOSES[advice.purpose].what}, at most {number(advice.bound)},"
@@ -175,7 +170,7 @@ def print_advice(advice: Advice, snippet: str = "") -> None:
         )
         console.print()
     if advice.short:
-        print_texts(console, {row.best.name: row.why for row in advice.short}, "Why")
+        print_texts(console, {row.best.name: row.reason for row in advice.short}, "Why")
         console.print()
     if advice.changes:
         print_changes(console, advice)
@@ -203,7 +198,7 @@ def print_group(console: Console, advice: Advice, group: str) -> None:
         one = ("library" if group == LIBRARIES else "solver of this project") + right
         console.print(f"No {one} keeps this error at any step size tried.", style="bold")
     if short:
-        print_short(console, replace(advice, short=short), group)
+        print_short(console, advice, short, group)
     if ranked or short or partial:
         console.print()
     if group == LIBRARIES and advice.statistics is not None:
@@ -251,7 +246,9 @@ def print_choices(
         console.print(f"Also within it: {names}.", highlight=False)
 
 
-def print_short(console: Console, advice: Advice, group: str) -> None:
+def print_short(
+    console: Console, advice: Advice, rows_short: Sequence[OutOfReach], group: str
+) -> None:
     """Print how near the engines come that do not keep the error; and of one that only grows until
     when they keep it, at the usual step size of the scene and at the one that keeps it longest."""
 
@@ -262,7 +259,7 @@ def print_short(console: Console, advice: Advice, group: str) -> None:
         return number(seconds * 1e3)
 
     coarse, fine = ms(advice.step_sizes[0]), ms(advice.step_sizes[-1])
-    short = sorted(advice.short, key=lambda row: (-reach(row.longest), row.best.name))
+    short = sorted(rows_short, key=lambda row: (-reach(row.longest), row.best.name))
     headings, title = ["engine"], f"{group.capitalize()} that do not keep it"
     rows = [[row.best.name] for row in short]
     if advice.purpose in LASTING:
@@ -294,7 +291,6 @@ def print_short(console: Console, advice: Advice, group: str) -> None:
 
 
 def print_changes(console: Console, advice: Advice) -> None:
-    """Print the effect of each option of the engines that keep the error."""
     what = "this part of the scene" if advice.until < advice.duration else "the scene"
     title = f"What {what} does not need: one option changed, at the same step size"
     rows = [
@@ -311,7 +307,6 @@ def print_changes(console: Console, advice: Advice) -> None:
 
 
 def sentence_on_times(advice: Advice) -> str:
-    """A sentence on how far the times can be compared."""
     said = f"Two timings of the same engine differ by {advice.noise:.0%}"
     if advice.quiet:
         return f"{said}. Costs that differ by less than {advice.floor:.0%} are the same."

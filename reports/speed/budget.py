@@ -1,5 +1,5 @@
 """The error budget of an engine: its mechanisms are enabled in the reference one at a time, and
-what they do not explain is the residual.
+what they do not explain is the residual; and the share of all errors that is explained.
 
 For each disk and sample, as vectors: engine - truth = contributions + interplay + residual.
 """
@@ -13,6 +13,7 @@ from operator import add
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from crosscheck2d.adapters.engine import Engine
 from crosscheck2d.adapters.engines import row_of
@@ -22,7 +23,8 @@ from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.view import View, cut
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.ladder import scored
+from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
@@ -55,6 +57,9 @@ COLUMNS = [
     "closed_deviation_radii",
     "note",
 ]
+EXPLAINED = [*WHOSE, "error_radii", "residual_radii", "note"]
+LEAST = 1e-9  # radii; smaller errors are rounding and need no explanation
+TO = (0.01, 0.001)  # of an error: an error with a smaller residual counts as explained
 # radii, the largest error by end-of-step detection alone: beyond it contributions do not add up
 LIMIT = 0.5
 
@@ -78,12 +83,11 @@ class Offset(NamedTuple):
 
     @property
     def radii(self) -> float:
-        """Root mean square over disks and samples."""
+        # root mean square over disks and samples
         return float(np.sqrt((self.position**2).sum(axis=2).mean()))
 
     @property
     def of_energy(self) -> float:
-        """Root mean square over the samples."""
         return float(np.sqrt((self.energy**2).mean()))
 
 
@@ -130,12 +134,12 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
         known
         | {
             "contribution": contribution,
-            "position_radii": each.radii,
-            "energy": each.of_energy,
+            "position_radii": offset.radii,
+            "energy": offset.of_energy,
             "note": "",
         }
         | checks.get(contribution, {})
-        for contribution, each in contributions.items()
+        for contribution, offset in contributions.items()
     ]
 
 
@@ -161,11 +165,7 @@ class Window:
     dt: float
 
     def played(self, make: Callable[[], Engine]) -> Run:
-        """The run of a new engine.
-
-        Raises:
-            NotPlayed: the engine failed.
-        """
+        """Raises `NotPlayed`: the engine failed."""
         run = play_once(make, "one:run", self.scenario, self.dt)
         if run.status != "ok":
             raise NotPlayed(f"{run.status}: {run.reason}")
@@ -183,6 +183,9 @@ class Window:
         energy = laws.energy(played, scene) - laws.energy(truth, scene)
         free = View(self.scenario, self.dt, played, truth).collision_free_samples
         return Offset(position, energy[free] / (scales.energy(self.scenario) or 1.0))
+
+    def offset_of(self, make: Callable[[], Engine]) -> Offset:
+        return self.offset(self.played(make))
 
     def flight_deviation(self, contribution: Offset, alpha: float) -> float:
         """radii, at most, from (alpha - 1/2) dt (v(t) - v(0)) up to the first collision; see
@@ -206,21 +209,14 @@ class Budget:
 
     def contributions(self) -> dict[str, Offset]:
         """The contribution of each mechanism, then interplay, residual, sum, all together, and the
-        engine.
-
-        Each is enabled by itself in the reference with end-of-step detection, or on top of
-        those it acts on. Those that the reference does not have are disabled in the engine, one
-        after the other.
-        """
+        engine. The mechanisms that the reference does not have are disabled in the engine, one
+        after the other."""
         contributions, engine = {TIME: self.reference([])}, self.total
         for mechanism in self.mechanisms:
             if mechanism.parameters:
-                below = [each for each in self.mechanisms if each.name in mechanism.on_top]
-                contributions[mechanism.name] = self.reference(
-                    [*below, mechanism]
-                ) - self.reference(below)
+                contributions[mechanism.name] = self.contribution(mechanism)
             elif mechanism.without is not None:
-                without = self.at.offset(self.at.played(mechanism.without))
+                without = self.at.offset_of(mechanism.without)
                 contributions[mechanism.name] = engine - without
                 engine = without
         outside = [
@@ -238,25 +234,81 @@ class Budget:
             TOTAL: self.total,
         }
 
+    def contribution(self, mechanism: Mechanism) -> Offset:
+        """In the reference with end-of-step detection, on top of the mechanisms it acts on."""
+        below = [each for each in self.mechanisms if each.name in mechanism.on_top]
+        return self.reference([*below, mechanism]) - self.reference(below)
+
     def ablated_in_both(self) -> dict[str, dict[str, float]]:
         """contribution -> what disabling it changes in the engine, and in the reference with
         all the rest enabled."""
-        found = {}
+        changes = {}
         for mechanism in self.mechanisms:
             if mechanism.parameters and mechanism.without is not None:
-                others = [each for each in self.mechanisms if each is not mechanism]
-                in_engine = self.total - self.at.offset(self.at.played(mechanism.without))
-                in_reference = self.reference(self.mechanisms) - self.reference(others)
-                found[mechanism.name] = {
+                rest = [each for each in self.mechanisms if each is not mechanism]
+                in_engine = self.total - self.at.offset_of(mechanism.without)
+                in_reference = self.reference(self.mechanisms) - self.reference(rest)
+                changes[mechanism.name] = {
                     "off_engine_radii": in_engine.radii,
                     "off_reference_radii": in_reference.radii,
                     "off_deviation_radii": (in_engine - in_reference).radii,
                 }
-        return found
+        return changes
 
     def reference(self, mechanisms: Sequence[Mechanism]) -> Offset:
-        """The error of the reference with these mechanisms."""
         names = tuple(mechanism.name for mechanism in self.mechanisms if mechanism in mechanisms)
         if names not in self.known:
-            self.known[names] = self.at.offset(self.at.played(partial(with_mechanisms, mechanisms)))
+            self.known[names] = self.at.offset_of(partial(with_mechanisms, mechanisms))
         return self.known[names]
+
+
+def explain(budget: pd.DataFrame) -> pd.DataFrame:
+    """A row for each scene and engine, of `EXPLAINED`: its error, its residual (root mean squares),
+    and how far the scene was evaluated, its exact answer goes, and the scene goes; note: why the
+    engine has no error.
+    """
+    total, residual = (budget[budget.contribution == name] for name in (TOTAL, RESIDUAL))
+    errors = total.rename(columns={"position_radii": "error_radii"})
+    left = residual[[*WHOSE, "position_radii"]].set_axis([*WHOSE, "residual_radii"], axis=1)
+    return errors.merge(left, on=WHOSE, how="left")[EXPLAINED]
+
+
+def cut_scenes(table: pd.DataFrame) -> pd.DataFrame:
+    """scenario, until_s and horizon_s of the scenes that are evaluated for a shorter time than
+    their exact answer lasts; `table` as `explain` gives it."""
+    scenes = table.drop_duplicates("scenario")[["scenario", "until_s", "horizon_s"]]
+    return scenes[scenes.until_s < scenes.horizon_s * (1 - 1e-9)]
+
+
+def explained_share(table: pd.DataFrame) -> str:
+    """How many errors have a residual below each of `TO`, over which part of the scenes, and what
+    is left out, as the page and README show it; `table` as `explain` gives it."""
+    are_explained = "is explained", "are explained"
+    scenes, short = table.drop_duplicates("scenario"), cut_scenes(table)
+    engines = table[["engine", "profile"]].drop_duplicates().shape[0]
+    played = table[table.note == ""]
+    errors = played[played.error_radii > LEAST]
+    exact, failed = len(played) - len(errors), len(table) - len(played)
+    left = errors.residual_radii / errors.error_radii
+    within = [int((left <= bound).sum()) for bound in TO]
+    sentence = (
+        f"of {counted(len(errors), 'error')} ({counted(engines, 'engine')} in"
+        f" {counted(len(scenes), 'scene')}"
+        + (f"; {exact} more below {LEAST:g} radii" if exact else "")
+        + (f"; {failed} not played" if failed else "")
+        + f") {counted(within[0], *are_explained)} to 1 %, {within[1]} to 0.1 %, "
+        f"over {scenes.until_s.sum():.0f} of {scenes.horizon_s.sum():.0f} simulated seconds"
+    )
+    if short.empty:
+        return f"{sentence}, up to the end of every exact answer"
+    places = ", ".join(
+        f"{row.scenario} at {row.until_s:.2g} of {row.horizon_s:.2g} s"
+        for row in short.itertuples()
+    )
+    are_cut = "1 scene is" if len(short) == 1 else f"{len(short)} scenes are"
+    whole = left[~errors.scenario.isin(short.scenario)]
+    return (
+        f"{sentence}: {are_cut} cut where end-of-step detection alone puts a disk"
+        f" {LIMIT:g} radii off ({places}). Of the {counted(len(whole), 'error')} in scenes that are"
+        f" not cut, {counted(int((whole <= TO[0]).sum()), *are_explained)} to 1 %"
+    )

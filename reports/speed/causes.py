@@ -28,14 +28,8 @@ from crosscheck2d.reports.compare.causes import LATE, Cause, CauseKind, by_setti
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.view import beside
 from crosscheck2d.reports.page.style import number
-from crosscheck2d.reports.speed.budget import (
-    Budget,
-    NotPlayed,
-    Window,
-)
-from crosscheck2d.reports.speed.explained import LEAST
-from crosscheck2d.reports.speed.purposes import PURPOSES
-from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.budget import LEAST, Budget, NotPlayed, Window
+from crosscheck2d.reports.speed.ladder import PURPOSES, scored
 from crosscheck2d.reports.terminal.counts import listed
 from crosscheck2d.scenarios.model import Scene, Trajectory
 
@@ -67,37 +61,35 @@ def cause_of(scene: str, seed: int, name: str, substeps: int, purpose: str, boun
             return np.inf
         return PURPOSES[purpose].error(beside(scenario, run, truth, jumps))
 
-    seen = play_once(row_of(name).make, name, scenario, scenario.dt(scenario.middle_substeps))
-    effects = []
-    if seen.trajectory is not None:
-        effects = effects_of(seen.trajectory, truth, scenario.scene)
+    usual = play_once(row_of(name).make, name, scenario, scenario.dt(scenario.middle_substeps))
     does = ""
-    if effects:
-        does = f"at dt {number(seen.dt * 1e3)} ms a disk {listed(effects)}; cause: "
+    played = usual.trajectory
+    if played is not None and (effects := effects_of(played, truth, scenario.scene)):
+        does = f"at dt {number(usual.dt * 1e3)} ms a disk {listed(effects)}; cause: "
     remedy = find_remedy(settings_of(name, scenario.scene, dt), error, bound)
     if remedy.settings:
         falls = f"the error falls from {number(remedy.before)} to {number(remedy.after)}"
         return does + by_settings(remedy, name, falls).told
-    measure = "energy" if purpose == "energy" else "position_radii"
     try:
-        mechanism = mechanism_of(scene, seed, name, substeps, measure)
+        mechanism = mechanism_of(scene, seed, name, substeps, purpose)
     except NotPlayed as failure:
         mechanism = unknown(str(failure))
     return "; ".join(filter(None, [f"{does}{mechanism.told}", remedy.sentence(name)]))
 
 
-def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) -> Cause:
+def mechanism_of(scene: str, seed: int, name: str, substeps: int, purpose: str) -> Cause:
     """The mechanism without which at most `GONE` of the error in all of the scored part is left; or
     the few that leave no more together with end-of-step detection; or those that were ruled out.
     Raises `NotPlayed`."""
     scenario, truth = scored(scene, seed)
     at = Window(scenario, truth, scenario.dt(substeps))
     run = at.played(row_of(name).make)
-    whole, size = at.offset(run), attrgetter("of_energy" if measure == "energy" else "radii")
+    whole, size = at.offset(run), attrgetter("of_energy" if purpose == "energy" else "radii")
     total = size(whole)
     left, together = dict[str, float](), dict[str, float]()
     for words, changes in {} if name in MECHANISMS else CANDIDATES.items():
-        left[words] = size(whole - at.offset(at.played(partial(ablated, changes))))
+        make = partial(AblatedReference, **END_OF_STEP | dict(changes))
+        left[words] = size(whole - at.offset_of(make))
     if name in MECHANISMS:
         known = mechanisms_of(name, run.settings, scenario.scene, at.dt)
         if name.endswith(":shipped"):
@@ -107,12 +99,10 @@ def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) 
         late = [LATE] if (truth.collisions.impulse > 0).any() else []  # else nothing collides
         left |= dict.fromkeys(late, size(whole - budget.reference([])))
         for mechanism in known:
-            below = [each for each in known if each.name in mechanism.on_top]
             if mechanism.parameters:
-                changed = budget.reference([*below, mechanism]) - budget.reference(below)
-                left[mechanism.name] = size(whole - changed)
+                left[mechanism.name] = size(whole - budget.contribution(mechanism))
             elif mechanism.without is not None:
-                left[mechanism.name] = size(at.offset(at.played(mechanism.without)))
+                left[mechanism.name] = size(at.offset_of(mechanism.without))
         needed = [each for each in known if each.parameters]
         for mechanism in list(needed):
             fewer = [x for x in needed if x is not mechanism and mechanism.name not in x.on_top]
@@ -129,11 +119,6 @@ def mechanism_of(scene: str, seed: int, name: str, substeps: int, measure: str) 
     return unknown(f"without any of these more than half of it is left: {'; '.join(left)}")
 
 
-def ablated(changes: Mapping[str, Any]) -> AblatedReference:
-    """The ablated reference with end-of-step detection and these parameters."""
-    return AblatedReference(**END_OF_STEP | dict(changes))
-
-
 def effects_of(played: Trajectory, truth: Trajectory, scene: Scene) -> list[str]:
     """What disks do otherwise than in the exact answer, as ends of a sentence: the deepest overlap,
     and what the disk that differs most has lost or gained of its spin and of its speed."""
@@ -141,14 +126,13 @@ def effects_of(played: Trajectory, truth: Trajectory, scene: Scene) -> list[str]
     deep = float(np.max(laws.penetration(played, scene)[: k + 1]))
     effects = [f"sinks {number(deep, 2)} radii into what it touches"] * (deep > SEEN)
     motions = {
-        "spin": [np.abs(one.angular_velocity) for one in (played, truth)],
-        "speed": [laws.lengths(one.velocity) for one in (played, truth)],
+        "spin": [np.abs(motion.angular_velocity) for motion in (played, truth)],
+        "speed": [laws.lengths(motion.velocity) for motion in (played, truth)],
     }
-    for what, (mine, exact) in motions.items():
-        is_, ought, most = mine[k], exact[k], exact.max()
+    for what, (run, exact) in motions.items():
         # of a disk with hardly any spin or speed in the exact answer a share means nothing
-        slow = scene.static | (ought <= SEEN * most)
-        change = np.where(slow, 0.0, is_ / np.where(slow, 1.0, ought) - 1)
+        slow = scene.static | (exact[k] <= SEEN * exact.max())
+        change = np.where(slow, 0.0, run[k] / np.where(slow, 1.0, exact[k]) - 1)
         worst = float(change[np.abs(change).argmax()])
         if isfinite(worst) and abs(worst) > SEEN:
             effects.append(

@@ -12,18 +12,16 @@ from typing import Any, NoReturn
 
 from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
-from crosscheck2d.reports.compare.pooling import said_of_pool
+from crosscheck2d.reports.compare.pooling import WHO, said_of_pool
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
 from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.run.made import digest_of
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.speed import figures
-from crosscheck2d.reports.speed.effort import FULL, QUICK
-from crosscheck2d.reports.speed.explained import sentence
-from crosscheck2d.reports.speed.kept import Kept
-from crosscheck2d.reports.speed.measure import Measuring
+from crosscheck2d.reports.speed.budget import explained_share
+from crosscheck2d.reports.speed.measure import Kept, Measuring
 from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_page
-from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.reports.speed.plan import FULL, QUICK, SpeedPlan
 from crosscheck2d.reports.speed.results import Results
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
@@ -67,8 +65,8 @@ def run_speed(
                 header |= {"seconds": progress.seconds, "load": measured.busy}
             header["measured"] = kept.first
             if measured.errors.empty:
-                for what, why in measured.left_out:
-                    say(f"{what}: {why}")
+                for what, reason in measured.left_out:
+                    say(f"{what}: {reason}")
                 say("no scene that was asked for has an exact answer, so no error can be measured")
                 sys.exit(FAILED)
             results = Results(plan, measured)
@@ -83,8 +81,6 @@ def run_speed(
 
 
 def kept_of(plan: SpeedPlan, header: Mapping[str, Any], store: Store) -> Kept:
-    """What is kept of an earlier measurement of this plan, by the same versions on the same
-    machine."""
     files = {scene: digest_of(scene) for scene in plan.scenes if scene.endswith(".toml")}
     files |= {name: row_of(name).source for name in plan.engines if name.endswith(OWN)}
     asked = {
@@ -98,8 +94,7 @@ def kept_of(plan: SpeedPlan, header: Mapping[str, Any], store: Store) -> Kept:
 
 
 def write_all(store: Store, results: Results, header: Mapping[str, Any]) -> None:
-    """Tables first, then the page, so that what was measured is kept whatever happens to the
-    page."""
+    # tables first, so that what was measured is kept whatever happens to the page
     store.export(MACHINE, json.dumps(header, indent=1) + "\n")
     for name, table in results.files.items():
         store.export(name, table.to_csv(index=False))
@@ -111,39 +106,30 @@ def write_all(store: Store, results: Results, header: Mapping[str, Any]) -> None
 
 
 def print_summary(results: Results, page: str) -> None:
-    """Print the pooled cost of each accuracy, the noise floor, and the path of the page."""
     console = Console()
     scenes = len(results.scenes)
     rows = [
         [f"{engine}:{profile}", *map(cost_of, group.to_dict("records"))]
-        for (engine, profile), group in results.pooled_reached.groupby(
-            ["engine", "profile"], sort=False
-        )
+        for (engine, profile), group in results.pooled_reached.groupby(WHO, sort=False)
     ]
     title = "What an error, in radii, costs: µs per simulated second"
     title += " (in how many of the scenes)" if scenes > 1 else ""
     print_table(console, ["engine", *ACCURACIES], rows, title)
     console.print()
-    print_texts(console, marks_in(rows, scenes))
-    said = [said_of_pool(results.pooled)]
-    said += filter(None, [said_of_cheaper(results.pooled_reached)])
-    if len(results.explained):
-        said.append(f"Error budget: {sentence(results.explained)}.")
-    said.append(results.noise_sentence)
-    said += [f"Left out: {what}: {why}." for what, why in results.measured.left_out]
-    print_list(console, said)
-    console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)
-
-
-def marks_in(rows: Sequence[Sequence[str]], scenes: int) -> dict[str, str]:
-    """What stands in the table instead of a cost -> what it means."""
     most = f", in half of the {scenes} scenes or more" if scenes > 1 else ""
     meanings = {
         NEVER: f"at no step size, or the engine failed{most}",
         NOT_REACHED: "not at the step sizes that were tried",
     }
     cells = {cell for row in rows for cell in row[1:]}
-    found = {mark: meaning for mark, meaning in meanings.items() if mark in cells}
+    marks = {mark: meaning for mark, meaning in meanings.items() if mark in cells}
     if any(" of " in cell for cell in cells):
-        found[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few to compare"
-    return found
+        marks[f"k of {scenes}"] = f"in k of the {scenes} scenes, too few to compare"
+    print_texts(console, marks)
+    sentences = [said_of_pool(results.pooled), said_of_cheaper(results.pooled_reached)]
+    if len(results.explained):
+        sentences.append(f"Error budget: {explained_share(results.explained)}.")
+    sentences.append(results.noise_sentence)
+    sentences += [f"Left out: {what}: {reason}." for what, reason in results.measured.left_out]
+    print_list(console, filter(None, sentences))
+    console.print(f"\n{page}", style="bold", highlight=False, soft_wrap=True)

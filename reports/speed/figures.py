@@ -15,6 +15,7 @@ from crosscheck2d.adapters.engines import DISTINCT, ENGINES
 from crosscheck2d.reports.compare.pareto import YARDSTICK
 from crosscheck2d.reports.compare.pooling import WHO
 from crosscheck2d.reports.speed.results import Results
+from crosscheck2d.reports.speed.tables import names_of
 from crosscheck2d.reports.terminal.foreign_text import put_text
 
 KEPT = Path(__file__).parent / "figures.csv"
@@ -34,76 +35,48 @@ def figures(results: Results) -> pd.DataFrame:
     disks with its worst step and exponent, that of a settled pile, and what a call costs."""
     pooled, reached, sizes = results.pooled, results.pooled_reached, results.sizes
     growth, driving = results.growth, results.driving
-    of_worst = [*WHO, "figure", "at", "value", "unit"]
+    pile = results.pile.melt(["name", "n"], var_name="at", value_name="cost")
+    pile[WHO] = pile.name.str.split(":", expand=True).reindex(columns=[0, 1])
+
+    def part(table: pd.DataFrame, figure: str, value: str, unit: str, **more: Any) -> pd.DataFrame:
+        columns = {"figure": figure, "value": table[value], "unit": unit} | more
+        return table.assign(**columns).reindex(columns=COLUMNS)
+
+    def cheaper(figure: str, count: str) -> pd.DataFrame:
+        # the ratio of a cost to that of `YARDSTICK`, and the scenes in which it costs less
+        rows = results.versus[results.versus[count].notna()]
+        scenes = rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
+        note = rows[count].map("{:.0f}".format) + scenes
+        return part(rows, figure, "ratio", "1", at=rows.change, note=note)
+
+    unknown = {"low": np.nan, "high": np.nan}
+    at, disks = {"at": pooled.step_size}, {"at": sizes.n}
     failed = pooled.failed.map("failed in {}".format) + pooled.of.map(" of {}".format)
+    errors = {"low": pooled.error_low, "high": pooled.error_high, "note": failed}
+    worst = part(sizes, "worst step", "worst", "us", **disks)
+    notes = {"at": growth.most, "note": growth.stopped}
     parts = [
-        pooled.assign(
-            figure="pooled error",
-            at=pooled.step_size,
-            value=pooled.error,
-            low=pooled.error_low,
-            high=pooled.error_high,
-            unit="radii",
-            note=failed,
-        ),
-        pooled.assign(figure="pooled cost", at=pooled.step_size, value=pooled.cost, unit="us/s"),
-        pooled.assign(
-            figure="pooled cost less idle steps",
-            at=pooled.step_size,
-            value=pooled.bare,
-            low=np.nan,
-            high=np.nan,
-            unit="us/s",
-        ),
-        reached.assign(
-            figure="cost at accuracy",
-            at=reached.accuracy,
-            value=reached.cost,
-            note=reached.why,
-            unit="us/s",
-        ),
-        sizes.assign(figure="cost of a step", at=sizes.n, value=sizes.cost, unit="us"),
-        sizes.assign(figure="worst step", at=sizes.n, value=sizes.worst, unit="us")[of_worst],
-        settled(results.pile),
-        growth.assign(
-            figure="exponent", at=growth.most, value=growth.exponent, note=growth.stopped, unit="1"
-        ),
-        driving.assign(figure="idle step", value=driving.step_us, unit="us"),
-        driving.assign(figure="read-out", value=driving.read_us, unit="us"),
-        driving.assign(figure="idle call", value=driving.call_us, unit="us"),
-        cheaper(results.versus, AGAINST, "cheaper"),
-        cheaper(results.versus, AGAINST_BARE, "bare_cheaper").assign(
-            value=np.nan, low=np.nan, high=np.nan
-        ),
+        part(pooled, "pooled error", "error", "radii", **at, **errors),
+        part(pooled, "pooled cost", "cost", "us/s", **at),
+        part(pooled, "pooled cost less idle steps", "bare", "us/s", **at, **unknown),
+        part(reached, "cost at accuracy", "cost", "us/s", at=reached.accuracy, note=reached.why),
+        part(sizes, "cost of a step", "cost", "us", **disks),
+        worst.assign(low=np.nan, high=np.nan, best=np.nan),
+        part(pile, "step of a settled pile", "cost", "us", note=pile.n.map("{} disks".format)),
+        part(growth, "exponent", "exponent", "1", **notes),
+        part(driving, "idle step", "step_us", "us"),
+        part(driving, "read-out", "read_us", "us"),
+        part(driving, "idle call", "call_us", "us"),
+        cheaper(AGAINST, "cheaper"),
+        cheaper(AGAINST_BARE, "bare_cheaper").assign(value=np.nan, **unknown),
     ]
-    table = pd.concat([part.reindex(columns=COLUMNS) for part in parts], ignore_index=True)
+    table = pd.concat(parts, ignore_index=True)
     # what friction costs where there is none has a benchmark of its own: tests/bench/friction.py
-    names = table.engine + ":" + table.profile
-    return table[~names.isin([name for name, row in ENGINES.items() if row.adds_friction])]
-
-
-def settled(pile: pd.DataFrame) -> pd.DataFrame:
-    """A row for each engine and option: the cost of a step of a settled pile."""
-    rows = pile.melt(["name", "n"], var_name="at", value_name="value")
-    names = rows.name.str.split(":", expand=True).reindex(columns=[0, 1])
-    note = rows.n.map("{} disks".format)
-    figure = "step of a settled pile"
-    return rows.assign(figure=figure, engine=names[0], profile=names[1], note=note, unit="us")
-
-
-def cheaper(versus: pd.DataFrame, figure: str, count: str) -> pd.DataFrame:
-    """A row for each engine and change of `versus`: the ratio of its cost to that of `YARDSTICK`,
-    and the scenes in which it costs less."""
-    rows = versus[versus[count].notna()]
-    said = (
-        rows[count].map("{:.0f}".format) + rows.scenes.map(" of {}: ".format) + rows[f"{count}_in"]
-    )
-    return rows.assign(figure=figure, at=rows.change, value=rows.ratio, note=said, unit="1")
+    return table[~names_of(table).isin([n for n, row in ENGINES.items() if row.adds_friction])]
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
-    """Write the figures as CSV, below comment lines with the machine, the versions and how quiet
-    the machine was."""
+    """As CSV, below comment lines with the machine, the versions and how quiet the machine was."""
     noise = results.noise_floor()
     about = {
         "command": header["command"],
@@ -130,8 +103,7 @@ def keep(folder: Path) -> None:
     KEPT.write_bytes((folder / "speed_figures.csv").read_bytes())
     for path in (ORDERS, EXPLAINED):
         table = read(folder / f"speed_{path.name}")
-        distinct = (table.engine + ":" + table.profile).isin(DISTINCT)
-        table[distinct].to_csv(path, index=False, float_format="%.4g")
+        table[names_of(table).isin(DISTINCT)].to_csv(path, index=False, float_format="%.4g")
 
 
 def read(path: Path = KEPT) -> pd.DataFrame:
@@ -148,10 +120,8 @@ def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
     """(`engine:profile`, disks) -> the cost of a step over that of `YARDSTICK`, each from its
     fastest round."""
     rows = kept[kept.figure == "cost of a step"]
-    best = {
-        (f"{row['engine']}:{row['profile']}", int(float(row["at"]))): float(row["best"])
-        for row in rows.to_dict("records")
-    }
+    disks = rows["at"].astype(float).astype(int)
+    best = dict(zip(zip(names_of(rows), disks), rows.best.astype(float)))
     return {
         (name, n): cost / best[YARDSTICK, n]
         for (name, n), cost in best.items()
@@ -164,16 +134,16 @@ def drifted(
 ) -> list[str]:
     """A sentence for every ratio that differs from the kept one by more than `LOOSE`, or that
     only one of the two tables has."""
-    said = [
+    sentences = [
         f"{name}, {n} disks: only one of the two has it"
         for name, n in sorted(set(kept) ^ set(fresh))
     ]
     for name, n in sorted(set(kept) & set(fresh)):
         change = fresh[name, n] / kept[name, n]
         if not 1 / LOOSE <= change <= LOOSE:
-            said.append(
+            sentences.append(
                 f"{name}, {n} disks: a step costs {fresh[name, n]:.3g} times that of"
                 f" {YARDSTICK}, kept is {kept[name, n]:.3g}; allowed is a factor of"
                 f" {LOOSE:g}"
             )
-    return said
+    return sentences

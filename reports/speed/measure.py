@@ -1,28 +1,41 @@
 """The two passes of a measurement: first the errors, in parallel; then the costs, one after the
-other with nothing else running."""
+other with nothing else running. A result is stored as its task ends, so that an interruption loses
+none."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from functools import partial
 from itertools import chain, groupby
-from math import nan
+from math import inf, nan
+from time import perf_counter
 from typing import Any
 
 import pandas as pd
 
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.reports.run.cells import digest, source_hash
 from crosscheck2d.reports.run.machine import busy_cores
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
+from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.run.timing import Sample
-from crosscheck2d.reports.speed import budget, cheapest, ladder, scored_part, sizes
-from crosscheck2d.reports.speed.estimate import estimate
-from crosscheck2d.reports.speed.kept import Kept
-from crosscheck2d.reports.speed.plan import PLAIN, SCENE, Measurement, Reach, SpeedPlan, middle
+from crosscheck2d.reports.speed import budget, ladder, sizes
+from crosscheck2d.reports.speed.plan import (
+    PLAIN,
+    SCENE,
+    Measurement,
+    Reach,
+    SpeedPlan,
+    estimate,
+    middle,
+)
 from crosscheck2d.reports.terminal.progress import Progress
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM, answered_by
 
 # s, limits for a ladder and for a timing: they only stop engines that hang
 HANGS, ALL_ROUNDS = 600.0, 3600.0
@@ -34,6 +47,51 @@ NUMBERS = {"dt_s": float, "n": int, "copy_of": int, "round": int, "place": int} 
     "wrapping": float,
     "runs": int,
 }
+SOURCE = (
+    "reports/speed/**/*.py",
+    "reports/compare/**/*.py",
+    "reports/run/*.py",
+    "scenarios/**/*.py",
+)
+TASK = "measurement"  # the kind of the rows in the store
+TRUTH_RUNS = 20  # of a closed form
+
+
+class Kept:
+    """The results of tasks: those of an earlier measurement of the same plan, and new ones as they
+    come. A task is a tuple of strings and whole numbers, a result what JSON can hold.
+
+    Attributes:
+        first: when the first of the results that were used was measured.
+    """
+
+    def __init__(self, store: Store, plan: Mapping[str, Any]) -> None:
+        """`plan`: all that decides the results: the request, versions and machine."""
+        self.store, self.plan = store, json.dumps([plan, source_hash(SOURCE)], sort_keys=True)
+        self.first = now()
+
+    def key(self, task: tuple[Any, ...]) -> str:
+        return digest(f"{self.plan} {json.dumps(task)}".encode())
+
+    def get(self, task: tuple[Any, ...]) -> Any:
+        """The result of the task; None if it has none."""
+        row = self.store.get(TASK, self.key(task))
+        if row is None:
+            return None
+        self.first = min(self.first, row.value["at"])
+        return row.value["result"]
+
+    def add(self, task: tuple[Any, ...], result: Any) -> None:
+        self.store.put(TASK, self.key(task), {"at": now(), "result": result})
+
+
+def now() -> str:
+    # in the form of `started` of a header, with which it is compared
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=[*WORDS, *NUMBERS]).astype(NUMBERS)
 
 
 @dataclass
@@ -46,7 +104,7 @@ class Measured:
         samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place,
             cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes;
             of the kinds of `stepping.overheads` in s each.
-        truths: as `cheapest.closed_form` gives them.
+        truths: as `closed_form` gives them.
         left_out: (what, reason) of what could not be measured.
         busy: cores that others kept busy when the timing began.
         stopped: (`engine:profile`, number of disks) -> why it was not measured with so many.
@@ -61,15 +119,9 @@ class Measured:
     busy: float = nan
 
 
-def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """`Measured.samples`; a table with its columns if there are no rows."""
-    return pd.DataFrame(rows, columns=[*WORDS, *NUMBERS]).astype(NUMBERS)
-
-
 @dataclass
 class Measuring:
-    """A measurement under way: first the errors, then the times; results `kept` from an interrupted
-    one are not measured again."""
+    """A measurement under way; results `kept` from an interrupted one are not measured again."""
 
     plan: SpeedPlan
     progress: Progress
@@ -77,7 +129,7 @@ class Measuring:
     measured: Measured = field(default_factory=Measured)
 
     def run(self) -> Measured:
-        """Both passes of the plan."""
+        """Both passes of the plan; none where no scene has an exact answer."""
         reach = self.find_reach()
         measurements = list(self.plan.measurements(reach))
         if any(measurement.kind == SCENE for measurement in measurements):
@@ -88,23 +140,15 @@ class Measuring:
         return self.measured
 
     def find_reach(self) -> Reach:
-        """(scene, seed) -> the number of sample intervals that have an exact answer; scenes that
-        have none are left out."""
-        # In workers, which can be stopped at any time.
-        asked = {
-            seeded: partial(scored_part.reach_of, *seeded) for seeded in self.plan.seeded_scenes
-        }
+        # in workers, which can be stopped at any time
+        tasks = {seeded: partial(ladder.reach_of, *seeded) for seeded in self.plan.seeded_scenes}
         reach = {}
-        for seeded, result in done(asked, self.plan.workers, self.progress, "exact answer"):
-            reach[seeded], why = (0, result.reason) if isinstance(result, Failure) else result
-            if why:
-                self.leave_out("{}, seed {}".format(*seeded), f"no exact answer: {why}")
+        for seeded, result in done(tasks, self.plan.workers, self.progress, "exact answer"):
+            reach[seeded], reason = (0, result.reason) if isinstance(result, Failure) else result
+            if reason:
+                what = "{}, seed {}".format(*seeded)
+                self.measured.left_out.append((what, f"no exact answer: {reason}"))
         return reach
-
-    def leave_out(self, what: str, why: str | Failure) -> None:
-        """Report what could not be measured."""
-        why = f"{why.status}: {why.reason}" if isinstance(why, Failure) else why
-        self.measured.left_out.append((what, why))
 
     def measure_errors(self, measurements: Sequence[Measurement]) -> list[Measurement]:
         """The errors of all engines; returns those of the first seed at the steps that were played
@@ -115,14 +159,13 @@ class Measuring:
         rows: list[dict[str, Any]] = []
         played = []
         for measurement in measurements:
-            found = results[measurement.task]
-            if isinstance(found, Failure):
-                found = one_step_size_at_a_time(measurement, workers)
-            rows += (
-                {"kind": measurement.kind, "change": measurement.change} | row for row in found
-            )
+            result = results[measurement.task]
+            if isinstance(result, Failure):
+                result = one_step_size_at_a_time(measurement, workers)
+            kind = {"kind": measurement.kind, "change": measurement.change}
+            rows += (kind | row for row in result)
             if measurement.seed == self.plan.seed:
-                well = tuple(r["substeps"] for r in found if r["status"] in ("ok", ladder.FAILS))
+                well = tuple(r["substeps"] for r in result if r["status"] in ("ok", ladder.FAILS))
                 played.append(measurement._replace(step_sizes=well))
         self.measured.errors = pd.DataFrame(rows)
         return played
@@ -139,46 +182,48 @@ class Measuring:
         results = dict(
             done(tasks, self.plan.workers, self.progress, "error budget", kept=self.kept)
         )
-        for task, result in results.items():
-            if isinstance(result, Failure):
-                self.leave_out(f"error budget of {' '.join(task[1:])}", result)
-        found = [results[task] for task in tasks if not isinstance(results[task], Failure)]
-        self.measured.budget = pd.DataFrame(chain.from_iterable(found), columns=budget.COLUMNS)
+        self.leave_out("error budget", results)
+        rows = [results[task] for task in tasks if not isinstance(results[task], Failure)]
+        self.measured.budget = pd.DataFrame(chain.from_iterable(rows), columns=budget.COLUMNS)
 
     def measure_times(self, played: Sequence[Measurement]) -> None:
         """The cost of everything that was played to the end, in one process and one thing at a
         time."""
         self.measured.busy = busy_cores()
+        tasks = timings(self.plan, played)
+        results = dict(done(tasks, 1, self.progress, "time", ALL_ROUNDS, self.kept))
+        self.leave_out("timing", results)
         rows: list[dict[str, Any]] = []
         truths = []
-        tasks = timings(self.plan, played)
-        for task, result in done(tasks, 1, self.progress, "time", ALL_ROUNDS, self.kept):
-            kind = task[1]
+        for (_, kind, *_), result in results.items():
             if isinstance(result, Failure):
-                self.leave_out(f"timing of {' '.join(task[1:])}", result)
-            elif kind == TRUTH:
+                continue
+            if kind == TRUTH:
                 truths.append(result)
             elif kind == SIZE:
                 rows += result["samples"]
-                self.measured.stopped = {(name, n): why for name, n, why in result["stopped"]}
+                self.measured.stopped = {(name, n): reason for name, n, reason in result["stopped"]}
             else:
                 rows += result
         self.measured.samples = samples_table(rows)
         self.measured.truths = pd.DataFrame(truths)
+
+    def leave_out(self, what: str, results: Mapping[tuple[Any, ...], Any]) -> None:
+        for task, result in results.items():
+            if isinstance(result, Failure):
+                reason = f"{result.status}: {result.reason}"
+                self.measured.left_out.append((f"{what} of {' '.join(task[1:])}", reason))
 
 
 def one_step_size_at_a_time(measurement: Measurement, workers: int) -> list[dict[str, Any]]:
     """A ladder whose worker died or hung, played again one step size at a time, so that the
     other step sizes are kept."""
     rows: list[dict[str, Any]] = []
-    for k, result in run_all(
-        {k: measurement._replace(step_sizes=(k,)).errors for k in measurement.step_sizes},
-        workers,
-        HANGS,
-    ):
+    alone = [measurement._replace(step_sizes=(k,)) for k in measurement.step_sizes]
+    for k, result in run_all({one.step_sizes[0]: one.errors for one in alone}, workers, HANGS):
         if isinstance(result, Failure):
-            asked = measurement.scene, measurement.seed, measurement.name, k
-            result = [ladder.error_row(*asked, result.status, result.reason)]
+            where = measurement.scene, measurement.seed, measurement.name, k
+            result = [ladder.error_row(*where, result.status, result.reason)]
         rows += result
     return sorted(rows, key=lambda row: row["substeps"])
 
@@ -189,43 +234,32 @@ def timings(
     """The tasks of the second pass: all measurements of one kind in one scene are one task,
     because they are compared with each other."""
     repeats: dict[str, Any] = {"rounds": plan.effort.rounds, "budget": plan.effort.budget}
-    makes = {name: row_of(name).make for name in plan.engines}
     tasks: dict[tuple[Any, ...], Callable[[], Any]] = {}
-    for (kind, scene), group in groupby(played, key=lambda one: one[:2]):
-        tasks["time", kind, scene] = partial(
-            scene_rows, kind, scene, plan.seed, in_turns(list(group)), repeats
-        )
+    for (kind, scene), group in groupby(played, key=lambda measurement: measurement[:2]):
+        # on a ladder each takes part twice at its middle dt, which gives the noise floor
+        engines = {
+            ((measurement.name, measurement.change), k, copy): measurement.make
+            for measurement in group
+            for place, k in enumerate(measurement.step_sizes)
+            for copy in range(1 + (kind == SCENE and place == len(measurement.step_sizes) // 2))
+        }
+        tasks["time", kind, scene] = partial(scene_rows, kind, scene, plan.seed, engines, repeats)
         if kind == SCENE:
-            tasks["time", TRUTH, scene] = partial(cheapest.closed_form, scene, plan.seed)
+            tasks["time", TRUTH, scene] = partial(closed_form, scene, plan.seed)
     if plan.whole:
-        tasks["time", SIZE] = partial(size_rows, makes, plan, repeats)
+        tasks["time", SIZE] = partial(size_rows, plan, repeats)
     return tasks
 
 
-def in_turns(
-    measurements: Sequence[Measurement],
-) -> dict[tuple[tuple[str, str], int, int], Callable[..., Any]]:
-    """((name, change), substeps, copy) -> engine.
-
-    On a ladder of a scene each takes part twice at its middle dt, which gives the noise floor.
-    """
-    return {
-        ((one.name, one.change), k, copy): one.make
-        for one in measurements
-        for place, k in enumerate(one.step_sizes)
-        for copy in ((0, 1) if one.kind == SCENE and place == len(one.step_sizes) // 2 else (0,))
-    }
-
-
 def scene_rows(
-    kind: str, scene: str, seed: int, measurements: Mapping[Any, Any], repeats: Mapping[str, Any]
+    kind: str, scene: str, seed: int, engines: Mapping[Any, Any], repeats: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """Rows of `Measured.samples` of measurements as `in_turns` gives them; where these are of a
-    scene's ladders, of what is measured beside their steps, too."""
+    """Rows of `Measured.samples` of engines by ((name, change), substeps, copy); where these are of
+    a scene's ladders, of what is measured beside their steps, too."""
     scenario = open_scene(scene, seed)
     rows = []
-    also = {who[0]: make for (who, _, _), make in measurements.items()} if kind == SCENE else {}
-    for sample in ladder.times_of(scene, seed, measurements, **repeats, also=also):
+    also = {name: make for ((name, _), _, _), make in engines.items()} if kind == SCENE else {}
+    for sample in ladder.times_of(scene, seed, engines, **repeats, also=also):
         if len(sample.key) == 2:
             name, what = sample.key
             rows.append(sample_row(what, name, sample, scenario=scenario.name))
@@ -236,43 +270,57 @@ def scene_rows(
     return rows
 
 
-def size_rows(
-    makes: Mapping[str, Callable[..., Any]], plan: SpeedPlan, repeats: Mapping[str, Any]
-) -> dict[str, list[Any]]:
-    """samples: rows of `Measured.samples` for every number of disks, and the worst step with it;
-    stopped: (name, disks, why)."""
-    found, worst, stopped = sizes.costs(
+def size_rows(plan: SpeedPlan, repeats: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """samples: rows of `Measured.samples` for every number of disks, the worst step with it, and
+    the settled piles; stopped: (name, disks, reason)."""
+    engines = {name: row_of(name) for name in plan.engines}
+    makes = {name: row.make for name, row in engines.items()}
+    steps, worst, stopped = sizes.costs(
         makes, plan.effort.sizes, patience=plan.effort.patience, seed=plan.seed, **repeats
     )
+    piles = {
+        (name, change): partial(row.make, **settings)
+        for name, row in engines.items()
+        if SLEEPING in row.options
+        for change, settings in ((PLAIN, {}), (SLEEPING, row.options[SLEEPING]))
+    }
     rows = [
         sample_row(kind, sample.key[0], sample, n=sample.key[1])
-        for kind, samples in ((SIZE, found), (WORST_STEP, worst))
+        for kind, samples in ((SIZE, steps), (WORST_STEP, worst))
         for sample in samples
     ]
-    piles = {
-        (name, change): make
-        for name in makes
-        if SLEEPING in (options := row_of(name).options)
-        for change, make in (
-            (PLAIN, makes[name]),
-            (SLEEPING, partial(makes[name], **options[SLEEPING])),
-        )
-    }
     rows += [
         sample_row(IN_PILE, sample.key[0], sample, n=sizes.PILE, change=sample.key[1])
         for sample in sizes.pile_costs(piles, seed=plan.seed, **repeats)
     ]
-    return {"samples": rows, "stopped": [(name, n, why) for (name, n), why in stopped.items()]}
+    return {
+        "samples": rows,
+        "stopped": [(name, n, reason) for (name, n), reason in stopped.items()],
+    }
 
 
 def sample_row(kind: str, name: str, sample: Sample, **identity: Any) -> dict[str, Any]:
-    """A sample as a row of `Measured.samples`."""
     engine, profile = name.split(":")
     row: dict[str, Any] = {"kind": kind, "engine": engine, "profile": profile}
     row |= {"scenario": "", "change": PLAIN, "dt_s": nan, "n": 0, "copy_of": 0} | identity
-    row |= sample._asdict()
-    del row["key"]
-    return row
+    return row | {name: value for name, value in sample._asdict().items() if name != "key"}
+
+
+def closed_form(scene: str, seed: int) -> dict[str, Any]:
+    """scenario, truth (the kind of its exact answer) and closed_us: µs per simulated second to
+    compute a closed form. An answer computed in many digits is cached on disk, so its cost cannot
+    be measured by asking again."""
+    scenario = ladder.scored(scene, seed).scenario
+    model, cost = answered_by(scenario), nan
+    if model == CLOSED_FORM and scenario.truth is not None:
+        ends = scenario.times[[0, -1]]  # an engine is not read on the way either
+        best = inf
+        for _ in range(TRUTH_RUNS):
+            started = perf_counter()
+            scenario.truth(ends)
+            best = min(best, perf_counter() - started)
+        cost = best / scenario.duration * 1e6
+    return {"scenario": scenario.name, "truth": model, "closed_us": cost}
 
 
 def done(
@@ -284,9 +332,10 @@ def done(
     kept: Kept | None = None,
 ) -> Iterable[tuple[Any, Any]]:
     """Run the tasks with progress; yields the kept results first, then new ones as they come."""
-    left = {task: do for task, do in tasks.items() if kept is None or task not in kept}
-    if kept is not None:
-        yield from ((task, kept[task]) for task in tasks if task not in left)
+    known = {} if kept is None else {task: kept.get(task) for task in tasks}
+    known = {task: result for task, result in known.items() if result is not None}
+    yield from known.items()
+    left = {task: do for task, do in tasks.items() if task not in known}
     if not left:
         return
     progress.start(len(left), len(tasks), what)

@@ -30,12 +30,23 @@ from crosscheck2d.reports.page.kit import (
 from crosscheck2d.reports.page.links import neighbours
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.speed import explained, tables
-from crosscheck2d.reports.speed.budget import ALL, INTERPLAY, RESIDUAL, SUM, TIME, TOTAL
-from crosscheck2d.reports.speed.explained import LEAST
+from crosscheck2d.reports.speed import tables
+from crosscheck2d.reports.speed.budget import (
+    ALL,
+    INTERPLAY,
+    LEAST,
+    RESIDUAL,
+    SUM,
+    TIME,
+    TO,
+    TOTAL,
+    cut_scenes,
+    explained_share,
+)
+from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.plan import PLAIN
 from crosscheck2d.reports.speed.results import Results
-from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.tables import names_of
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.foreign_text import put_text
 
@@ -142,18 +153,14 @@ def table_of(
 
 
 def name_of(row: Row) -> str:
-    """`engine:profile` of a row."""
     return f"{row['engine']}:{row['profile']}"
 
 
 def failure(row: Row) -> str:
-    """How the run of a row failed; "" if it did not."""
     return f"{row['status']}: {row['reason']}" if row["status"] != "ok" else ""
 
 
 def situation_section(results: Results) -> list[Section]:
-    """The median error of each engine in the scenes of each situation, at the middle of the step
-    sizes measured, and what it costs."""
     points, seed = results.points, results.plan.seed
     of_scene = {}
     for scene in results.plan.scenes:
@@ -162,19 +169,19 @@ def situation_section(results: Results) -> list[Section]:
     sizes = points.groupby("scenario").step_size.unique()
     middle = points.scenario.map({scene: sorted(k)[len(k) // 2] for scene, k in sizes.items()})
     here = points[points.step_size == middle].assign(situation=points.scenario.map(of_scene))
-    here = here.assign(name=here.engine + ":" + here.profile).explode("situation")
-    found = here.groupby(["situation", "name"], sort=False)[["error", "cost"]].median()
+    here = here.assign(name=names_of(here)).explode("situation")
+    medians = here.groupby(["situation", "name"], sort=False)[["error", "cost"]].median()
     titles = [t for t in situations.SITUATIONS if t in set(here.situation)]
     names = list(dict.fromkeys(here.name))
     rows = {}
     for title in titles:
-        errors = found.error.loc[title]
+        errors = medians.error.loc[title]
         best = errors[np.isfinite(errors)].min()
         rows[title] = [
             TableCell(
                 errors.get(name, np.nan),
                 css="best" if errors.get(name) == best else "",
-                side=f"{number(found.cost.get((title, name), np.nan))} µs/s",
+                side=f"{number(medians.cost.get((title, name), np.nan))} µs/s",
             )
             for name in names
         ]
@@ -218,7 +225,6 @@ def write_picture(path: Path, kept: pd.DataFrame) -> None:
 
 
 def chart_of(lines: Sequence[Line], label: str, title: str, caption: str, **axes: Any) -> Chart:
-    """A chart of lines on logarithmic axes."""
     figure, plot = new_figure(7.6, 4.6)
     draw_lines(
         plot, lines, axes.get("x", COST), axes.get("y", ERROR), x_unit=axes.get("unit", "µs")
@@ -227,7 +233,6 @@ def chart_of(lines: Sequence[Line], label: str, title: str, caption: str, **axes
 
 
 def pooled_section(results: Results) -> Section:
-    """All scenarios at once."""
     pooled = results.pooled
     steps, scenes = pooled.step_size.nunique(), counted(len(results.scenes), "scene")
     caption = (
@@ -245,9 +250,8 @@ def pooled_section(results: Results) -> Section:
 
 
 def reached_table(results: Results) -> Table:
-    """What each accuracy costs, over the scenes."""
     rows: dict[str, dict[str, TableCell]] = {}
-    for row in to_rows(results.pooled_reached):
+    for row in results.pooled_reached.to_dict("records"):
         rows.setdefault(name_of(row), {})[row["accuracy"]] = TableCell(cost_of(row), row["why"])
     frame = pd.DataFrame.from_dict(rows, "index", dtype=object)[list(ACCURACIES)]
     caption = (
@@ -265,7 +269,6 @@ NEVER, NOT_REACHED = "never", "–"
 
 
 def cost_of(row: Row) -> str:
-    """What an accuracy costs an engine, or in how many scenes it is reached."""
     if np.isfinite(row["cost"]):
         got = f" ({row['got']})" if row["of"] > 1 else ""
         return number(row["cost"]) + got
@@ -275,7 +278,6 @@ def cost_of(row: Row) -> str:
 
 
 def versus_section(results: Results) -> Section:
-    """Where engines with end-of-step detection cost less than our own solver."""
     table = table_of(
         results.versus,
         name_of,
@@ -301,7 +303,6 @@ def versus_section(results: Results) -> Section:
 
 
 def models_section(results: Results) -> Section:
-    """The cheapest model that answers each scene."""
     table = table_of(
         results.models,
         "scenario",
@@ -326,12 +327,10 @@ def models_section(results: Results) -> Section:
 
 
 def budget_sections(results: Results) -> list[Section]:
-    """The error budget: its share, in how many scenes each contribution is the largest, and all
-    contributions of each scene."""
-    budget, found = results.measured.budget, results.explained
+    budget, explained = results.measured.budget, results.explained
     if budget.empty:
         return []
-    absent = [n for n in results.plan.engines if n not in set(found.engine + ":" + found.profile)]
+    absent = [name for name in results.plan.engines if name not in set(names_of(explained))]
     closed = number(float(budget.closed_deviation_radii.max()), 1)
     texts = [
         "The ablated reference is the hand-written solver with an option for every mechanism by"
@@ -353,9 +352,9 @@ def budget_sections(results: Results) -> list[Section]:
         Text(texts),
         overview(budget),
         Text(items=[f"{k}: {v}" for k, v in TERMS.items()]),
+        Text([f"The contribution of flight equals its formula to {closed} radii."]),
     ]
-    parts.append(Text([f"The contribution of flight equals its formula to {closed} radii."]))
-    if len(cuts := explained.cuts(found)):
+    if len(cuts := cut_scenes(explained)):
         columns: Columns = {
             "evaluated, s": "until_s",
             "exact answer, s": "horizon_s",
@@ -378,14 +377,13 @@ def budget_sections(results: Results) -> list[Section]:
             " must change as much as in the ablated reference with all others enabled."
         )
         parts.append(table_of(changed, name_of, columns, caption=caption))
-    says = f"Explained: {explained.sentence(found)}."
+    says = f"Explained: {explained_share(explained)}."
     return [Section("What the errors are made of", says, parts, True, "budget")]
 
 
 def causes(budget: pd.DataFrame) -> list[str]:
-    """The contributions that are causes, of any engine."""
-    found = set(budget.contribution)
-    return [TIME, *(name for name in NAMES if name in found)]
+    contributions = set(budget.contribution)
+    return [TIME, *(name for name in NAMES if name in contributions)]
 
 
 def overview(budget: pd.DataFrame) -> Table:
@@ -399,7 +397,7 @@ def overview(budget: pd.DataFrame) -> Table:
         scenes = scenes.reindex(columns=[TOTAL, RESIDUAL, *causes(budget)]).fillna(0.0)
         off, known = scenes[scenes[TOTAL] > LEAST], scenes[causes(budget)]
         largest = known[known.max(axis=1) > LEAST].idxmax(axis=1)
-        within = int((off[RESIDUAL] <= explained.TO[0] * off[TOTAL]).sum())
+        within = int((off[RESIDUAL] <= TO[0] * off[TOTAL]).sum())
         counts = [int((largest == cause).sum()) for cause in known.columns]
         rows[f"{engine}:{profile}"] = [len(scenes), len(off), within, *counts]
     caption = (
@@ -416,16 +414,13 @@ def contributions(budget: pd.DataFrame) -> Table:
     opens: dict[str, list[Part]] = {}
     extents = {}
     for scene, here in budget.groupby("scenario", sort=False):
-        wide = here.assign(name=here.engine + ":" + here.profile).pivot(
-            index="name", columns="contribution", values="position_radii"
-        )
+        here = here.assign(name=names_of(here))
+        wide = here.pivot(index="name", columns="contribution", values="position_radii")
         of_anybody = [c for c in causes(budget) if c in wide and wide[c].max() > LEAST]
         columns = [TOTAL, RESIDUAL, *of_anybody, INTERPLAY, SUM, ALL]
-        wide = wide.reindex(
-            columns=columns, index=[*dict.fromkeys(here.engine + ":" + here.profile)]
-        )
+        wide = wide.reindex(columns=columns, index=[*dict.fromkeys(here.name)])
         notes = here[here.note != ""]
-        failed = [f"{name_of(row)} has not played it: {row['note']}" for row in to_rows(notes)]
+        failed = [f"{row.name} has not played it: {row.note}" for row in notes.itertuples()]
         label = f"budget of {scene}"  # a row's label is its address
         opens[label] = [
             Table(wide.astype(object), caption="–: this engine does not have the mechanism."),
@@ -437,13 +432,7 @@ def contributions(budget: pd.DataFrame) -> Table:
     return Table(frame, corner="All contributions in", opens=opens)
 
 
-def to_rows(frame: pd.DataFrame) -> list[dict[Hashable, Any]]:
-    """The rows of a frame."""
-    return frame.to_dict("records")
-
-
 def option_sections(results: Results) -> list[Section]:
-    """The cost and the effect of each option that the scenes do not need."""
     if results.options.empty:
         return []
     scenes = results.plan.option_scenes
@@ -456,7 +445,6 @@ def option_sections(results: Results) -> list[Section]:
 
 
 def options_table(options: pd.DataFrame) -> Table:
-    """A row for each option in each scene, also one that failed there."""
     return table_of(
         options,
         name_of,
@@ -476,7 +464,6 @@ def options_table(options: pd.DataFrame) -> Table:
 
 
 def sweep_sections(results: Results) -> list[Section]:
-    """The effect of more iterations and substeps, and that of smaller steps for the same time."""
     if results.sweeps.empty:
         return []
     pooled = results.pooled_sweeps
@@ -512,7 +499,6 @@ def sweep_sections(results: Results) -> list[Section]:
 
 
 def sweeps_table(sweeps: pd.DataFrame) -> Table:
-    """A row for each point of a sweep and of its engine, also one that failed."""
     return table_of(
         sweeps,
         "scenario",
@@ -531,15 +517,12 @@ def sweeps_table(sweeps: pd.DataFrame) -> Table:
 
 
 def interval_of_seeds(row: Row) -> str:
-    """The 95 % interval of an error; – of one seed."""
     if row["seeds"] < 2:
         return NOT_REACHED
     return f"{number(row['error_low'])} to {number(row['error_high'])}"
 
 
 def size_sections(results: Results) -> list[Section]:
-    """Cost against the number of disks: the mean and the worst step, the growth, and what a
-    settled pile costs with sleeping and without."""
     costs, growth = results.sizes, results.growth
     if costs.empty:
         return []
@@ -552,7 +535,7 @@ def size_sections(results: Results) -> list[Section]:
     title = "Cost of a step against the number of disks"
     chart = chart_of(lines, title, title, caption, **words)
     rows: dict[str, dict[str, TableCell]] = {}
-    for row in to_rows(costs):
+    for row in costs.to_dict("records"):
         worst = f"worst {number(row['worst'])}"
         cell = TableCell(row["cost"], quartiles(row), side=worst)
         rows.setdefault(name_of(row), {})[f"{row['n']} disks"] = cell
@@ -569,7 +552,6 @@ def size_sections(results: Results) -> list[Section]:
 
 
 def growth_table(growth: pd.DataFrame) -> Table:
-    """A row for each engine, also one that was stopped at the fewest disks."""
     return table_of(
         growth,
         name_of,
@@ -587,12 +569,10 @@ def growth_table(growth: pd.DataFrame) -> Table:
 
 
 def quartiles(row: Row) -> str:
-    """Quartiles and the fastest of a cost, in words."""
     return f"{number(row['low'])} to {number(row['high'])}, fastest {number(row['best'])}"
 
 
 def driving_section(results: Results) -> Section:
-    """What the loop in Python costs."""
     table = table_of(
         results.driving,
         name_of,
@@ -614,7 +594,7 @@ def driving_section(results: Results) -> Section:
 
 def scenes_section(results: Results) -> Section:
     """A row for each scenario, which opens its chart, its orders and all its points."""
-    points = results.points.assign(name=results.points.engine + ":" + results.points.profile)
+    points = results.points.assign(name=names_of(results.points))
     rows, opens = {}, dict[str, list[Part]]()
     for scene, here in points.groupby("scenario", sort=False):
         fine = here[np.isfinite(here.error)]
@@ -630,7 +610,6 @@ def scenes_section(results: Results) -> Section:
 
 
 def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part]:
-    """What the row of a scenario opens."""
     noise, seeds = results.noise_floor(scene), int(points.seeds.max())
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
     sentences = [
@@ -657,7 +636,7 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part
     )
     reached = {
         (name_of(row), row["accuracy"]): row
-        for row in to_rows(results.reached[results.reached.scenario == scene])
+        for row in results.reached[results.reached.scenario == scene].to_dict("records")
     }
 
     def cost_at(accuracy: str) -> Callable[[Row], TableCell]:
@@ -698,7 +677,6 @@ def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part
 
 
 def points_table(points: pd.DataFrame) -> Table:
-    """A row for each engine and dt, also without a time, or failed."""
     return table_of(
         points,
         name_of,

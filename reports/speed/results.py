@@ -9,10 +9,9 @@ import pandas as pd
 from crosscheck2d.reports.compare.pooling import pooled
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.timing import Noise, noise_of
-from crosscheck2d.reports.speed import cheapest, explained, tables, versus
+from crosscheck2d.reports.speed import budget, tables
 from crosscheck2d.reports.speed.measure import Measured
 from crosscheck2d.reports.speed.plan import SpeedPlan
-from crosscheck2d.scenarios.model import Scenario
 
 QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 
@@ -28,8 +27,8 @@ class Results:
             per simulated s.
         pooled: see `pooling.pooled`; of scenes without friction, as is `pooled_reached`, unless
             every scene has friction.
-        versus, models, explained: see `versus.against_own`, `cheapest.cheapest_models`,
-            `explained.explained`.
+        versus, models, explained: see `tables.against_own`, `tables.cheapest_models`,
+            `budget.explain`.
     """
 
     plan: SpeedPlan
@@ -46,52 +45,54 @@ class Results:
         self.asks = {name: asked[name].asks for name in asked if name in {*points.scenario}}
         self.orders = tables.orders(measured, seed)
         self.reached = tables.reached(self.points, self.orders)
-        self.pooled = pooled(poolable(self.points, asked))
-        self.pooled_reached = tables.pooled_reached(poolable(self.reached, asked), self.reached)
+        rough = [scenario.name for scenario in scenarios if scenario.scene.friction]
+        if set(rough) >= set(self.asks):
+            rough = []
+        smooth = self.reached[~self.reached.scenario.isin(rough)]
+        self.pooled = pooled(self.points[~self.points.scenario.isin(rough)])
+        self.pooled_reached = tables.pooled_reached(smooth, self.reached)
         self.sizes = tables.sizes(measured)
         self.growth = tables.growth(self.sizes, measured.stopped)
         self.pile = tables.pile(measured)
         self.sweeps = tables.sweeps(measured, seed)
         self.pooled_sweeps = tables.pooled_sweeps(self.sweeps)
         self.options = tables.options(measured)
-        self.versus = versus.against_own(self.points, self.options)
-        self.models = cheapest.cheapest_models(measured.truths, self.points)
-        self.explained = explained.explained(measured.budget)
+        self.versus = tables.against_own(self.points, self.options)
+        self.models = tables.cheapest_models(measured.truths, self.points)
+        self.explained = budget.explain(measured.budget)
         self.noise = tables.noise(measured)
 
     @property
     def scenes(self) -> list[str]:
-        """The measured scenarios."""
         return list(self.asks)
 
     def noise_floor(self, scene: str = "") -> Noise:
-        """That of an engine against itself, in one scene or in all; quiet up to `QUIET`."""
+        # of an engine against itself, in one scene or in all
         ratios = self.noise[self.noise.scenario == scene].ratio if scene else self.noise.ratio
         return noise_of(ratios.to_numpy(float))
 
     @property
     def noise_sentence(self) -> str:
-        """The noise floor of all scenes, and what to do where it is too loud."""
         noise = self.noise_floor()
         if not noise.pairs:
             return "No engine was timed against itself, so the noise floor is not known."
-        said = (
+        sentence = (
             "Noise floor: the time of an engine over its own time again, in the same rounds, is"
             f" {noise.median:.3f}; for half of {noise.pairs} pairs it is from {noise.low:.3f} to"
             f" {noise.high:.3f}, at worst {noise.least:.3f} and {noise.most:.3f}."
         )
         if noise.floor > QUIET:
-            said += (
+            sentence += (
                 f" It must stay between {1 - QUIET:g} and {1 + QUIET:g}: differences of time below"
                 " this floor mean nothing. Measure again while nothing else runs before you quote"
                 " a time."
             )
-        return said
+        return sentence
 
     @property
     def files(self) -> dict[str, pd.DataFrame]:
         """The tables, by the names of their CSV files."""
-        tables = {
+        files = {
             "speed_samples": self.measured.samples,
             "speed_errors": self.measured.errors,
             "speed": self.points,
@@ -110,11 +111,4 @@ class Results:
             "speed_explained": self.explained,
             "speed_versus": self.versus,
         }
-        return {f"{name}.csv": table for name, table in tables.items()}
-
-
-def poolable(table: pd.DataFrame, asked: dict[str, Scenario]) -> pd.DataFrame:
-    """The rows of scenes without friction, which alone are pooled; all rows if every scene has
-    friction."""
-    rough = table.scenario.isin([name for name, one in asked.items() if one.scene.friction])
-    return table if rough.all() else table[~rough]
+        return {f"{name}.csv": table for name, table in files.items()}

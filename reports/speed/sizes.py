@@ -65,10 +65,10 @@ def pile_costs(
 ) -> list[Sample]:
     """Samples in s a step of a pile of `PILE` disks that has settled, by the key of the engine."""
     piles = {key: RunningGas(make(), pile(PILE), SETTLED) for key, make in engines.items()}
-    what = [Timed(key, going, going.steps) for key, going in piles.items()]
-    samples = interleaved(what, rounds, budget, seed)
-    for going in piles.values():
-        going.engine.close()
+    timed = [Timed(key, running, running.steps) for key, running in piles.items()]
+    samples = interleaved(timed, rounds, budget, seed)
+    for running in piles.values():
+        running.engine.close()
     return samples
 
 
@@ -90,22 +90,22 @@ def costs(
     left_out: dict[tuple[str, int], str] = {}
     course: dict[str, list[tuple[int, float]]] = {name: [] for name in engines}
     for n in sizes:
-        awake: dict[str, RunningGas] = {}
+        gases: dict[str, RunningGas] = {}
         for name, make in engines.items():
             if extrapolated_cost(course[name], n) > patience:
                 left_out[name, n] = STOPPED.format(patience)
                 continue
             try:
-                awake[name] = RunningGas(make(), gas(n, seed))
+                gases[name] = RunningGas(make(), gas(n, seed))
             except Unsupported as refusal:
                 left_out[name, n] = f"refused: {refusal}"
-        what = [Timed((name, n), going, going.steps) for name, going in awake.items()]
-        here = interleaved(what, rounds, budget, seed)
-        for name, going in awake.items():
+        timed = [Timed((name, n), running, running.steps) for name, running in gases.items()]
+        here = interleaved(timed, rounds, budget, seed)
+        for name, running in gases.items():
             least = min(sample.cost for sample in here if sample.key == (name, n))
             course[name].append((n, least))
-            worst.append(Sample((name, n), 0, 0, going.worst_step(least, budget), 0.0, 1))
-            going.engine.close()
+            worst.append(Sample((name, n), 0, 0, running.worst_step(least, budget), 0.0, 1))
+            running.engine.close()
         samples += here
     return samples, worst, left_out
 
@@ -115,7 +115,6 @@ class RunningGas:
     steps after the beginning."""
 
     def __init__(self, engine: Engine, scene: Scene, first: int = 1) -> None:
-        """Load the gas, and determine how many steps fill a sample."""
         self.engine, self.scene, self.first = engine, scene, first
         engine.listening = False
         self.begin()
@@ -124,13 +123,11 @@ class RunningGas:
         self.steps = int(np.clip(SAMPLE / each, 1, MOST_STEPS))
 
     def begin(self) -> None:
-        """Load, which may compile, and take the first steps; not timed."""
         self.engine.load(self.scene, DT)
         self.engine.step(self.first)
         self.taken = 1
 
     def __call__(self) -> Spent:
-        """Take the steps of one sample; only they are timed."""
         if self.taken + self.steps > RESTART_AFTER + WARM_STEPS:
             self.begin()
         started = perf_counter()
@@ -154,7 +151,6 @@ class RunningGas:
 
 
 def extrapolated_cost(course: Sequence[tuple[int, float]], n: int) -> float:
-    """s a step with `n` disks, extrapolated from the last two sizes; 0 if fewer are known."""
     if len(course) < 2:
         return 0.0
     (n1, cost1), (n2, cost2) = course[-2:]

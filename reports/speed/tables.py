@@ -1,10 +1,9 @@
 """The tables made from samples and errors: points, orders, cost of an accuracy, sizes, options,
-noise floor."""
+sweeps, our own solver beside the others, the cheapest model, noise floor."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,8 @@ import pandas as pd
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.options import SWEEPS
-from crosscheck2d.reports.compare.order import Order, median_interval, order_of
+from crosscheck2d.adapters.mechanisms.table import MECHANISMS
+from crosscheck2d.reports.compare.order import FINEST, Order, median_interval, order_of
 from crosscheck2d.reports.compare.pareto import (
     ACCURACIES,
     FAILED,
@@ -32,9 +32,18 @@ from crosscheck2d.reports.speed.plan import OPTION, PLAIN, SCENE, SWEEP
 from crosscheck2d.reports.speed.sizes import exponent
 from crosscheck2d.reports.terminal.counts import listed
 from crosscheck2d.scenarios.model import Scenario
+from crosscheck2d.scenarios.truth.exact import CLOSED_FORM
 
 NOT_GOT = {"never": UNREACHABLE, "failed": FAILED, "untimed": NOT_TIMED}  # how it is counted -> why
 TIMES = ["cost", "low", "high", "best", "wrapping"]
+HERE = ["scenario", *WHO]
+# engines with end-of-step detection, but for our own solver
+COMPARED = tuple(name for name in MECHANISMS if name in ENGINES and name != YARDSTICK)
+
+
+def names_of(table: pd.DataFrame) -> pd.Series:
+    names: pd.Series = table.engine + ":" + table.profile
+    return names
 
 
 def rows_by(
@@ -46,72 +55,31 @@ def rows_by(
     return pd.DataFrame([dict(zip(keys, key)) | {**row(group)} for key, group in groups])
 
 
-def points(measured: Measured, seed: int) -> pd.DataFrame:
-    """A row for each scenario, engine and dt: the columns of `summed`, and step_size (0:
-    coarsest)."""
-    found = summed(measured, SCENE, seed)
-    return found.assign(step_size=doublings(found))
+def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping,
+    rounds; no warm-up."""
+    counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
+    cost = counted["cost"]
+    quartiles = {"low": cost.quantile(0.25), "high": cost.quantile(0.75)}
+    table = pd.DataFrame({"cost": cost.median(), **quartiles, "best": cost.min()})
+    return table.assign(wrapping=counted["wrapping"].median(), rounds=cost.size()).reset_index()
 
 
-def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
-    """The columns of `summed`, and step_size: the sweeps over their values, and their engines over
-    a ladder of dt."""
-    if not (measured.errors.kind == SWEEP).any():
-        return pd.DataFrame()
-    found = summed(measured, SWEEP, seed)
-    places = {
-        (sweep.name, str(value)): k
-        for sweep in SWEEPS
-        for k, value in enumerate(sweep.parameter.values)
-    }
-    names = found.engine + ":" + found.profile
-    turned = [places.get(who, -1) for who in zip(names, found.change)]
-    return found.assign(
-        step_size=np.where(found.change == PLAIN, doublings(found), turned), idle=np.nan
-    )
+def times_in_us(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+    table = summed_up(samples, by)
+    return table.assign(**{column: table[column] * 1e6 for column in TIMES})
 
 
-def pooled_sweeps(found: pd.DataFrame) -> pd.DataFrame:
-    """As `pooled`, of cost and error over those of the matched engine at the dt at which its
-    parameter is swept.
-
-    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
-    part in it.
-    """
-    if found.empty:
-        return found
-    both = found.merge(at_matched(found), on=["scenario", "engine"], suffixes=("", "_here"))
-    both = both[measurable(both)]
-    for of in ("cost", "error"):
-        both[of] /= both[f"{of}_here"]
-    parts = [
-        pooled(group).assign(change=str(change))
-        for (_, change), group in both.groupby(["profile", "change"])
-    ]
-    return pd.concat(parts).sort_values("step_size", kind="stable") if parts else found.head(0)
+def doublings(table: pd.DataFrame) -> pd.Series:
+    # how often the step of a row has been halved from the scenario's coarsest
+    coarsest = table.groupby("scenario").substeps.transform("min")
+    return (table.substeps / coarsest).map(np.log2).round().astype(int)
 
 
-def without_ratio(found: pd.DataFrame) -> list[tuple[str, str]]:
-    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right
-    to the last bit."""
-    here = at_matched(found)
-    lost = here[~measurable(here)]
-    return list(zip(lost.engine, lost.scenario))
-
-
-def at_matched(found: pd.DataFrame) -> pd.DataFrame:
-    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its
-    parameter is swept."""
-    dt = found[found.change != PLAIN].groupby("scenario").dt_s.first()
-    here = found[(found.change == PLAIN) & (found.dt_s == found.scenario.map(dt))]
-    both = here[["scenario", "engine", "cost", "error"]]
-    return both.rename(columns={"cost": "cost_here", "error": "error_here"})
-
-
-def measurable(here: pd.DataFrame) -> pd.Series:
-    """Whether there is a value to divide by."""
-    finite: pd.Series = np.isfinite(here.cost_here) & np.isfinite(here.error_here)
-    return finite & (here.error_here > 0)
+def in_order(table: pd.DataFrame) -> pd.DataFrame:
+    # of `ENGINES`, otherwise as it was
+    ranks = {name: rank for rank, name in enumerate(ENGINES)}
+    return table.loc[names_of(table).map(ranks).sort_values(kind="stable").index]
 
 
 def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
@@ -140,22 +108,69 @@ def summed(measured: Measured, kind: str, seed: int) -> pd.DataFrame:
             "error_high": high,
         }
 
-    keys = ["scenario", *WHO, "change", "dt_s"]
+    keys = [*HERE, "change", "dt_s"]
     errors = measured.errors[measured.errors.kind == kind]
     first = measured.samples[(measured.samples.kind == kind) & (measured.samples.copy_of == 0)]
-    times = in_us(summed_up(first, keys))
-    return rows_by(errors, [*keys, "substeps"], over_seeds).merge(times, on=keys, how="left")
+    table = rows_by(errors, [*keys, "substeps"], over_seeds)
+    return table.merge(times_in_us(first, keys), on=keys, how="left")
 
 
-def doublings(found: pd.DataFrame) -> pd.Series:
-    """How often the step of a row has been halved from the scenario's coarsest."""
-    coarsest = found.groupby("scenario").substeps.transform("min")
-    return (found.substeps / coarsest).map(np.log2).round().astype(int)
+def points(measured: Measured, seed: int) -> pd.DataFrame:
+    """The columns of `summed`, and step_size (0: coarsest)."""
+    table = summed(measured, SCENE, seed)
+    return table.assign(step_size=doublings(table))
 
 
-def in_us(table: pd.DataFrame) -> pd.DataFrame:
-    """The same times in µs."""
-    return table.assign(**{column: table[column] * 1e6 for column in TIMES})
+def sweeps(measured: Measured, seed: int) -> pd.DataFrame:
+    """The columns of `summed`, and step_size: the sweeps over their values, and their engines over
+    a ladder of dt."""
+    if not (measured.errors.kind == SWEEP).any():
+        return pd.DataFrame()
+    table = summed(measured, SWEEP, seed)
+    places = {
+        (sweep.name, str(value)): k
+        for sweep in SWEEPS
+        for k, value in enumerate(sweep.parameter.values)
+    }
+    places_of_rows = [places.get(key, -1) for key in zip(names_of(table), table.change)]
+    step_size = np.where(table.change == PLAIN, doublings(table), places_of_rows)
+    return table.assign(step_size=step_size, idle=np.nan)
+
+
+def pooled_sweeps(table: pd.DataFrame) -> pd.DataFrame:
+    """As `pooled`, of cost and error over those of the matched engine at the dt at which its
+    parameter is swept.
+
+    change is the value of the sweep; a ladder of dt has none. Scenes of `without_ratio` have no
+    part in it.
+    """
+    if table.empty:
+        return table
+    matched = at_matched(table)
+    both = table.merge(matched[matched.usable], on=["scenario", "engine"])
+    both = both.assign(cost=both.cost / both.cost_here, error=both.error / both.error_here)
+    parts = [
+        pooled(group).assign(change=str(change))
+        for (_, change), group in both.groupby(["profile", "change"])
+    ]
+    return pd.concat(parts).sort_values("step_size", kind="stable") if parts else table.head(0)
+
+
+def without_ratio(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """(engine, scenario) of the sweeps where the matched engine failed, was not timed, or is right
+    to the last bit."""
+    matched = at_matched(table)
+    return list(matched[~matched.usable][["engine", "scenario"]].itertuples(index=False, name=None))
+
+
+def at_matched(table: pd.DataFrame) -> pd.DataFrame:
+    """scenario, engine, cost_here and error_here: each matched engine at the dt at which its
+    parameter is swept; usable: there is a value to divide by."""
+    dt = table[table.change != PLAIN].groupby("scenario").dt_s.first()
+    here = table[(table.change == PLAIN) & (table.dt_s == table.scenario.map(dt))]
+    usable = np.isfinite(here.cost) & np.isfinite(here.error) & (here.error > 0)
+    both = here[["scenario", "engine", "cost", "error"]].assign(usable=usable)
+    return both.rename(columns={"cost": "cost_here", "error": "error_here"})
 
 
 def orders(measured: Measured, seed: int) -> pd.DataFrame:
@@ -184,27 +199,23 @@ def orders(measured: Measured, seed: int) -> pd.DataFrame:
             "failed": int(failed.any(axis=0).sum()),
         }
 
-    scenes = measured.errors[measured.errors.kind == SCENE]
-    return rows_by(scenes, ["scenario", *WHO], fit)
+    return rows_by(measured.errors[measured.errors.kind == SCENE], HERE, fit)
 
 
 def reached(found: pd.DataFrame, fitted: pd.DataFrame) -> pd.DataFrame:
     """A row for each scenario, engine and accuracy: accuracy (radii), cost (µs per simulated
     second), dt_s, why it is not, and lost: it is not at any dt, or failed."""
-    keys = ["scenario", *WHO]
-    both = found.merge(fitted[[*keys, "verdict"]], on=keys)
-
-    def reach(accuracy: str, group: pd.DataFrame) -> dict[str, Any]:
+    rows = []
+    both = found.merge(fitted[[*HERE, "verdict"]], on=HERE)
+    for key, group in both.groupby(HERE, sort=False):
         dts, costs, errors = (group[name].to_numpy(float) for name in ("dt_s", "cost", "error"))
-        verdict = group.verdict.iloc[0]
-        cost, dt, why = cost_to_reach(ACCURACIES[accuracy], dts, costs, errors, verdict)
-        if why == NOT_REACHED:
-            why = f"not down to dt {group.dt_s.min():.2g} s"
-        lost = why in (UNREACHABLE, FAILED)
-        return {"accuracy": accuracy, "cost": cost, "dt_s": dt, "why": why, "lost": lost}
-
-    parts = [rows_by(both, keys, partial(reach, accuracy)) for accuracy in ACCURACIES]
-    return pd.concat(parts).sort_index(kind="stable", ignore_index=True)
+        for accuracy, radii in ACCURACIES.items():
+            cost, dt, why = cost_to_reach(radii, dts, costs, errors, group.verdict.iloc[0])
+            if why == NOT_REACHED:
+                why = f"not down to dt {group.dt_s.min():.2g} s"
+            lost = why in (UNREACHABLE, FAILED)
+            rows.append((*key, accuracy, cost, dt, why, lost))
+    return pd.DataFrame(rows, columns=[*HERE, "accuracy", "cost", "dt_s", "why", "lost"])
 
 
 def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
@@ -221,18 +232,18 @@ def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
 
     def pool(group: pd.DataFrame) -> dict[str, Any]:
         got, count = int(group.cost.notna().sum()), len(group)
-        others = {name: int((group.why == why).sum()) for name, why in NOT_GOT.items()}
-        parts = [f"{got} of {count}", *(f"{name} in {k}" for name, k in others.items() if k)]
-        mine = own[own.accuracy == group.accuracy.iloc[0]]
+        counts = {name: int((group.why == why).sum()) for name, why in NOT_GOT.items()}
+        parts = [f"{got} of {count}", *(f"{name} in {k}" for name, k in counts.items() if k)]
+        own_rows = own[own.accuracy == group.accuracy.iloc[0]]
         return {
             "scenario": POOLED,
-            "cost": paired_cost(group, mine) if 2 * got > count else np.nan,
+            "cost": paired_cost(group, own_rows) if 2 * got > count else np.nan,
             "dt_s": np.nan,
             "why": ", ".join(parts),
             "lost": 2 * int(group.lost.sum()) >= count,
             "of": count,
             "got": got,
-            **others,
+            **counts,
         }
 
     return rows_by(part, [*WHO, "accuracy"], pool)
@@ -243,8 +254,8 @@ def noise(measured: Measured) -> pd.DataFrame:
     the same rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
     both = (
-        summed_up(samples, ["scenario", *WHO, "dt_s", "copy_of"])
-        .pivot(index=["scenario", *WHO, "dt_s"], columns="copy_of", values="cost")
+        summed_up(samples, [*HERE, "dt_s", "copy_of"])
+        .pivot(index=[*HERE, "dt_s"], columns="copy_of", values="cost")
         .reindex(columns=[0, 1])
     )
     return (both[1] / both[0]).dropna().rename("ratio").reset_index()
@@ -255,57 +266,45 @@ def bindings(measured: Measured) -> pd.DataFrame:
     there is nothing to do, measured in the rounds of that scenario, and a read-out of it."""
     samples = measured.samples[measured.samples.kind.isin([EMPTY, CALL, READ])]
     if samples.empty:
-        return pd.DataFrame(columns=["scenario", *WHO, "step_us", "call_us", "read_us"])
+        return pd.DataFrame(columns=[*HERE, "step_us", "call_us", "read_us"])
     # The fastest samples: on a busy machine a difference of medians may have either sign.
-    wide = in_us(summed_up(samples, ["scenario", *WHO, "kind"])).pivot(
-        index=["scenario", *WHO], columns="kind", values="best"
-    )
-    call = (wide[CALL] - wide[EMPTY]).clip(lower=0.0)
-    return pd.DataFrame(
-        {"step_us": wide[EMPTY], "call_us": call, "read_us": wide[READ]}
-    ).reset_index()
+    best = times_in_us(samples, [*HERE, "kind"]).pivot(index=HERE, columns="kind", values="best")
+    call = (best[CALL] - best[EMPTY]).clip(lower=0.0)
+    table = {"step_us": best[EMPTY], "call_us": call, "read_us": best[READ]}
+    return pd.DataFrame(table).reset_index()
 
 
-def driving(found: pd.DataFrame) -> pd.DataFrame:
+def driving(bound: pd.DataFrame) -> pd.DataFrame:
     """engine, profile, and of `bindings` the median over the scenes, besides read_most_us, the
     largest."""
-    each = found.groupby(WHO)
-    medians = each[["step_us", "call_us", "read_us"]].median()
-    return in_order(medians.assign(read_most_us=each.read_us.max()).reset_index())
+    engines = bound.groupby(WHO)
+    medians = engines[["step_us", "call_us", "read_us"]].median()
+    return in_order(medians.assign(read_most_us=engines.read_us.max()).reset_index())
 
 
-def idle(found: pd.DataFrame, points: pd.DataFrame, scenarios: Mapping[str, Scenario]) -> pd.Series:
+def idle(bound: pd.DataFrame, points: pd.DataFrame, scenarios: Mapping[str, Scenario]) -> pd.Series:
     """Of each row of `points` what its steps and calls cost where there is nothing to do, µs per
-    simulated second; nan where `found`, of `bindings`, does not say."""
-    both = points[["scenario", *WHO, "substeps"]].merge(found, on=["scenario", *WHO], how="left")
+    simulated second; nan where `bound`, of `bindings`, does not say."""
+    both = points[[*HERE, "substeps"]].merge(bound, on=HERE, how="left")
     rows = zip(both.scenario, both.step_us, both.call_us, both.substeps)
     values = [binding_of(step, step + call, scenarios[name], k) for name, step, call, k in rows]
     return pd.Series(values, points.index, dtype=float)
 
 
-def in_order(table: pd.DataFrame) -> pd.DataFrame:
-    """Its rows in the order of `ENGINES`, otherwise as they were."""
-    ranks = {name: rank for rank, name in enumerate(ENGINES)}
-    names = table.engine + ":" + table.profile
-    return table.loc[names.map(ranks).sort_values(kind="stable").index]
-
-
 def sizes(measured: Measured) -> pd.DataFrame:
     """engine, profile, n, cost in µs a step, the other columns of `summed_up`, worst: µs of the
     dearest step."""
-    samples = measured.samples[measured.samples.kind == SIZE]
-    costs = in_us(summed_up(samples, [*WHO, "n"]))
-    dearest = measured.samples[measured.samples.kind == WORST_STEP]
-    worst = dearest.set_index([*WHO, "n"]).cost.mul(1e6).rename("worst")
-    costs = costs.join(worst, on=[*WHO, "n"]).sort_values("n", kind="stable")
-    return in_order(costs.reset_index(drop=True))
+    samples = measured.samples
+    costs = times_in_us(samples[samples.kind == SIZE], [*WHO, "n"])
+    dearest = samples[samples.kind == WORST_STEP].set_index([*WHO, "n"])
+    costs = costs.join(dearest.cost.mul(1e6).rename("worst"), on=[*WHO, "n"])
+    return in_order(costs.sort_values("n", kind="stable").reset_index(drop=True))
 
 
 def end_of_all_pairs(costs: pd.DataFrame) -> str:
     """A sentence on the number of disks from which on testing all pairs, as `YARDSTICK` does, costs
     more than other engines, interpolated; "" if it costs more than none."""
-    table = costs.assign(name=costs.engine + ":" + costs.profile)
-    table = table.pivot(index="n", columns="name", values="cost")
+    table = costs.assign(name=names_of(costs)).pivot(index="n", columns="name", values="cost")
     ends = []
     for name in table.columns.drop(YARDSTICK, errors="ignore") if YARDSTICK in table else ():
         both = table[[YARDSTICK, name]].dropna()
@@ -321,8 +320,8 @@ def pile(measured: Measured) -> pd.DataFrame:
     """name, n and what a step of a settled pile of n disks costs, µs: `PLAIN` and `SLEEPING`; no
     rows if none was timed."""
     samples = measured.samples[measured.samples.kind == IN_PILE]
-    costs = in_us(summed_up(samples, [*WHO, "change", "n"]))
-    named = costs.assign(name=costs.engine + ":" + costs.profile)
+    costs = times_in_us(samples, [*WHO, "change", "n"])
+    named = costs.assign(name=names_of(costs))
     wide = named.pivot(index=["name", "n"], columns="change", values="cost")
     return wide.reindex(columns=[PLAIN, SLEEPING]).dropna().reset_index()
 
@@ -330,8 +329,8 @@ def pile(measured: Measured) -> pd.DataFrame:
 def growth(costs: pd.DataFrame, stopped: Mapping[tuple[str, int], str]) -> pd.DataFrame:
     """engine, profile, exponent of the costs of `sizes`, low, high, most (disks), and where and why
     it was first stopped, `Measured.stopped`."""
-    first = {name: f"{n}: {why}" for (name, n), why in reversed([*stopped.items()])}
-    timed, rows = costs.engine + ":" + costs.profile, []
+    first = {name: f"{n}: {reason}" for (name, n), reason in reversed([*stopped.items()])}
+    timed, rows = names_of(costs), []
     # some engines were stopped at the smallest number of disks
     for name in dict.fromkeys([*timed, *(name for name, _ in stopped)]):
         group = costs[timed == name]
@@ -348,24 +347,87 @@ def options(measured: Measured) -> pd.DataFrame:
     errors = measured.errors[measured.errors.kind == OPTION]
     if samples.empty or errors.empty:
         return pd.DataFrame()
-    keys = ["scenario", *WHO, "change"]
-    table = errors[[*keys, "status", "reason", "error_radii"]].merge(
-        in_us(summed_up(samples, keys))[[*keys, "cost", "low", "high", "best"]], on=keys, how="left"
-    )
-    plain = table[table.change == PLAIN][["scenario", *WHO, "error_radii", "cost"]]
-    both = table[table.change != PLAIN].merge(plain, on=["scenario", *WHO], suffixes=("", "_plain"))
-    both["cost_ratio"] = both.cost / both.cost_plain
-    both["error_ratio"] = both.error_radii / both.error_radii_plain.where(
-        both.error_radii_plain > 0
-    )
-    return both
+    keys = [*HERE, "change"]
+    costs = times_in_us(samples, keys)[[*keys, "cost", "low", "high", "best"]]
+    table = errors[[*keys, "status", "reason", "error_radii"]].merge(costs, on=keys, how="left")
+    plain = table[table.change == PLAIN][[*HERE, "error_radii", "cost"]]
+    both = table[table.change != PLAIN].merge(plain, on=HERE, suffixes=("", "_plain"))
+    error = both.error_radii_plain.where(both.error_radii_plain > 0)
+    return both.assign(cost_ratio=both.cost / both.cost_plain, error_ratio=both.error_radii / error)
 
 
-def summed_up(samples: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Columns `by`, then cost (the median), low, high (quartiles), best (the minimum), wrapping,
-    rounds; no warm-up."""
-    counted = samples[samples["round"] != WARM_UP].groupby(list(by), sort=False)
-    cost = counted["cost"]
-    quartiles = {"low": cost.quantile(0.25), "high": cost.quantile(0.75)}
-    table = pd.DataFrame({"cost": cost.median(), **quartiles, "best": cost.min()})
-    return table.assign(wrapping=counted["wrapping"].median(), rounds=cost.size()).reset_index()
+def against_own(points: pd.DataFrame, options: pd.DataFrame) -> pd.DataFrame:
+    """A row for each of `COMPARED` and for each of its changed settings.
+
+    ratio, low, high: its cost over that of `YARDSTICK` at the same steps, geometric mean, least
+        and most over the scenes;
+    cheaper: in how many scenes it costs less, and bare_cheaper: less where an idle step (the
+        binding and the engine's fixed cost) is taken off both (nan where that is not known);
+        scenes: in how many both were timed, and not_timed_in those in which one was not.
+
+    A pooled number alone must not make our own solver the cheapest: this lists every scene in which
+    it is not.
+    """
+    plain = points.assign(change=PLAIN, name=names_of(points))
+    own = plain[plain.name == YARDSTICK][["scenario", "dt_s", "cost", "idle"]]
+    own = own.rename(columns={"cost": "own", "idle": "own_idle"})
+    both = plain[plain.name.isin(COMPARED)].merge(own, on=["scenario", "dt_s"], how="left")
+    columns = [*WHO, "change", "scenes", "ratio", "low", "high", "cheaper", "cheaper_in"]
+    columns += ["bare_cheaper", "bare_cheaper_in", "not_timed_in"]
+    if own.empty or both.empty:
+        return pd.DataFrame(columns=columns)
+    if len(options):  # the changed settings, timed in the same rounds
+        named = options.assign(name=names_of(options))
+        costs = named[named.name == YARDSTICK].groupby("scenario").cost_plain.first()
+        changed = named[named.name.isin(COMPARED)]
+        changed = changed.assign(own=changed.scenario.map(costs), idle=np.nan, own_idle=np.nan)
+        both = pd.concat([both, changed])
+
+    def over_own(group: pd.DataFrame) -> dict[str, object]:
+        logs = group.assign(log=np.log(group.cost) - np.log(group.own))
+        ratios = logs.groupby("scenario", sort=False)["log"].mean()
+        timed = np.exp(ratios.dropna())
+        bare = (group.cost - group.idle) - (group.own - group.own_idle)
+        bare = (bare * group.get("dt_s", np.nan)).groupby(group.scenario, sort=False).mean()
+        bare = bare.dropna()
+        cheaper, bare_cheaper = timed[timed < 1].index, bare[bare < 0].index
+        return {
+            "scenes": len(timed),
+            "ratio": np.exp(np.log(timed).mean()),
+            "low": timed.min(),
+            "high": timed.max(),
+            "cheaper": len(cheaper),
+            "cheaper_in": " ".join(cheaper),
+            "bare_cheaper": len(bare_cheaper) if len(bare) else np.nan,
+            "bare_cheaper_in": " ".join(bare_cheaper),
+            "not_timed_in": " ".join(ratios[ratios.isna()].index),
+        }
+
+    return rows_by(both, [*WHO, "change"], over_own)[columns]
+
+
+def cheapest_models(truths: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+    """A row for each scenario: truth, closed_us, and the cheapest engines with an error of at
+    most `FINEST` and of at most 1 % of a radius.
+
+    The first are the columns model, engine and cost_us, the second loose_engine and loose_us; ""
+    and nan where no engine is that accurate.
+    """
+
+    def cheapest(scenario: str, error: float) -> tuple[str, float]:
+        here = points[(points.scenario == scenario) & points.cost.notna() & (points.error <= error)]
+        rows = here.nsmallest(1, "cost")
+        return (names_of(rows).iloc[0], float(rows.cost.iloc[0])) if len(rows) else ("", np.nan)
+
+    rows = []
+    for row in truths.to_dict("records"):
+        engine, cost = cheapest(row["scenario"], FINEST)
+        loose_engine, loose_cost = cheapest(row["scenario"], 0.01)
+        model = "step by step" if engine else ""
+        if engine.startswith("event_driven:"):
+            model = "collision to collision, float64"
+        if np.isfinite(row["closed_us"]) and not row["closed_us"] > cost:
+            model = CLOSED_FORM
+        row |= {"model": model, "engine": engine, "cost_us": cost}
+        rows.append(row | {"loose_engine": loose_engine, "loose_us": loose_cost})
+    return pd.DataFrame(rows)

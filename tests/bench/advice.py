@@ -20,6 +20,7 @@ from crosscheck2d.reports.speed.advice import (
     LOUD,
     Inquiry,
     NoAdvice,
+    Question,
     those_that_keep,
 )
 from crosscheck2d.reports.speed.plan import PLAIN
@@ -30,7 +31,6 @@ BOUND, PURPOSE, SEED = 0.01, "trajectory", 0
 
 
 def main(scenes: list[str]) -> int:
-    """Print a line a scene; 1 if any advice is wrong."""
     wrong = 0
     for scene in scenes:
         with Progress() as progress:
@@ -45,14 +45,14 @@ def main(scenes: list[str]) -> int:
 
 
 def measured_anew(scene: str, progress: Progress) -> tuple[str, bool]:
-    """What was advised and what costs least when all is measured again; whether they agree."""
-    asked = Inquiry(scene, SEED, os.cpu_count() or 1, progress)
-    advice = asked.advice(PURPOSE, BOUND, list(ENGINES))
+    question = Question(scene, SEED, PURPOSE, BOUND)
+    asked = Inquiry(question, os.cpu_count() or 1, progress)
+    advice = asked.advise(list(ENGINES))
     keeping = []
     for name in ENGINES:
-        tried = asked.attempts([(name, PLAIN, k) for k in asked.ladder], PURPOSE, BOUND)
+        tried = asked.attempts((name, PLAIN, k) for k in asked.ladder)
         able, _ = asked.to_the_end(those_that_keep(tried, BOUND))
-        every = asked.from_every_start(able, PURPOSE, BOUND)
+        every = asked.from_every_start(able)
         keeping += [one for one in every if one.holds(BOUND)]
     if not advice.keeping or not keeping:
         return "none", not advice.keeping and not keeping

@@ -19,14 +19,12 @@ from tests.solvers.mutants import CORRECT, MUTANTS
 
 
 def spent() -> float:
-    """Processor seconds of this process and of all it has waited for."""
     return sum(
         use.ru_utime + use.ru_stime for use in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN))
     )
 
 
 def main() -> None:
-    """One file in each language, then a hundred."""
     for path in (one for one in CORRECT if one.stem in ("plain", "arrays")):
         began, before = monotonic(), spent()
         check_file(path)

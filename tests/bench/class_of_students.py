@@ -22,7 +22,6 @@ LONGEST, LARGEST = 40.0, 8.0  # s on two processors; MB of the page
 
 
 def main(students: int) -> None:
-    """Write the class, have it marked by the command, and print the seconds and the size."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         write_class(home / "class", students)

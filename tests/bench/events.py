@@ -53,7 +53,6 @@ def rate(n: int, packing: float, collisions: int) -> tuple[float, float]:
 
 
 def in_a_box(n: int, packing: float) -> Scene:
-    """The gas of `gas` between walls: a little room is left around its lattice."""
     scene, torus = gas(n, packing)
     return Scene(
         position=scene.position,
@@ -105,7 +104,6 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
 
 
 def alone(code: str, **environment: str) -> float:
-    """The number that a Python process of its own prints."""
     ran = subprocess.run(
         [sys.executable, "-c", code],
         env=os.environ | environment,
@@ -117,7 +115,6 @@ def alone(code: str, **environment: str) -> float:
 
 
 def memory() -> float:
-    """MB at most, of a process that plays 100 000 disks, Python and numba included."""
     return alone(
         "from tests.bench.events import peak; from tests.adapters.event_driven.gases import gas; "
         "from crosscheck2d.adapters.event_driven.events import EventEngine; "
@@ -126,12 +123,10 @@ def memory() -> float:
 
 
 def peak() -> float:
-    """MB this process has held at most."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def compile_time() -> float:
-    """Processor seconds for all kernels, from an empty cache."""
     with tempfile.TemporaryDirectory() as empty:
         return alone(
             "from tests.adapters.event_driven.gases import gas; from time import process_time;"
@@ -144,7 +139,6 @@ def compile_time() -> float:
 
 
 def main() -> None:
-    """Print the table."""
     print(f"{'what':58}{'measured':>14}  floor")
     for n, packing, collisions in ROWS:
         best, median = rate(n, packing, collisions)

@@ -71,12 +71,10 @@ class Checkout:
         self.least = dict.fromkeys(self.engines, float("inf"))
 
     def line(self) -> list[str]:
-        """The words of the next line."""
         assert self.process.stdout is not None
         return self.process.stdout.readline().split()
 
     def round(self) -> None:
-        """Let every engine play its steps, and keep the least time of each."""
         assert self.process.stdin is not None
         print(file=self.process.stdin, flush=True)
         for name, time in zip(self.engines, map(float, self.line()), strict=True):
@@ -84,7 +82,6 @@ class Checkout:
 
 
 def measured(sources: Sequence[Path], rounds: int = ROUNDS) -> list[dict[str, float]]:
-    """The least microseconds a step of every engine of every checkout, played in turns."""
     with tempfile.TemporaryDirectory() as kernels:
         folders = [Path(kernels) / str(sources.index(source)) for source in sources]
         checkouts = [Checkout(source, folder) for source, folder in zip(sources, folders)]
@@ -98,7 +95,6 @@ def measured(sources: Sequence[Path], rounds: int = ROUNDS) -> list[dict[str, fl
 
 
 def main(before: Path) -> None:
-    """Print the table."""
     now, again, then = measured([HERE, HERE, before.resolve()])
     print(f"{'microseconds a step':24}{'before':>10}{'now':>10}{'ratio':>8}{'noise':>8}")
     for name, time in now.items():

@@ -41,8 +41,6 @@ MEANINGS = {
 def measure(
     browser: Browser, seconds: float, engines: Sequence[str]
 ) -> tuple[dict[str, np.ndarray], float, list[str]]:
-    """ms of each kind over so many seconds of a flight under thrust, the flight's time over the
-    clock's, and who flew; no engine: those that the game begins with."""
     game = game_of(None, engines)
     with served(application(game)) as url:
         page, heard = opened(browser, url, viewport={"width": 1280, "height": 900})
@@ -62,7 +60,6 @@ def measure(
 
 
 def main(seconds: float, engines: Sequence[str]) -> None:
-    """Print them."""
     with chromium() as browser:
         rows, pace, flown = measure(browser, seconds, engines)
     print(f"{len(flown)} engines, 21 disks, {seconds:g} s: {', '.join(flown)}")

@@ -46,12 +46,10 @@ Row = dict[str, str | float | int]
 
 
 def lasting_box(seed: int, duration: float) -> Scenario:
-    """The box at e = 1 without gravity."""
     return lasting(boxed(seed), duration)
 
 
 def wrapped(duration: float) -> Scenario:
-    """The asteroids at e = 1 on the exercise's wrap."""
     one = scenario("asteroids")
     return replace(
         one,
@@ -62,13 +60,10 @@ def wrapped(duration: float) -> Scenario:
 
 
 def falling(restitution: float, seed: int) -> Scenario:
-    """The box at g = 10 m/s2."""
     return lasting(boxed(seed, restitution, 10.0), FALL)
 
 
 def figures(name: str, one: Scenario, repeats: int) -> Row:
-    """One row: what the record says, and the best time of a few, on the processor: others may use
-    it, too."""
     best = np.inf
     for _ in range(repeats):
         started = process_time()
@@ -83,7 +78,6 @@ def figures(name: str, one: Scenario, repeats: int) -> Row:
 
 
 def said(one: Scenario, record: TruthRecord) -> Row:
-    """What does not depend on the machine."""
     rests = record.events[record.events[:, 3] == 0, 0]
     return {
         "method": record.method,
@@ -105,7 +99,6 @@ def growth(one: Scenario, bits: int = 128) -> float:
 
 
 def main() -> None:
-    """The table, row by row; and the file."""
     computed(lasting_box(0, 1.0))  # compiles what is not yet in numba's cache
     print(
         f"growth of a distance, box 0: {growth(lasting_box(0, 600.0)):.2f} 1/s; floors {FLOORS} s"
@@ -120,7 +113,6 @@ def main() -> None:
 
 
 def questions() -> Iterator[tuple[str, int, Scenario]]:
-    """What is asked, its name, and how often for the best time."""
     for until in FLOORS:
         yield from ((f"box_{seed}", REPEATS, lasting_box(seed, until)) for seed in range(2))
         yield "wrap_0", REPEATS, wrapped(until)

@@ -51,8 +51,6 @@ FIGURES = Path(__file__).parents[2] / "tests" / "data" / "reference_figures.csv"
 
 
 class Figure(NamedTuple):
-    """One number, and the least or the most that is demanded of it."""
-
     scene: str
     disks: int
     what: str
@@ -64,7 +62,6 @@ class Figure(NamedTuple):
 
 
 def reference(variant, scene: Scene, dt: float) -> Step:
-    """The compiled solver, whose collisions are counted but not handed to Python."""
     engine = Reference(variant)
     engine.load(scene, dt)
     return lambda count: silent(variant)(engine.disks, engine.world, dt, count)
@@ -78,7 +75,6 @@ def silent(variant):
 
 
 def pymunk(profile: str, scene: Scene, dt: float) -> Step:
-    """The space without its collision callback."""
     engine = Pymunk(profile)
     engine._record = None  # type: ignore[assignment, method-assign]
     engine.load(scene, dt)
@@ -86,7 +82,6 @@ def pymunk(profile: str, scene: Scene, dt: float) -> Step:
 
 
 def box2d(profile: str, scene: Scene, dt: float) -> Step:
-    """The world without its contact listener."""
     engine = Box2DEngine(profile)
     engine.load(scene, dt)
     engine.world.contactListener = None
@@ -116,8 +111,6 @@ def box2d_v3(profile: str, scene: Scene, dt: float) -> Step:
 
 
 def engines(scene: Scene, dt: float) -> dict[str, Step]:
-    """Everyone who steps, and the reference a second time: what it measures against itself is the
-    noise."""
     steps = {
         "reference:neighbours": reference(neighbours, scene, dt),
         "reference:neighbours again": reference(neighbours, scene, dt),
@@ -183,7 +176,6 @@ def added(n: int) -> float:
 
 
 def status(key: str) -> float:
-    """Bytes, of a line in /proc/self/status."""
     (line,) = (
         line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(key)
     )
@@ -191,7 +183,6 @@ def status(key: str) -> float:
 
 
 def memory(n: int) -> float:
-    """`added` in a process of its own."""
     code = f"from tests.bench.reference import added; print(added({n}))"
     return float(
         subprocess.run(
@@ -201,13 +192,11 @@ def memory(n: int) -> float:
 
 
 def gases() -> Iterator[Figure]:
-    """Everyone in gases of three sizes."""
     for n in (20, 100, 1000):
         yield from compared("gas", n, engines(boxed_gas(n, 0.3), DT), LEAST if n == 1000 else {})
 
 
 def sizes() -> Iterator[Figure]:
-    """What a disk costs among many, and what room it takes."""
     sized = {str(n): reference(neighbours, boxed_gas(n, 0.3), DT) for n in SIZES}
     measured = {n: samples * 1e3 / n for n, samples in zip(SIZES, times(sized, 50, CALL).values())}
     for n, samples in measured.items():
@@ -222,13 +211,11 @@ def sizes() -> Iterator[Figure]:
 
 
 def first_of(scene: Scene, n: int) -> Scene:
-    """Its first n disks alone."""
     arrays = ("position", "velocity", "angle", "angular_velocity", "radius", "mass", "inertia")
     return replace(scene, **{name: getattr(scene, name)[:n] for name in arrays})
 
 
 def small() -> Iterator[Figure]:
-    """What the list buys among few disks, and what a call costs; all pairs in the same rounds."""
     variants = {"neighbours": neighbours, "ordered": ordered, "exercise": exercise}
     asteroids = boxed_asteroids(0)
     scenes: list[tuple[Scene, float, float | None]] = []
@@ -275,7 +262,6 @@ def in_order() -> Iterator[Figure]:
 
 
 def header() -> str:
-    """Machine and versions, as comment lines."""
     saved = about("python -m tests.bench.reference", 0)
     lines = {
         "started": saved["started"],
@@ -287,7 +273,6 @@ def header() -> str:
 
 
 def main() -> None:
-    """Print the figures as they come, and write them."""
     with FIGURES.open("w", newline="", encoding="utf-8") as file:
         file.write(header())
         table = csv.writer(file, lineterminator="\n")

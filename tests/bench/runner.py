@@ -48,7 +48,6 @@ class Cost(NamedTuple):
 def played(
     scenarios: Mapping[str, Scenario], cells: list[Cell], workers: int, folder: Path
 ) -> Cost:
-    """What it costs to play the cells into the folder."""
     questions = {scene: replace(one, truth=None) for scene, one in scenarios.items()}
     tasks = {
         cell: partial(play_here, cell, ENGINES[cell.engine], questions[cell.scene])
@@ -76,7 +75,6 @@ def played(
 
 
 def processor() -> list[float]:
-    """s of processor time of this process, and of its workers that have ended."""
     usages = [
         resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     ]
@@ -84,7 +82,6 @@ def processor() -> list[float]:
 
 
 def crowd() -> Scenario:
-    """1000 disks in a box, 20 s sampled 120 times."""
     scene, (low, high) = gas(1000, 0.3)
     scene = replace(scene, walls=box(low - 0.5, high + 0.5))
     return Scenario(
@@ -93,8 +90,6 @@ def crowd() -> Scenario:
 
 
 def overhead_of_large() -> None:
-    """Wall over engine time with 1000 disks: a run of nine cells on one worker, its start
-    included."""
     names = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
     cells = [Cell("crowd", 0, name, k) for name in names for k in crowd().substeps]
     best: dict[str, float] = {}
@@ -157,8 +152,6 @@ def least(name: str, scene: Scenario, substeps: int) -> tuple[float, float]:
 
 
 class Clocked(Progress):
-    """Knows when the last cell had ended."""
-
     def done(self, what: str, status: str = "ok", reason: str = "") -> None:
         super().done(what, status, reason)
         assert status == "ok", reason
@@ -180,8 +173,6 @@ def many_cells(folder: Path) -> None:
 
 
 def play_many(folder: Path) -> None:
-    """Print how long a run of all scenes takes, and how long after its last cell the tables are
-    there."""
     scenes = sorted(str(path) for path in folder.glob("*.toml"))
     out = folder / "out"
     plan = RunPlan(scenes, ENGINES, seed=0, dts=[], full=False, timings=0, command="bench")
@@ -199,7 +190,6 @@ def play_many(folder: Path) -> None:
 
 
 def tables_again(folder: Path) -> None:
-    """Print how long rows and tables take when all has been compared."""
     started = perf_counter()
     with writing(folder / "out", COMMAND) as store:
         make_tables(RunResults.read(store), lambda _: None)
@@ -207,7 +197,6 @@ def tables_again(folder: Path) -> None:
 
 
 def used() -> str:
-    """Processor time and memory of this process and of its workers."""
     seconds = processor()
     mine, theirs = (
         resource.getrusage(who).ru_maxrss / 1e3

@@ -21,14 +21,13 @@ WRITTEN = list(csv.DictReader(FIGURES.open(encoding="utf-8")))
 
 
 def row_of(name: str, duration: float) -> dict[str, str]:
-    """The written row of a question."""
     return next(
         row for row in WRITTEN if (row["scene"], float(row["duration_s"])) == (name, duration)
     )
 
 
 def test_the_box_is_certified_within_its_floors():
-    """60 s within 0.2 s and 600 s within 3 s, on the machine that wrote the figures."""
+    # 60 s within 0.2 s and 600 s within 3 s, on the machine that wrote the figures.
     boxes = [row for row in WRITTEN if row["scene"].startswith("box")]
     assert {float(row["duration_s"]) for row in boxes} == set(FLOORS)
     for row in boxes:
@@ -37,7 +36,6 @@ def test_the_box_is_certified_within_its_floors():
 
 
 def test_falling_boxes_are_answered_beyond_their_first_rest():
-    """Without the resting mode each would end there."""
     falls = [row for row in WRITTEN if row["scene"].startswith("fall")]
     assert len(falls) >= 9
     for row in falls:
@@ -56,8 +54,8 @@ def test_falling_boxes_are_answered_beyond_their_first_rest():
     ],
 )
 def test_the_figures_are_what_is_computed(name: str, one: Scenario):
-    """The same collisions, rests and horizon to the microsecond they are written with; nothing
-    overlaps, energy falls."""
+    # The same collisions, rests and horizon to the microsecond they are written with; nothing
+    # overlaps, energy falls.
     record, written = computed(one), row_of(name, one.duration)
     found, truth, scene = said(one, record), record.sampled(one.scene, [], one.times), one.scene
     energy = (scene.mass * ((truth.velocity**2).sum(-1) / 2 - truth.position @ scene.gravity)).sum(

@@ -22,7 +22,6 @@ LOOSE = 2.0
 
 
 def test_every_figure_is_as_demanded():
-    """On the machine that wrote them."""
     rows = [row for row in csv.DictReader(WRITTEN) if row["at_least"] or row["at_most"]]
     assert len(rows) >= 14
     for row in rows:
@@ -33,7 +32,6 @@ def test_every_figure_is_as_demanded():
 
 @pytest.mark.long
 def test_the_reference_is_still_several_times_as_fast_as_the_engines():
-    """Ratios within one run, not times."""
     found = list(compared("gas", 1000, engines(boxed_gas(1000, 0.3), DT), LEAST))
     demanded = [figure for figure in found if figure.at_least is not None]
     assert len(demanded) == 6

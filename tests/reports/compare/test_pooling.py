@@ -12,8 +12,8 @@ from crosscheck2d.reports.compare.order import FINEST
 from crosscheck2d.reports.compare.pooling import middle_half, moved, pooled, said_of_pool
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import ladder
-from crosscheck2d.reports.speed.effort import QUICK
-from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.ladder import scored
+from crosscheck2d.reports.speed.plan import QUICK
 from crosscheck2d.scenarios.model import Array
 
 MOST = 2.0  # the factor by which leaving out one scene of the quick form may move a pooled error

@@ -21,7 +21,6 @@ class Sleeper:
         self.each, self.wraps = each, wrapping
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Slow, but not timed."""
         self.scene, self.dt = scene, dt
         sleep(0.005)
 
@@ -29,26 +28,21 @@ class Sleeper:
         """Nothing moves."""
 
     def step(self, count: int = 1) -> None:
-        """`count` times `each` s, a part of it spent on wrapping."""
         sleep(count * self.each)
         self.wrapping += count * self.wraps
         if self.listening:
             sleep(0.05)
 
     def read(self) -> State:
-        """Must not be called while time is taken."""
         raise AssertionError("read while timed")
 
     def collisions(self) -> list[ContactImpulse]:
-        """None."""
         return []
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """None."""
         return {}
 
     def versions(self) -> dict[str, str]:
-        """None."""
         return {}
 
     def close(self) -> None:
@@ -63,15 +57,12 @@ class Late(Sleeper):
         self.order, self.size, self.aside = order, size, aside
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Remember where it starts."""
         self.scene, self.dt, self.t = scene, dt, 0.0
 
     def step(self, count: int = 1) -> None:
-        """Only the clock moves on."""
         self.t += count * self.dt
 
     def read(self) -> State:
-        """The straight line, and the error grown in proportion to the time."""
         scene = self.scene
         off = self.t * (self.size * self.dt**self.order + self.aside)
         return State(

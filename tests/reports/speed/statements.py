@@ -15,9 +15,10 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.compare.order import FINEST, NEARER
 from crosscheck2d.reports.compare.pareto import YARDSTICK
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.speed import explained, figures
+from crosscheck2d.reports.speed import figures
+from crosscheck2d.reports.speed.budget import explained_share
 from crosscheck2d.reports.speed.figures import AGAINST, AGAINST_BARE
-from crosscheck2d.reports.speed.versus import COMPARED
+from crosscheck2d.reports.speed.tables import COMPARED, names_of
 from crosscheck2d.reports.terminal.counts import counted
 
 SHIPPED = tuple(name for name in ENGINES if name.endswith(":shipped"))
@@ -26,8 +27,7 @@ MILLIONTH = "1e-6"
 
 
 def named(table: pd.DataFrame) -> pd.DataFrame:
-    """With a column name, `engine:profile`."""
-    return table.assign(name=table.engine + ":" + table.profile)
+    return table.assign(name=names_of(table))
 
 
 LATE_BY_KIND = {
@@ -40,8 +40,6 @@ them."""
 
 
 def caption(kept: pd.DataFrame) -> str:
-    """Of the picture: what half a step buys with end-of-step detection, and who reaches a millionth
-    of a radius."""
     rows = named(kept[(kept.figure == "cost at accuracy") & (kept["at"] == MILLIONTH)]).set_index(
         "name"
     )
@@ -78,13 +76,10 @@ def halving(kept: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def span(ratios: pd.DataFrame) -> str:
-    """From the least to the largest, as a text."""
     return f"{ratios.min(axis=None):.1f} to {ratios.max(axis=None):.1f}"
 
 
 def costs(kept: pd.DataFrame) -> str:
-    """In how many scenes our own solver costs least at the same steps; who costs less elsewhere,
-    and where."""
     rows, bare = (
         named(kept[(kept.figure == figure) & (kept["at"] == "")])
         for figure in (AGAINST, AGAINST_BARE)
@@ -121,7 +116,6 @@ def costs(kept: pd.DataFrame) -> str:
 
 
 def scenes_of(rows: pd.DataFrame) -> dict[str, list[str]]:
-    """Scene -> the engines that cost less there."""
     found: dict[str, list[str]] = {}
     for row in rows.itertuples(index=False):
         for scene in where(row.note):
@@ -130,20 +124,16 @@ def scenes_of(rows: pd.DataFrame) -> dict[str, list[str]]:
 
 
 def where(note: str) -> list[str]:
-    """The scenes of a note like "2 of 38: one another"."""
     return note.split(":")[1].split()
 
 
 def of(note: str) -> tuple[int, int]:
-    """k and n of a note that begins with, or holds, "k of n"."""
     found = re.search(r"(\d+) of (\d+)", note)
     assert found is not None, note
     return int(found[1]), int(found[2])
 
 
 def pooled(kept: pd.DataFrame) -> list[pd.DataFrame]:
-    """Error in radii and cost, pooled over the scenes: a row an engine, a column a step, coarse to
-    fine."""
     table = named(kept)
     return [
         table[table.figure == f"pooled {what}"].pivot(index="name", columns="at", values="value")
@@ -152,7 +142,6 @@ def pooled(kept: pd.DataFrame) -> list[pd.DataFrame]:
 
 
 def as_far(kept: pd.DataFrame) -> str:
-    """How far off the matched engines are at the same step, over our own solver."""
     error, _ = pooled(kept)
     over = error.loc[list(MATCHED)] / error.loc[YARDSTICK]
     return (
@@ -173,7 +162,6 @@ def no_nearer(fitted: pd.DataFrame) -> pd.Series:
 
 
 def nearer(orders: pd.DataFrame) -> str:
-    """In how many scenes finer steps bring an engine no nearer, engine by engine."""
     rows = named(orders)
     none = rows[no_nearer(rows)].groupby("name").size()
     said = (
@@ -187,21 +175,17 @@ def nearer(orders: pd.DataFrame) -> str:
 
 
 def budget(table: pd.DataFrame) -> str:
-    """How much of the errors is explained, and over how much of the scenes; those with friction
-    apart."""
-    smooth, rough = (explained.sentence(part) for part in apart(table))
+    smooth, rough = (explained_share(part) for part in apart(table))
     return f"Without friction: {smooth}. With friction: {rough}.\n"
 
 
 def apart(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The rows of scenes without friction, and those with."""
     rough = {name for name in set(table.scenario) if open_scene(name, 0).scene.friction}
     with_friction = table.scenario.isin(rough)
     return table[~with_friction], table[with_friction]
 
 
 def measured() -> str:
-    """All that reports/speed/README.md says in numbers, as it stands there."""
     kept, orders, table = (
         figures.read(path) for path in (figures.KEPT, figures.ORDERS, figures.EXPLAINED)
     )

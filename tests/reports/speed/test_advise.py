@@ -34,15 +34,12 @@ from crosscheck2d.reports.speed.advice import (
     Attempt,
     ChangedOption,
     Inquiry,
-    play_part,
-    play_scene,
-    play_starts,
+    Question,
     those_that_keep,
 )
 from crosscheck2d.reports.speed.advise import print_advice, sentence_on_times
+from crosscheck2d.reports.speed.ladder import PURPOSES, STARTS, scored, starts_within_a_step
 from crosscheck2d.reports.speed.plan import PLAIN
-from crosscheck2d.reports.speed.purposes import PURPOSES
-from crosscheck2d.reports.speed.scored_part import STARTS, scored, starts_within_a_step
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.adapters.broken_engines import DoublesSpeed, Freezes, GainsEnergy
@@ -55,7 +52,6 @@ given = partial(Advice, "a", "trajectory", 1.0)
 
 @drawn(st.lists(st.floats(0, 2) | st.sampled_from([inf, nan]), min_size=1, max_size=9))
 def test_the_advised_step_and_every_finer_one_keep_the_error(errors: list[float]):
-    """And the next coarser one does not: luck at one step size does not count."""
     ladder = [attempt(2**k, 0.1 / 2**k, error) for k, error in enumerate(errors)]
 
     kept = those_that_keep(ladder, 1.0)
@@ -80,7 +76,7 @@ def test_the_advised_step_and_every_finer_one_keep_the_error(errors: list[float]
 def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
     error: float, cost: float, verdict: str
 ):
-    """Set against an error of 0.5 within 1 and a cost of 1 s; a saving within the noise is none."""
+    # Set against an error of 0.5 within 1 and a cost of 1 s; a saving within the noise is none.
     plain = attempt(1, 0.1, 0.5, starts=(0.4, 0.5, 0.6), cost=1.0)
 
     changed = ChangedOption(plain, attempt(1, 0.1, error, starts=(error,) * 3, cost=cost))
@@ -91,7 +87,7 @@ def test_a_change_is_judged_by_its_error_first_and_then_by_its_cost(
 
 
 def test_an_option_is_judged_by_its_errors_from_all_starts():
-    """From a single one a collision may fall on the edge of a step by chance."""
+    # From a single one a collision may fall on the edge of a step by chance.
     plain = attempt(1, 0.1, 0.5, starts=(0.4, 0.5, 0.6), cost=1.0)
     lucky = attempt(1, 0.1, 0.01, starts=(0.01, 0.5, 0.6), cost=1.0)
 
@@ -102,7 +98,6 @@ def test_an_option_is_judged_by_its_errors_from_all_starts():
 
 @pytest.mark.parametrize(("kept", "holds"), [(20, True), (18, True), (17, False)])
 def test_a_step_counts_only_if_nine_tenths_of_its_starts_keep_the_error(kept: int, holds: bool):
-    """And the scene itself does."""
     starts = (0.5,) * kept + (2.0,) * (STARTS - kept)
 
     assert attempt(1, 0.1, 0.5, starts=starts).holds(1.0) is holds
@@ -111,7 +106,6 @@ def test_a_step_counts_only_if_nine_tenths_of_its_starts_keep_the_error(kept: in
 
 
 def test_costs_within_the_floor_are_ties():
-    """Libraries and solvers of this project are ranked apart; on a busy machine all are ties."""
     names = ["pymunk:matched", "box2d:matched", "planck:matched", "reference:ordered"]
     costs = [1.0, 1.09, 1.2, 0.1]
     keeping = [Attempt(n, PLAIN, 1, 0.1, 0.5, cost=c) for n, c in zip(names, costs)]
@@ -124,8 +118,8 @@ def test_costs_within_the_floor_are_ties():
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_a_run_from_within_a_step_begins_and_goes_on_as_the_exact_answer(name: str):
-    """An engine that is right is right from every start: forces, a torus and friction are moved
-    with it."""
+    # An engine that is right is right from every start: forces, a torus and friction are moved with
+    # it.
     scenario, _ = scored(name, 0)
     dt = scenario.dt(1)
     for begin, part in [*starts_within_a_step(name, 0, dt)][:: STARTS - 1]:
@@ -137,17 +131,15 @@ def test_a_run_from_within_a_step_begins_and_goes_on_as_the_exact_answer(name: s
 
 
 def test_what_a_step_keeps_by_luck_is_not_kept_from_nine_tenths_of_its_starts():
-    """At 0.156 ms the scene itself is off by 0.0073 radii only because of where its bounces fall;
-    from most starts it is off by more than 0.01. Half of that step keeps it from all."""
+    # At 0.156 ms the scene itself is off by 0.0073 radii only because of where its bounces fall;
+    # from most starts it is off by more than 0.01. Half of that step keeps it from all.
     scene = str(SCENES / "one_bounce.toml")
     dt = scored(scene, 0).scenario.dt
-    coarse, fine = (
-        play_starts(scene, 0, "trajectory", 0.01, play_scene(scene, 0, "trajectory", 0.01, one))
-        for one in (attempt(k, dt(k), nan) for k in (128, 256))
-    )
+    question = Question(scene, 0, "trajectory", 0.01)
+    coarse, fine = (question.play_starts(question.play(attempt(k, dt(k), nan))) for k in (128, 256))
 
     untils = [
-        begin + play_part(part, "trajectory", 0.01, coarse).until
+        begin + question.play_part(part, coarse).until
         for begin, part in starts_within_a_step(scene, 0, coarse.dt)
     ]
 
@@ -161,10 +153,10 @@ def test_what_a_step_keeps_by_luck_is_not_kept_from_nine_tenths_of_its_starts():
 
 
 def test_until_when_an_error_is_kept_is_the_last_sample_before_it_is_not():
-    """The same for the scene itself, at the step size at which people play."""
     scene = str(SCENES / "airhockey.toml")
     scenario, truth = scored(scene, 0)
-    played = play_scene(scene, 0, "trajectory", 0.01, attempt(2, scenario.dt(2), nan))
+    question = Question(scene, 0, "trajectory", 0.01)
+    played = question.play(attempt(2, scenario.dt(2), nan))
     trajectory = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", scenario, played.dt)
     off = np.linalg.norm(trajectory.trajectory.position - truth.position, axis=2)
     first = int(np.argmax((off / scenario.scene.radius).max(axis=1) > 0.01))
@@ -174,11 +166,13 @@ def test_until_when_an_error_is_kept_is_the_last_sample_before_it_is_not():
 
 
 def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
-    """In a column the collisions accumulate: `event_driven` refuses to go on."""
+    # In a column the collisions accumulate: `event_driven` refuses to go on.
     dt = open_scene("column_of_ten", 0).dt(1)
-    found = [Attempt(name, PLAIN, 1, dt, 0.0) for name in ("event_driven:float64", "box2d:matched")]
+    question = Question("column_of_ten", 0, "trajectory", 0.01)
+    names = "event_driven:float64", "box2d:matched"
     with Progress() as progress:
-        able, partly = Inquiry("column_of_ten", 0, 1, progress).to_the_end(found)
+        inquiry = Inquiry(question, 1, progress)
+        able, partly = inquiry.to_the_end([Attempt(name, PLAIN, 1, dt, 0.0) for name in names])
 
     assert [one.name for one in able] == ["box2d:matched"]
     assert [one.name for one in partly] == ["event_driven:float64"]
@@ -186,7 +180,6 @@ def test_an_engine_that_stops_before_the_end_of_the_scene_is_no_advice():
 
 
 def test_it_says_why_times_cannot_be_compared():
-    """A small difference of two timings is not given as the reason."""
     keeping = [attempt(1, 0.1, 0.5)]
     advice = given(1, 1, 0, [1], keeping, [], [], [], noise=0.01, busy=1.9)
 
@@ -216,7 +209,6 @@ def test_it_says_why_times_cannot_be_compared():
 def test_it_says_what_part_of_the_scene_is_judged(
     until: float, collisions: int, says: list[str], capsys: pytest.CaptureFixture[str]
 ):
-    """And that a cost is of the whole scene, beyond the exact answer, too."""
     plain = attempt(1, 0.1, 0.5, starts=(0.5,) * STARTS, cost=1.0)
     changes = [ChangedOption(plain, replace(plain, change="sleeping"))]
     advice = given(until, 3.0, collisions, [0.1, 0.05], [plain], [], [], changes, 0.0, 0.0)
@@ -230,7 +222,6 @@ def test_it_says_what_part_of_the_scene_is_judged(
 
 
 def test_the_part_of_a_scene_that_is_judged_is_that_of_its_exact_answer():
-    """With the collisions of that part alone: of those of the whole scene some are out of reach."""
     scenario, truth = scored("falling_box", 0)
 
     assert scenario.duration < open_scene("falling_box", 0).duration
@@ -241,8 +232,8 @@ def test_the_part_of_a_scene_that_is_judged_is_that_of_its_exact_answer():
 @pytest.mark.parametrize("purpose", PURPOSES)
 @pytest.mark.parametrize("control", [DoublesSpeed, Freezes, GainsEnergy])
 def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type):
-    """Negative controls in a scene of flight and bounces; the engine that they are made from is
-    right."""
+    # Negative controls in a scene of flight and bounces; the engine that they are made from is
+    # right.
     scenario, truth = scored("box_billiard", 0)
     dt = scenario.dt(scenario.substeps[-1])
 
@@ -256,10 +247,9 @@ def test_every_purpose_sees_an_engine_that_is_wrong(purpose: str, control: type)
 
 
 def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
-    """Two step sizes at least, so that one finer can speak for a coarser."""
     for name in SCENARIOS:
         scenario = open_scene(name, 0)
-        steps = Inquiry(name, 0, 1, Progress()).ladder
+        steps = Inquiry(Question(name, 0, "trajectory", 0.01), 1, Progress()).ladder
         assert steps[0] == scenario.substeps[0]
         assert len(steps) >= 2
         assert all(fine == 2 * coarse for coarse, fine in pairwise(steps))
@@ -276,7 +266,6 @@ def test_a_ladder_begins_at_the_steps_of_the_scene_and_halves_them():
     ],
 )
 def test_bad_input_is_one_clear_sentence(words: list[str], says: str, tmp_path: Path):
-    """Exit 2, and nothing is measured."""
     done = crosscheck("advise", *words, cwd=tmp_path)
 
     assert (done.returncode, done.stdout) == (2, "")
@@ -287,7 +276,6 @@ def test_bad_input_is_one_clear_sentence(words: list[str], says: str, tmp_path: 
 def test_advice_names_those_that_keep_the_error_and_those_that_do_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Whatever the times are; an engine stands in one of the two lists, with the error it has."""
     monkeypatch.setattr(advice, "MOST_WORK", advice.MOST_WORK // 8)  # the finest steps take longest
     words = ["bouncing_ball_e09", "--engine", "reference", "--engine", "pymunk:shipped", "--json"]
 
@@ -329,7 +317,7 @@ high = [2.0, 2.0]
 
 @pytest.mark.slow
 def test_on_a_torus_free_flight_needs_no_small_step(tmp_path: Path):
-    """20 ms, the coarsest; the exercise loses a part of a step at every edge."""
+    # 20 ms, the coarsest; the exercise loses a part of a step at every edge.
     (tmp_path / "torus.toml").write_text(TORUS)
     engines = ["--engine", "reference:exercise", "--engine", "pymunk:matched"]
 
@@ -342,7 +330,6 @@ def test_on_a_torus_free_flight_needs_no_small_step(tmp_path: Path):
 
 @pytest.mark.long
 def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Path):
-    """Exit 1, as a comparison that was asked for could not be made."""
     words = ["bouncing_ball_e09", "--engine", "box2d:shipped", "--error", "1e-6"]
 
     done = crosscheck("advise", *words, cwd=tmp_path)
@@ -354,14 +341,14 @@ def test_where_no_engine_keeps_the_error_the_answer_is_none_and_why(tmp_path: Pa
 
 @pytest.mark.parametrize("name", ["heavy_on_light", "swapped"])
 def test_an_engine_whose_disk_is_through_the_floor_is_not_advised(name: str):
-    """Up to 0.319 s, where it lands, all keep the error."""
+    # Up to 0.319 s, where it lands, all keep the error.
     scene = str(SCENES / f"{name}.toml")
     names = ("reference:exercise", "reference:coulomb", "pymunk:matched")
     dt = open_scene(scene, 0).dt
     with Progress() as progress:
-        inquiry = Inquiry(scene, 0, 2, progress)
+        inquiry = Inquiry(Question(scene, 0, "trajectory", inf), 2, progress)
         ladders = [[Attempt(name, PLAIN, k, dt(k), 0.01) for k in (1, 2)] for name in names]
-        able, unable, _ = inquiry.confirmed(ladders, "trajectory", inf)
+        able, unable, _ = inquiry.confirmed(ladders)
 
     assert [(one.name, one.substeps) for one in able] == [("pymunk:matched", 2)]
     assert {one.name for one in unable} == {"reference:exercise", "reference:coulomb"}

@@ -1,4 +1,5 @@
-"""The error budget gives every cause its own, names the residual, and closes."""
+"""The error budget gives every cause its own, names the residual, and closes; what it leaves out is
+said beside the share that it explains."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ from crosscheck2d.adapters.mechanisms.table import (
 )
 from crosscheck2d.reports.compare import scales
 from crosscheck2d.reports.page.kit import Table, Text
-from crosscheck2d.reports.speed import budget, explained, page
+from crosscheck2d.reports.speed import budget, page
 from crosscheck2d.reports.speed.budget import (
     ALL,
     INTERPLAY,
@@ -38,8 +39,11 @@ from crosscheck2d.reports.speed.budget import (
     Budget,
     Offset,
     budget_of,
+    cut_scenes,
+    explained_share,
     window_of,
 )
+from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.plan import middle
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import State
@@ -60,13 +64,11 @@ class Drifting(AblatedReference):
     bug = 0.003
 
     def read(self) -> State:
-        """The state, wrongly."""
         state = super().read()
         return replace(state, position=state.position + np.array([0.0, self.bug]))
 
 
 def planted(mechanisms: list[Mechanism]) -> Drifting:
-    """An engine with just these."""
     parameters: dict[str, Any] = dict(END_OF_STEP)
     for mechanism in mechanisms:
         parameters |= mechanism.parameters
@@ -76,14 +78,12 @@ def planted(mechanisms: list[Mechanism]) -> Drifting:
 def budgeted(
     scene: str, known: list[Mechanism], substeps: int = 4
 ) -> tuple[dict[str, Offset], Budget]:
-    """The budget of the planted engine for somebody who knows only of `known`."""
     at = window_of(scene, 0, substeps)
     made = Budget(at, known, at.offset(at.played(partial(planted, KNOWN))))
     return made.contributions(), made
 
 
 def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
-    """The residual is the bug to rounding, of every disk in every sample."""
     contributions, made = budgeted("oblique_e09", KNOWN)
     moving = made.at.scenario.scene.radius
 
@@ -98,8 +98,8 @@ def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
 
 
 def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
-    """Negative control: without the restitution rule in the list, the residual is as large as
-    it and the bug."""
+    # Negative control: without the restitution rule in the list, the residual is as large as it and
+    # the bug.
     known, _ = budgeted("oblique_e09", KNOWN)
     missed, _ = budgeted("oblique_e09", [each for each in KNOWN if each.name != RESTITUTION])
 
@@ -107,7 +107,6 @@ def test_a_mechanism_that_nobody_names_is_the_residual_to_its_size():
 
 
 def test_the_parts_close_as_vectors_and_agree_with_the_whole():
-    """engine - truth = contributions + interplay + residual, sample by sample."""
     contributions, _ = budgeted("bouncing_ball_e09", KNOWN)
     causes = [each for part, each in contributions.items() if part not in budget.TOTALS]
     total = contributions[TOTAL]
@@ -123,8 +122,8 @@ def test_the_parts_close_as_vectors_and_agree_with_the_whole():
 
 
 def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
-    """x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy
-    at hand."""
+    # x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy at
+    # hand.
     rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("contribution")
     at = window_of("free_fall", 0, 4)
     g, t = float(np.linalg.norm(at.scenario.scene.gravity)), at.truth.t
@@ -140,8 +139,6 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
 
 @pytest.mark.slow
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
-    """All eight with known mechanisms; float32 alone leaves less than a thousandth of an engine's
-    error."""
     scenes = ("head_on_unequal_e09", "wall_to_wall")
     rows = pd.DataFrame(
         [row for scene in scenes for name in BUILT_IN for row in budget_of(scene, 0, name, 4)]
@@ -157,7 +154,7 @@ def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce()
 
 
 def test_a_scene_has_a_budget_while_late_collisions_alone_are_near_the_truth():
-    """The asteroids are not played to the end of their truth; one collision head-on is."""
+    # The asteroids are not played to the end of their truth; one collision head-on is.
     at, whole = window_of("asteroids", 0, 20), window_of("head_on_equal_e09", 0, 4)
 
     assert 0 < at.truth.t[-1] < 9
@@ -168,8 +165,6 @@ def test_a_scene_has_a_budget_while_late_collisions_alone_are_near_the_truth():
 def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """One row that says why, and a row of noughts among all scenes, not none."""
-
     class Refusing(Drifting):
         def read(self) -> State:
             raise RuntimeError("no <b>such</b> thing")
@@ -191,8 +186,6 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(
 
 
 def test_tables_have_the_largest_part_and_no_column_for_nothing():
-    """A part that is nothing for anybody has no column; the overview counts the scene for the
-    largest part."""
     rows = pd.DataFrame(
         [
             row
@@ -214,18 +207,17 @@ def test_tables_have_the_largest_part_and_no_column_for_nothing():
 
 
 def left_over(scene: str, name: str) -> float:
-    """The part of an engine's error that the budget does not explain."""
     rows = pd.DataFrame(budget_of(scene, 0, name, middle(scene)), columns=budget.COLUMNS)
-    found = explained.explained(rows).iloc[0]
-    return float(found.residual_radii / found.error_radii)
+    row = budget.explain(rows).iloc[0]
+    return float(row.residual_radii / row.error_radii)
 
 
 def test_half_of_the_friction_is_explained_by_the_order_of_friction_and_restitution(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """Of Box2D 3.1; the control: with friction for what restitution adds, too, it is not."""
+    # Of Box2D 3.1; the control: with friction for what restitution adds, too, it is not.
     scene, name = "friction_bounce_e1_mu01", "box2d_v3:matched"
-    assert left_over(scene, name) < explained.TO[0]
+    assert left_over(scene, name) < budget.TO[0]
 
     def rubbed(*of: Any) -> list[Mechanism]:
         return [
@@ -241,11 +233,72 @@ def test_half_of_the_friction_is_explained_by_the_order_of_friction_and_restitut
 
 @pytest.mark.long
 def test_nine_in_ten_errors_with_friction_are_explained_to_a_hundredth():
-    """All but box2d:matched in `spinning_disks_meet`; solvers that refuse friction have none."""
+    # All but box2d:matched in `spinning_disks_meet`; solvers that refuse friction have none.
     scenes = [name for name in SCENARIOS if scenario(name).scene.friction]
     engines = [name for name in BUILT_IN if ENGINES[name].outside]
     parts = {(scene, name): left_over(scene, name) for scene in scenes for name in engines}
 
-    missed = [case for case, part in parts.items() if not part <= explained.TO[0]]
+    missed = [case for case, part in parts.items() if not part <= budget.TO[0]]
     assert len(parts) == 72
     assert missed == [("spinning_disks_meet", "box2d:matched")]
+
+
+def made_up(*rows: tuple[str, str, float, float, float, float, str]) -> pd.DataFrame:
+    return pd.DataFrame(
+        [
+            (scene, 0, engine, "own", 0.1, until, horizon, 9.0, error, left, note)
+            for scene, engine, until, horizon, error, left, note in rows
+        ],
+        columns=budget.EXPLAINED,
+    )
+
+
+TABLE = made_up(
+    ("short", "a", 0.2, 1.0, 1.0, 0.005, ""),
+    ("short", "b", 0.2, 1.0, 1.0, 0.5, ""),
+    ("whole", "a", 4.0, 4.0, 1.0, 0.0005, ""),
+    ("whole", "b", 4.0, 4.0, np.nan, np.nan, "error: no"),
+    ("still", "a", 3.0, 3.0, 0.0, 0.0, ""),
+    ("still", "b", 3.0, 3.0, 1e-13, 1e-13, ""),
+)
+
+
+def test_what_is_cut_is_named_once_however_many_engines_played_it():
+    assert cut_scenes(TABLE).to_numpy().tolist() == [["short", 0.2, 1.0]]
+
+
+def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
+    said, uncut = explained_share(TABLE), explained_share(TABLE[TABLE.scenario != "short"])
+
+    assert said.startswith(
+        "of 3 errors (2 engines in 3 scenes; 2 more below 1e-09 radii; 1 not played) 2 are"
+        " explained to 1 %, 1 to 0.1 %"
+    )
+    assert "over 7 of 8 simulated seconds: 1 scene is cut" in said
+    assert "(short at 0.2 of 1 s)" in said
+    assert said.endswith("Of the 1 error in scenes that are not cut, 1 is explained to 1 %")
+    assert uncut.endswith("over 7 of 7 simulated seconds, up to the end of every exact answer")
+
+
+def test_the_budget_itself_tells_how_far_it_goes():
+    rows = [
+        row
+        for scene, k in (("gas_of_100", 4), ("free_fall", 4))
+        for row in budget_of(scene, 0, "pymunk:matched", k)
+    ]
+    table = budget.explain(pd.DataFrame(rows, columns=budget.COLUMNS)).set_index("scenario")
+    gas, fall = table.loc["gas_of_100"], table.loc["free_fall"]
+
+    assert 0 < gas.until_s < gas.horizon_s < gas.duration_s
+    assert gas.horizon_s == scored("gas_of_100", 0).scenario.duration
+    assert fall.until_s == fall.horizon_s == fall.duration_s
+    assert [*cut_scenes(table.reset_index()).scenario] == ["gas_of_100"]
+
+
+def test_a_row_has_the_error_and_what_is_left_of_the_budget():
+    rows = pd.DataFrame(budget_of("slow_collision", 0, "box2d:matched", 4), columns=budget.COLUMNS)
+    contributions = rows.set_index("contribution").position_radii
+    row = budget.explain(rows).iloc[0]
+
+    assert (row.error_radii, row.residual_radii) == (contributions[TOTAL], contributions[RESIDUAL])
+    assert row.note == ""

@@ -37,13 +37,11 @@ each of which a default bites."""
 
 
 def cause(scene: str | Path, engine: str, tmp_path: Path, substeps: int = 2) -> str:
-    """What `cause_of` says of a scene of `SCENES`, or of a file, at an error of 0.01 radii."""
     path = scene if isinstance(scene, Path) else written(scene, tmp_path)
     return cause_of(str(path), 0, engine, substeps, "trajectory", 0.01)
 
 
 def written(name: str, folder: Path) -> Path:
-    """The file of a scene of `SCENES`."""
     gravity, e, disks, walls = SCENES[name]
     body = "".join(f"[[disk]]\nposition = {disk}\nradius = 0.25\nmass = 1.0\n" for disk in disks)
     path = folder / f"{name}.toml"
@@ -84,7 +82,6 @@ JAVASCRIPT = [
 def test_the_default_that_bites_is_named_with_what_to_set(
     scene: str, engine: str, expected: str, tmp_path: Path
 ):
-    """And switched off, it takes the error with it."""
     assert expected in cause(scene, engine, tmp_path)
 
 
@@ -94,14 +91,13 @@ def test_the_default_that_bites_is_named_with_what_to_set(
 def test_the_default_of_a_javascript_engine_is_named_with_what_to_set(
     scene: str, engine: str, expected: str, tmp_path: Path
 ):
-    """The same of planck, matter and Rapier."""
     assert expected in cause(scene, engine, tmp_path)
 
 
 @fetched
 @pytest.mark.slow
 def test_the_air_of_matter_slows_a_disk_on_a_slope(tmp_path: Path):
-    """1 % of the speed in 1/60 s, its default."""
+    # 1 % of the speed in 1/60 s, its default.
     said = cause(CASES / "ramp_with_air.toml", "matter:shipped", tmp_path, 4)
     assert "cause: matter: `frictionAir` 0.01; set 0: the error falls" in said
 
@@ -110,8 +106,8 @@ def test_the_air_of_matter_slows_a_disk_on_a_slope(tmp_path: Path):
 @pytest.mark.parametrize("substeps", [4, 64])
 @pytest.mark.parametrize("engine", ["box2d_v3:shipped", "box2d_v3:matched"])
 def test_a_disk_that_lies_on_the_floor_is_not_late(engine: str, substeps: int, tmp_path: Path):
-    """Two contributions that cancel are no cause. As matched the engine refuses the spin at coarser
-    steps."""
+    # Two contributions that cancel are no cause. As matched the engine refuses the spin at coarser
+    # steps.
     said = cause(CASES / "rolling_marble.toml", engine, tmp_path, substeps)
     named = said.partition(": without")[0]
     assert LATE not in named
@@ -123,13 +119,13 @@ def test_a_disk_that_lies_on_the_floor_is_not_late(engine: str, substeps: int, t
 
 @pytest.mark.slow
 def test_a_cap_on_spin_is_named_where_it_bites(tmp_path: Path):
-    """125 rad/s are 2.1 rad in a step of 1/60 s; no setting lifts the cap."""
+    # 125 rad/s are 2.1 rad in a step of 1/60 s; no setting lifts the cap.
     said = cause(CASES / "rolling_marble.toml", "box2d_v3:shipped", tmp_path, 1)
     assert "`B2_MAX_ROTATION` 0.785 rad a step, compiled in; take steps of 5.56 ms" in said
 
 
 def test_a_cause_is_judged_over_the_whole_scene(tmp_path: Path):
-    """Not up to where the errors are small: by then no disk has struck the wall."""
+    # Not up to where the errors are small: by then no disk has struck the wall.
     path = tmp_path / "wall.toml"
     path.write_text(
         'name = "wall"\nasks = "Where is it?"\nduration = 0.3\nsample_interval = 0.0166666666666\n'
@@ -141,32 +137,28 @@ def test_a_cause_is_judged_over_the_whole_scene(tmp_path: Path):
 
 
 def test_where_no_setting_helps_what_was_tried_is_named(tmp_path: Path):
-    """A collision is found late, or foreseen early, whatever is set."""
     said = cause("half", "box2d_v3:shipped", tmp_path)
     assert ": without it " in said
     assert "no setting removes it (tried: `friction`, `enable_sleep`" in said
 
 
 def test_collision_code_without_a_budget_is_compared_with_what_it_may_do(tmp_path: Path):
-    """With the ablated reference, which can do the same."""
     said = cause("half", "reference:coulomb", tmp_path)
     assert said.startswith(f"{LATE}")
     assert "of the error is left" in said
 
 
 def test_what_leaves_more_than_half_of_the_error_is_ruled_out_not_named(tmp_path: Path):
-    """reference:ordered collides at the time of impact: its error is rounding."""
+    # reference:ordered collides at the time of impact: its error is rounding.
     said = cause("half", "reference:ordered", tmp_path)
     assert said.startswith("not known: without any of these more than half of it is left: ")
 
 
 def knob(name: str) -> Setting:
-    """A setting of an engine that does not exist."""
     return Setting(name, 1, 0, {name: 0})
 
 
 def test_the_fewest_settings_are_found():
-    """One; one after the other; two at once; none."""
     knobs = [knob(name) for name in "abc"]
 
     def found(error: Any) -> tuple[list[str], float]:
@@ -188,8 +180,6 @@ def test_the_fewest_settings_are_found():
 
 @pytest.mark.parametrize("library", [name for name in SETTINGS if f"{name}:shipped" not in FETCHED])
 def test_every_setting_can_be_made(library: str):
-    """Each can be made, and loads a scene: a parameter that an engine does not know would be found
-    only where it is tried."""
     scene = replace(read_scene_file(CASES / "rolling_marble.toml").scene, friction=0.0)
     for each in settings_of(f"{library}:shipped", scene, 1 / 60):
         chosen, _ = without_finer(each.parameters)

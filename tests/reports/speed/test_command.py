@@ -27,7 +27,6 @@ pytestmark = pytest.mark.slow  # starts worker processes six times
 def test_bad_input_is_one_clear_sentence(
     arguments: list[str], says: str, monkeypatch: pytest.MonkeyPatch
 ):
-    """Exit 2, no traceback."""
     monkeypatch.chdir(Path(__file__).parents[3])
     done = CliRunner().invoke(app, ["speed", *arguments])
 
@@ -39,8 +38,7 @@ def test_bad_input_is_one_clear_sentence(
 def test_a_scene_without_an_exact_answer_is_refused_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Exit 1 and the reason; no table and no page, only the empty store that a run goes on from."""
-    monkeypatch.setattr("crosscheck2d.reports.speed.scored_part.reach_of", no_reach)
+    monkeypatch.setattr("crosscheck2d.reports.speed.ladder.reach_of", no_reach)
     done = CliRunner().invoke(app, ["speed", "cradle_touching", "--out", str(tmp_path / "out")])
 
     assert done.exit_code == 1
@@ -53,12 +51,10 @@ def test_a_scene_without_an_exact_answer_is_refused_by_name(
 
 
 def no_reach(*_: object) -> tuple[int, str]:
-    """What a worker says of a scene without an answer."""
     return 0, "two outcomes"
 
 
 def test_one_scene_and_one_engine_are_measured_by_themselves(tmp_path: Path):
-    """Exit 0; tables and a page, without sizes and options; a second run may replace it."""
     arguments = ["speed", "free_fall", "--engine", "reference", "--out", str(tmp_path / "out")]
     for _ in range(2):
         done = CliRunner().invoke(app, arguments)

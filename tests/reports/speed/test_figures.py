@@ -13,12 +13,11 @@ from crosscheck2d.adapters.engines import DISTINCT, ENGINES
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.reports.compare.pareto import YARDSTICK
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.speed import budget, explained, figures, ladder, tables
+from crosscheck2d.reports.speed import budget, figures, ladder, tables
 from crosscheck2d.reports.speed.budget import budget_of
-from crosscheck2d.reports.speed.effort import FULL, QUICK
 from crosscheck2d.reports.speed.measure import Measured
-from crosscheck2d.reports.speed.plan import SCENE, middle
-from crosscheck2d.reports.speed.versus import COMPARED
+from crosscheck2d.reports.speed.plan import FULL, QUICK, SCENE, middle
+from crosscheck2d.reports.speed.tables import COMPARED
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from tests.measured import MEASURED
 from tests.reports.speed import statements as speed_figures
@@ -29,15 +28,12 @@ DIGITS = 2e-3  # four digits are kept
 
 
 def kept_row(path: object, scene: str, name: str) -> pd.Series:
-    """One row of `ORDERS` or `EXPLAINED`."""
     table = speed_figures.named(figures.read(path))  # type: ignore[arg-type]
     return table[(table.scenario == scene) & (table.name == name)].iloc[0]
 
 
 @pytest.mark.parametrize("name", [name for name in DISTINCT if name in MEASURED])
 def test_the_kept_orders_are_those_of_the_code(name: str):
-    """One scene on the ladder of the full form: verdict, slope and the error at the finest step, of
-    every engine."""
     scene = "head_on_unequal_e09"
     step_sizes = FULL.ladder(open_scene(scene, 0))
     rows = ladder.errors_of(scene, 0, name, ENGINES[name].make, step_sizes)
@@ -54,10 +50,9 @@ def test_the_kept_orders_are_those_of_the_code(name: str):
 
 @pytest.mark.parametrize("name", WITH_MECHANISMS)
 def test_the_kept_budget_is_that_of_the_code(name: str):
-    """One scene: the error and how far it was evaluated; the residual may be rounding."""
     scene = "slow_collision"
     rows = pd.DataFrame(budget_of(scene, 0, name, middle(scene)), columns=budget.COLUMNS)
-    now, kept = explained.explained(rows).iloc[0], kept_row(figures.EXPLAINED, scene, name)
+    now, kept = budget.explain(rows).iloc[0], kept_row(figures.EXPLAINED, scene, name)
 
     assert kept.error_radii == pytest.approx(now.error_radii, rel=DIGITS)
     assert kept.residual_radii == pytest.approx(
@@ -69,7 +64,6 @@ def test_the_kept_budget_is_that_of_the_code(name: str):
 
 
 def test_the_kept_tables_have_every_scene_and_measured_engine():
-    """Nobody is left out of a count by not being in the table."""
     orders, budgets = (
         speed_figures.named(figures.read(path)) for path in (figures.ORDERS, figures.EXPLAINED)
     )
@@ -84,7 +78,6 @@ def test_the_kept_tables_have_every_scene_and_measured_engine():
 
 
 def orders(**stays: int) -> pd.DataFrame:
-    """Two scenes; an engine's shipped profile comes no nearer in so many."""
     return pd.DataFrame(
         [
             {
@@ -105,7 +98,6 @@ def orders(**stays: int) -> pd.DataFrame:
 
 
 def test_the_sentence_on_finer_steps_counts_each_engine():
-    """What is true of both Box2Ds is not said of pymunk."""
     said = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
 
     assert said[0].startswith(
@@ -127,8 +119,8 @@ def test_the_sentence_on_finer_steps_counts_each_engine():
 
 
 def test_no_nearer_is_read_from_the_ends_of_the_ladder():
-    """A tenth less is nearer; a finest step that fails or is no better is not; nor count rounding
-    and all failed."""
+    # A tenth less is nearer; a finest step that fails or is no better is not; nor count rounding
+    # and all failed.
     table = pd.DataFrame(
         [
             (1.0, 0.89, 0),
@@ -145,7 +137,6 @@ def test_no_nearer_is_read_from_the_ends_of_the_ladder():
 
 
 def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
-    """A row of the figures."""
     return dict(zip(("engine", "profile"), name.split(":"))) | {
         "figure": figure,
         "at": at,
@@ -155,8 +146,6 @@ def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
 
 
 def against(cheaper: dict[str, str], bare: dict[str, str], changed: str = "") -> pd.DataFrame:
-    """Figures of two scenes in which these engines cost less than our own solver, in "k of 2:
-    scenes"."""
     rows = [row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")) for name in COMPARED]
     rows += [
         row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in COMPARED
@@ -167,7 +156,6 @@ def against(cheaper: dict[str, str], bare: dict[str, str], changed: str = "") ->
 
 
 def test_who_costs_less_than_our_own_solver_is_named():
-    """With the scene, and why where it is known; without idle steps; and with a changed setting."""
     alone = speed_figures.costs(against({}, {}))
     thrust = {"pymunk:matched": "1 of 2: ship_thrust"}
 
@@ -193,8 +181,6 @@ def test_who_costs_less_than_our_own_solver_is_named():
 
 
 def pooled(worse: str = "") -> pd.DataFrame:
-    """Figures of three steps: every error is halved, every cost doubled; one engine is three times
-    as far off."""
     rows = []
     for name in ENGINES:
         for step_size in range(3):
@@ -217,7 +203,6 @@ def pooled(worse: str = "") -> pd.DataFrame:
 
 
 def test_the_sentence_on_errors_at_the_same_step_holds_for_the_worst_and_the_best():
-    """The range is that of all matched engines."""
     assert speed_figures.as_far(pooled()).startswith(
         "At the same step the matched engines are 1.0 to 1.0 times as far"
     )
@@ -226,7 +211,6 @@ def test_the_sentence_on_errors_at_the_same_step_holds_for_the_worst_and_the_bes
 
 
 def test_the_caption_counts_scenes_and_failures():
-    """Of the event-driven engine, too."""
     assert (
         speed_figures.caption(pooled())
         == "Halving the step multiplies the time of these engines by 2.0 to 2.0, and divides their"
@@ -240,7 +224,6 @@ def test_the_caption_counts_scenes_and_failures():
 
 
 def test_the_readme_says_how_much_each_form_measures():
-    """Disks of the quick and of the full form; steps of a scene in the default run."""
     root = Path(__file__).parents[3]
     text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
 
@@ -255,7 +238,7 @@ def test_the_readme_says_how_much_each_form_measures():
     ("name", "fails"), [("reference:exercise", True), ("box2d:matched", False)]
 )
 def test_what_fails_a_verdict_is_infinitely_far_off(name: str, fails: bool):
-    """A disk of 100 kg falls through one of 1 kg and the floor."""
+    # A disk of 100 kg falls through one of 1 kg and the floor.
     scene = str(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "heavy_on_light.toml")
     (row,) = ladder.errors_of(scene, 0, name, ENGINES[name].make, [4])
     assert (row["status"], np.isinf(row["error_radii"])) == ("fails" if fails else "ok", fails)

@@ -14,10 +14,8 @@ from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure
 from crosscheck2d.reports.speed.command import SPEED, kept_of
-from crosscheck2d.reports.speed.effort import QUICK
-from crosscheck2d.reports.speed.kept import Kept
-from crosscheck2d.reports.speed.measure import done
-from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.reports.speed.measure import Kept, done
+from crosscheck2d.reports.speed.plan import QUICK, SpeedPlan
 from crosscheck2d.reports.terminal import progress as terminal
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
@@ -51,23 +49,21 @@ HEADER: dict[str, Any] = {
 
 
 def test_what_has_ended_is_not_measured_again(tmp_path: Path):
-    """Of the same plan every number is used again, infinities too; of another plan none, and
-    nothing of either is lost."""
     with writing(tmp_path / "out", SPEED) as store, Progress() as progress:
         Kept(store, HEADER).add(TASK, [FAILED])
         again = Kept(store, HEADER)
-        found = dict(done({TASK: fails}, 1, progress, "error", kept=again))
-        other = Kept(store, HEADER | {"seed": 1})
+        ((_, (row,)),) = done({TASK: fails}, 1, progress, "error", kept=again)
+        changed = Kept(store, HEADER | {"seed": 1})
 
-        assert found[TASK][0]["error_radii"] == np.inf
-        assert np.isnan(found[TASK][0]["change_radii"])
-        assert TASK not in other
-        other.add(TASK, [])
-        assert (again[TASK][0]["status"], other[TASK]) == ("error", [])
+        assert row["error_radii"] == np.inf
+        assert np.isnan(row["change_radii"])
+        assert changed.get(TASK) is None
+        changed.add(TASK, [])
+        assert (again.get(TASK)[0]["status"], changed.get(TASK)) == ("error", [])
 
 
 def test_a_new_measurement_is_not_older_than_its_command(tmp_path: Path):
-    """Both times are texts of one form: "12:00:00+" is less than "12:00:00.5+"."""
+    # Both times are texts of one form: "12:00:00+" is less than "12:00:00.5+".
     started = about("crosscheck speed", 0)["started"]
     with writing(tmp_path / "out", SPEED) as store:
         new = Kept(store, HEADER)
@@ -84,14 +80,13 @@ def test_what_was_measured_of_a_solver_that_was_saved_since_is_measured_again(tm
     read_row(f"{solver}:own")
     with writing(tmp_path / "out", SPEED) as store:
         kept_of(plan, header, store).add(TASK, [FAILED])
-        assert TASK in kept_of(plan, header, store)
+        assert kept_of(plan, header, store).get(TASK)
         solver.write_text("function integrate(sphere, dt) { }")
         read_row(f"{solver}:own")
-        assert TASK not in kept_of(plan, header, store)
+        assert kept_of(plan, header, store).get(TASK) is None
 
 
 def fails() -> None:
-    """Must not be called."""
     raise AssertionError("done again")
 
 
@@ -99,8 +94,6 @@ def fails() -> None:
 def test_a_log_gets_a_line_now_and_then(
     quiet: float, lines: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """A bar is not drawn into a file, and a line a task would be too many: so much time lies
-    between two."""
     monkeypatch.setattr(terminal, "QUIET", quiet)
     with Progress() as progress:
         progress.start(2, 2, "error")
@@ -114,7 +107,6 @@ def test_a_log_gets_a_line_now_and_then(
 def test_an_interrupted_measurement_is_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """Ctrl-C where the times begin: exit 130; the same command looks for no error a second time."""
     words = ("speed", "free_fall", "--engine", "reference:exercise", "--out", "out")
     with monkeypatch.context() as patch:
         patch.setattr(measure.Measuring, "measure_times", interrupted)
@@ -132,5 +124,4 @@ def test_an_interrupted_measurement_is_gone_on_with(
 
 
 def interrupted(*_: object) -> None:
-    """As Ctrl-C does."""
     raise KeyboardInterrupt

@@ -10,7 +10,7 @@ import pytest
 from crosscheck2d.reports.compare.order import ORDER
 from crosscheck2d.reports.compare.pareto import FAILED, NOT_TIMED, UNREACHABLE, cost_to_reach
 from crosscheck2d.reports.page.kit import Table
-from crosscheck2d.reports.speed import page, tables, versus
+from crosscheck2d.reports.speed import page, tables
 from crosscheck2d.reports.speed.measure import SIZE, Measured
 from crosscheck2d.reports.speed.plan import PLAIN, SCENE
 
@@ -20,7 +20,6 @@ DT = np.array([0.4, 0.2, 0.1])
 def point(
     scenario: str = "one", step_size: int = 0, cost: float = 1.0, error: float = 0.1, **more: object
 ) -> dict:
-    """A row of `points` of `pymunk:matched`."""
     return {
         "scenario": scenario,
         "engine": "pymunk",
@@ -45,7 +44,6 @@ def point(
 
 
 def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
-    """The error is small enough at the finest two steps, but nobody knows what they cost."""
     error = np.array([0.5, 0.05, 0.05])
 
     assert cost_to_reach(0.1, DT, np.array([1.0, np.nan, np.nan]), error, ORDER).why == NOT_TIMED
@@ -53,8 +51,6 @@ def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
 
 
 def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
-    """Of five scenes one is reached, one never, one failed, one untimed, one not yet: infinite, and
-    all are reported."""
     why = ["", UNREACHABLE, FAILED, NOT_TIMED, "not down to dt 0.1 s"]
     reached = pd.DataFrame(
         {
@@ -77,7 +73,6 @@ def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
 
 
 def rows_of(table: Table) -> list[dict[str, str]]:
-    """What a table shows: heading -> text, a row each."""
     heads = [head.text for head in table.heads]
     return [
         {"": label.text} | dict(zip(heads, (cell.text for cell in cells)))
@@ -86,7 +81,6 @@ def rows_of(table: Table) -> list[dict[str, str]]:
 
 
 def test_a_point_that_was_not_timed_has_its_error_and_a_failed_one_how_it_failed():
-    """The one is accurate, and must not look failed; neither is drawn as if it had a cost."""
     table = pd.DataFrame(
         [
             point(),
@@ -110,7 +104,6 @@ def sweep(value: str, step_size: int, **more: object) -> dict:
 
 
 def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
-    """With how it failed. It was not shown at all."""
     found = pd.DataFrame(
         [
             row | {"scenario": scene}
@@ -133,8 +126,6 @@ def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
 
 
 def test_a_scene_without_a_ratio_is_named():
-    """Right to the last bit, or failed: nothing to divide by; the pool says of how many scenes it
-    is."""
     rows = [
         point("one", 2),
         sweep("1", 0),
@@ -150,7 +141,6 @@ def test_a_scene_without_a_ratio_is_named():
 
 
 def test_a_change_that_fails_has_its_row_with_how_it_failed():
-    """And the change that did not has its ratios."""
     table = pd.DataFrame(
         {
             "scenario": ["one", "two"],
@@ -177,7 +167,6 @@ def test_a_change_that_fails_has_its_row_with_how_it_failed():
 
 
 def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_reason():
-    """It has no cost at any size, and had no row."""
     sample = {
         "kind": SIZE,
         "engine": "pymunk",
@@ -202,7 +191,7 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_reason():
 
 
 def test_an_order_tells_how_many_steps_failed():
-    """They have no part in its slope, which says nothing of them."""
+    # They have no part in its slope, which says nothing of them.
     rows = [
         {
             "kind": "scene",
@@ -224,13 +213,12 @@ def test_an_order_tells_how_many_steps_failed():
 
 
 def own(scenario: str, cost: float) -> dict:
-    """A point of our own solver."""
     return point(scenario, cost=cost, engine="reference", profile="exercise")
 
 
 def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene():
-    """At cost 2 against 4 it is cheaper; without idle steps of 0.5 and 3.9, not; one scene was not
-    timed."""
+    # At cost 2 against 4 it is cheaper; without idle steps of 0.5 and 3.9, not; one scene was not
+    # timed.
     rows = [
         own("one", 1.0),
         point("one", cost=3.0),
@@ -239,7 +227,7 @@ def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene()
         own("three", 1.0),
         point("three", cost=np.nan),
     ]
-    row = versus.against_own(pd.DataFrame(rows), pd.DataFrame()).iloc[0]
+    row = tables.against_own(pd.DataFrame(rows), pd.DataFrame()).iloc[0]
 
     assert (row.cheaper, row.cheaper_in, row.scenes, row.not_timed_in) == (1, "two", 2, "three")
     assert (row.bare_cheaper, row.bare_cheaper_in) == (0, "")
@@ -248,7 +236,6 @@ def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene()
 
 
 def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
-    """Against our solver unchanged, in the same scene."""
     known = {"scenario": "one"}
     options = pd.DataFrame(
         [
@@ -270,16 +257,16 @@ def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
             },
         ]
     )
-    table = versus.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), options)
+    table = tables.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), options)
     row = table.set_index("change").loc["sleeping"]
 
     assert (row.ratio, row.cheaper, row.cheaper_in) == (0.5, 1, "one")
     # our own solver was not asked for
-    assert versus.against_own(pd.DataFrame([point("one")]), options).empty
+    assert tables.against_own(pd.DataFrame([point("one")]), options).empty
 
 
 def test_where_no_timing_ended_there_is_a_table_without_times():
-    """An engine that fails while it is timed takes those of its scene along; the errors stay."""
+    # An engine that fails while it is timed takes those of its scene along; the errors stay.
     error = {
         "kind": SCENE,
         "scenario": "one",

@@ -15,7 +15,7 @@ from crosscheck2d.reports.speed.ladder import times_of
     [("walls gravity", {READ}), ("walls gravity static", {EMPTY, CALL, READ})],
 )
 def test_what_a_file_refuses_is_not_timed(words: str, measured: set[str], tmp_path: Path):
-    """Its steps in the scene are; the empty step needs a disk that cannot move."""
+    # Its steps in the scene are; the empty step needs a disk that cannot move.
     path = tmp_path / "ball.js"
     line = 'models = "disks walls gravity static forces rotation wrap"'
     text = TEMPLATES["javascript"].read_text()

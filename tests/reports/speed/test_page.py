@@ -21,13 +21,11 @@ from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import opening
 from crosscheck2d.reports.run.machine import about
 from crosscheck2d.reports.speed import figures
-from crosscheck2d.reports.speed.budget import budget_of
+from crosscheck2d.reports.speed.budget import budget_of, cut_scenes
 from crosscheck2d.reports.speed.command import SPEED, write_all
-from crosscheck2d.reports.speed.effort import QUICK
-from crosscheck2d.reports.speed.explained import cuts
 from crosscheck2d.reports.speed.measure import Measured, Measuring
 from crosscheck2d.reports.speed.page import LOWEST, NEVER, drawn_lines, reached_table, write_page
-from crosscheck2d.reports.speed.plan import SpeedPlan
+from crosscheck2d.reports.speed.plan import QUICK, SpeedPlan
 from crosscheck2d.reports.speed.results import Results
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import scenario
@@ -57,7 +55,6 @@ SAID = {"load": 0.0, "seconds": 1.0}
 
 @pytest.fixture(scope="module")
 def measured() -> Measured:
-    """A little of everything, played and timed for real, in worker processes."""
     with Progress() as progress:
         return Measuring(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), progress).run()
 
@@ -86,7 +83,6 @@ def results(measured: Measured) -> Results:
 
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
-    """A row a round for every engine, dt and copy; a row a seed for every engine and dt."""
     with opening(tmp_path, SPEED) as store:
         write_all(store, results, about("crosscheck speed", 0) | SAID)
     samples, errors = (
@@ -104,7 +100,6 @@ def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
 
 
 def test_errors_are_those_of_the_comparison(results: Results):
-    """The same number as `position_max_radii` of the report, from the same play."""
     from crosscheck2d.adapters.engines import ENGINES
     from crosscheck2d.reports.compare.comparison import compare
 
@@ -121,7 +116,6 @@ def test_errors_are_those_of_the_comparison(results: Results):
 
 
 def test_what_failed_is_named_beside_the_chart(results: Results):
-    """It has no error to draw; its row says how it failed, and its text cannot become a tag."""
     points = results.points[results.points.scenario == SCENES[0]]
     drawn = {line.name: line for line in drawn_lines(points) if not line.faint}
     ladder = points[(points.engine == "reference")]
@@ -134,7 +128,7 @@ def test_what_failed_is_named_beside_the_chart(results: Results):
 
 
 def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
-    """In a head-on collision it is both cheapest and exact, so that nobody else is on the front."""
+    # In a head-on collision it is both cheapest and exact, so that nobody else is on the front.
     points = results.points[results.points.scenario == SCENES[0]]
     front, *lines = drawn_lines(points)
     mine = points[points.engine == "event_driven"]
@@ -148,7 +142,6 @@ def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
 def test_the_page_of_speed_opens_with_which_engine_for_what(
     browser: Browser, results: Results, tmp_path: Path
 ):
-    """On its first screen: a row for the scenes of each situation, and what they cost here."""
     page = tmp_path / "speed.html"
     write_page(page, results, about("crosscheck speed", 0) | SAID)
     tab, heard = opened(browser, page.as_uri(), viewport={"width": 1280, "height": 900})
@@ -171,7 +164,6 @@ def test_the_page_of_speed_opens_with_which_engine_for_what(
 
 
 def test_times_that_mean_nothing_are_called_so(results: Results):
-    """By how far an engine is from itself; without a pair nothing is known."""
     loud, quiet, alone = copy(results), copy(results), copy(results)
     loud.noise, quiet.noise = (
         pd.DataFrame({"scenario": "free_fall", "ratio": ratios}) for ratios in ([0.8, 1.3], [1.01])
@@ -185,8 +177,6 @@ def test_times_that_mean_nothing_are_called_so(results: Results):
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):
-    """Refused: never. The reference comes to 1 % at a cost, but not to 1e-6 of a radius down to its
-    finest dt."""
     reached = results.reached[results.reached.scenario == SCENES[0]].set_index(
         ["engine", "profile", "accuracy"]
     )
@@ -198,7 +188,6 @@ def test_what_cannot_be_reached_is_above_what_costs(results: Results):
 
 
 def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
-    """The median error lies between the ends of its bootstrap interval, which are apart."""
     row = results.points[
         (results.points.scenario == "asteroids") & (results.points.engine == "reference")
     ].iloc[0]
@@ -208,7 +197,6 @@ def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
 
 
 def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
-    """One of two scenes failed: the upper quartile is infinite, and it is counted."""
     row = results.pooled[
         (results.pooled.engine == "pymunk") & (results.pooled.profile == "shipped")
     ].iloc[0]
@@ -217,8 +205,6 @@ def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
 
 
 def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Results):
-    """Time and error together; an engine changed in nothing reads 1 in both, so it is not
-    listed."""
     expected = {option.change for option in OPTIONS if option.engine in PLAYED}
     table = results.options
 
@@ -229,8 +215,7 @@ def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Res
 
 
 def test_float32_breaks_what_it_must(results: Results):
-    """Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not
-    1."""
+    # Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not 1.
     row = results.options[
         (results.options.scenario == "bouncing_ball_e1") & (results.options.engine == "reference")
     ]
@@ -239,8 +224,8 @@ def test_float32_breaks_what_it_must(results: Results):
 
 
 def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
-    """10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where
-    all are pooled."""
+    # 10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all
+    # are pooled.
     table = results.sweeps
     here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
     turned = here[here.change == "10"].iloc[0]
@@ -254,7 +239,6 @@ def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
 
 
 def test_the_cheapest_model_is_named_for_every_scene(results: Results):
-    """A closed form where the truth is one; the asteroids are answered event by event."""
     models = results.models.set_index("scenario")
 
     assert models.loc[SCENES[0]].truth == CLOSED_FORM
@@ -264,8 +248,6 @@ def test_the_cheapest_model_is_named_for_every_scene(results: Results):
 
 
 def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
-    """With machine and versions in comment lines; their ratios are within the gate of
-    themselves."""
     path = tmp_path / "figures.csv"
     figures.write(path, results, about("crosscheck speed", 0) | SAID)
     kept = figures.ratios(figures.read(path))
@@ -277,7 +259,6 @@ def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
 
 
 def test_a_ratio_that_drifts_beyond_the_gate_is_named():
-    """Four times as dear, a fourth, or gone; twice as dear passes."""
     kept = {("a:b", 10): 1.0, ("a:b", 100): 1.0, ("c:d", 10): 1.0, ("e:f", 10): 1.0}
     said = figures.drifted(kept, {("a:b", 10): 4.0, ("a:b", 100): 0.25, ("c:d", 10): 2.0})
 
@@ -286,7 +267,6 @@ def test_a_ratio_that_drifts_beyond_the_gate_is_named():
 
 
 def test_the_kept_figures_have_every_ratio_that_is_gated():
-    """All engines but the yardstick and those that are it with friction, at all sizes."""
     from crosscheck2d.adapters.engines import ENGINES
 
     assert set(figures.ratios(figures.read())) == {
@@ -300,10 +280,6 @@ def test_the_kept_figures_have_every_ratio_that_is_gated():
 
 
 def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
-    """How much one scene moves the curve, what failed, who costs less than our own solver; and of a
-    budget that is cut, which scene, when, of how long, and over how many seconds the share is.
-    Without the cut scene none of the latter.
-    """
     rows = [
         row for name in PLAYED if name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4)
     ]
@@ -312,7 +288,7 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     )
     cut = Results(results.plan, replace(results.measured, budget=both))
     whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
-    (gas,) = cuts(cut.explained).itertuples()
+    (gas,) = cut_scenes(cut.explained).itertuples()
 
     for page in (whole, shorter):
         assert said_of_pool(results.pooled) in page
@@ -326,7 +302,6 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
 
 
 def page_of(results: Results, folder: Path) -> str:
-    """The page as text, its entities undone."""
     path = folder / "speed.html"
     write_page(path, results, about("crosscheck speed", 0) | SAID)
     return unescape(path.read_text())
@@ -336,8 +311,6 @@ def page_of(results: Results, folder: Path) -> str:
 def test_the_page_opens_every_scene_and_asks_nothing_of_anywhere(
     browser: Browser, results: Results, tmp_path: Path, width: int, scheme: str
 ):
-    """No request but for itself, no word on the console, nothing wider than the page; a click on a
-    scene draws its chart and its tables."""
     page = tmp_path / "speed.html"
     write_page(page, results, about("crosscheck speed", 0) | SAID)
     tab, heard = opened(
@@ -361,7 +334,6 @@ def test_the_page_opens_every_scene_and_asks_nothing_of_anywhere(
 
 
 def test_a_settled_pile_is_a_row_with_sleeping_and_without(results: Results):
-    """Of the engines that may let disks sleep; and every number of disks has its worst step."""
     assert [*results.pile.name] == ["pymunk:matched"]
     assert (results.pile[["", "sleeping"]] > 0).all(axis=None)
     assert results.sizes.worst.notna().all()

@@ -11,7 +11,7 @@ import pandas as pd
 from crosscheck2d.adapters.engines import DISTINCT
 from crosscheck2d.reports.compare.pareto import YARDSTICK
 from crosscheck2d.reports.speed import figures
-from crosscheck2d.reports.speed.versus import COMPARED
+from crosscheck2d.reports.speed.tables import COMPARED
 from tests.measured import MEASURED
 from tests.reports.speed import statements as speed_figures
 
@@ -21,7 +21,6 @@ SPEED = (ROOT / "reports" / "speed" / "README.md").read_text("utf-8")
 
 
 def test_the_caption_of_the_picture_follows_from_the_kept_table():
-    """Word for word but for line breaks: `python -m tests.reports.speed.statements` prints it."""
     text = " ".join(SPEED.split())
 
     assert speed_figures.caption(figures.read(figures.KEPT)) in text
@@ -29,7 +28,6 @@ def test_the_caption_of_the_picture_follows_from_the_kept_table():
 
 
 def stated(text: str) -> list[tuple[float, float]]:
-    """Each "a to b" of what half a step divides the errors by, in the order of `LATE_BY_KIND`."""
     of_errors = " ".join(text.split()).split("divides their error ")[1].split(". They come")[0]
     return [
         (float(low), float(high)) for low, high in re.findall(r"by ([\d.]+) to ([\d.]+)", of_errors)
@@ -50,12 +48,9 @@ def outside(kept: pd.DataFrame, text: str) -> set[str]:
 
 
 def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detection():
-    """None is left out, and the ranges hold for each; one whose error grows is no exception without
-    a word.
-
-    The control: with a tenth of the coarsest error an engine falls out of its range, whichever it
-    is.
-    """
+    # None is left out, and the ranges hold for each; one whose error grows is no exception without
+    # a word. The control: with a tenth of the coarsest error an engine falls out of its range,
+    # whichever it is.
     kept, late = figures.read(figures.KEPT), {YARDSTICK, *COMPARED}
     spoken_of = [name for names in speed_figures.LATE_BY_KIND.values() for name in names]
     assert sorted(spoken_of) == sorted(late)
@@ -80,17 +75,14 @@ def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detectio
 
 
 def test_the_scenes_in_which_smaller_steps_do_not_help_are_counted_for_every_engine():
-    """The authors' own solvers too."""
     table = SPEED.split("falls by less than a tenth")[1]
 
     assert [name for name in DISTINCT if name in MEASURED and f"\n| {name} | " not in table] == []
 
 
 def test_the_page_on_speed_ends_with_what_follows_from_the_kept_tables():
-    """Line for line, and nothing else stands there."""
     assert SPEED.endswith(f"less there.\n\n{speed_figures.measured()}")
 
 
 def test_nothing_else_is_said_of_who_costs_least():
-    """No second sentence, which no table would hold."""
     assert (FRONT + SPEED).count("costs least") == 1

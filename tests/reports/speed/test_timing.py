@@ -21,10 +21,9 @@ from crosscheck2d.reports.run.timing import (
     interleaved,
 )
 from crosscheck2d.reports.speed import ladder, sizes
-from crosscheck2d.reports.speed.effort import QUICK
-from crosscheck2d.reports.speed.estimate import READY, all_rounds
+from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.measure import IN_PILE, Measured, samples_table
-from crosscheck2d.reports.speed.scored_part import scored
+from crosscheck2d.reports.speed.plan import QUICK, READY, all_rounds
 from crosscheck2d.reports.speed.tables import end_of_all_pairs, pile, summed_up
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scene
@@ -35,18 +34,16 @@ SLACK = 0.5  # of a fixed time: a busy machine wakes a sleeper late, never early
 
 
 def fixed(seconds: float, wrapping: float = 0.0) -> Timed:
-    """Something that says it took so long; one run is two of its units."""
     return Timed(f"{seconds}", lambda: Spent(seconds, wrapping), 2.0)
 
 
 def table(samples: list[Sample]) -> pd.DataFrame:
-    """As a table."""
     return pd.DataFrame([sample._asdict() for sample in samples])
 
 
 def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
-    """Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
-    in it."""
+    # Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
+    # in it.
     part = scored("near_miss", 0).scenario
     steps = part.intervals
     samples = ladder.times_of(
@@ -58,8 +55,7 @@ def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
 
 
 def test_what_wrapping_in_python_took_is_given_separately():
-    """A quarter of each step goes into wrapping: it is left out of the cost, and reported beside
-    it."""
+    # A quarter of each step goes into wrapping: it is left out of the cost, and reported beside it.
     engines = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
     row = summed_up(table(ladder.times_of("near_miss", 0, engines, 3, 1.0)), ["key"]).iloc[0]
 
@@ -69,8 +65,8 @@ def test_what_wrapping_in_python_took_is_given_separately():
 
 
 def test_an_engine_against_itself_reads_one():
-    """The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest
-    is on time."""
+    # The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest
+    # is on time.
     engines = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
     best = summed_up(table(ladder.times_of("near_miss", 0, engines, 15, 3.0)), ["key"]).best
 
@@ -78,8 +74,6 @@ def test_an_engine_against_itself_reads_one():
 
 
 def test_every_round_visits_all_in_an_order_of_its_own_and_keeps_every_sample():
-    """Places are a permutation in each round, the rounds differ, and the same seed gives the same
-    orders."""
     what = [fixed(0.1 * k) for k in range(1, 8)]
     samples, again = interleaved(what, 6, 100.0, seed=3), interleaved(what, 6, 100.0, seed=3)
     rounds = table(samples).groupby("round").key.agg(list)
@@ -91,7 +85,7 @@ def test_every_round_visits_all_in_an_order_of_its_own_and_keeps_every_sample():
 
 
 def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
-    """Its time is used up after one sample; the other goes on."""
+    # Its time is used up after one sample; the other goes on.
     rounds = (
         table(interleaved([fixed(0.1), fixed(9.0)], 8, 1.0, seed=0))
         .groupby("key")["round"]
@@ -104,7 +98,6 @@ def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
 
 @pytest.mark.parametrize("run", [0.0019, 0.0099, 0.03, 9.0])
 def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
-    """All of them, those that the budget is enough for, and those that are always taken."""
     effort = replace(QUICK, rounds=8, budget=0.05)
     samples = interleaved([fixed(run)], effort.rounds, effort.budget, seed=0)
 
@@ -112,7 +105,6 @@ def test_the_estimate_counts_the_rounds_that_are_taken(run: float):
 
 
 def test_a_sample_is_filled_with_runs_and_reported_per_unit():
-    """Runs of 0.1 ms fill 1 ms with ten; the cost is per unit of amount, of which a run has two."""
     sample = interleaved([fixed(1.01e-4)], 1, 1.0, seed=0)[0]
 
     assert sample.runs == 10
@@ -120,7 +112,6 @@ def test_a_sample_is_filled_with_runs_and_reported_per_unit():
 
 
 def test_the_summary_leaves_the_warm_up_out_and_has_quartiles_and_the_fastest():
-    """Of 1, 2, 3, 4, 9 and a warm-up of 100."""
     costs = [100.0, 1.0, 2.0, 3.0, 4.0, 9.0]
     samples = [Sample("a", k, 0, cost, 0.0, 1) for k, cost in enumerate(costs, start=WARM_UP)]
     row = summed_up(table(samples), ["key"]).iloc[0]
@@ -129,8 +120,6 @@ def test_the_summary_leaves_the_warm_up_out_and_has_quartiles_and_the_fastest():
 
 
 def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_take_too_long():
-    """Cost n^1.5: the exponent is 1.5 with an interval of no width; extrapolated_cost costs follow
-    the same law."""
     n = np.array([10.0, 100.0, 1000.0, 10_000.0])
     course = [(int(k), float(k**1.5)) for k in n]
 
@@ -141,7 +130,7 @@ def test_what_grows_as_a_power_of_n_gives_the_power_and_stops_where_it_would_tak
 
 @pytest.mark.slow
 def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
-    """A gas that loses energy falls asleep, so whoever took more steps of it would look cheaper."""
+    # A gas that loses energy falls asleep, so whoever took more steps of it would look cheaper.
     ages: list[int] = []
 
     class Ageing(Sleeper):
@@ -159,7 +148,7 @@ def test_no_gas_grows_older_than_it_may_however_often_it_is_sampled():
 
 
 def test_the_worst_step_is_that_of_the_engine_and_not_of_the_machine():
-    """The fourth step of a gas takes 5 ms; a pause that comes in one replay alone is no step."""
+    # The fourth step of a gas takes 5 ms; a pause that comes in one replay alone is no step.
     pauses = iter([*[0.0] * 7, 0.05, *[0.0] * 99])  # in the first replay, at the seventh step
 
     class Slow(Sleeper):
@@ -187,7 +176,7 @@ def test_the_worst_step_is_that_of_the_engine_and_not_of_the_machine():
     ],
 )
 def test_where_all_pairs_stop_paying_is_said_in_a_sentence(costs: dict[int, float], sentence: str):
-    """All pairs cost 1 and 16: equal to an engine of 2 and 8 at the square root of 10 times 100."""
+    # All pairs cost 1 and 16: equal to an engine of 2 and 8 at the square root of 10 times 100.
     rows = [("reference", "exercise", n, cost) for n, cost in ((10, 1.0), (100, 16.0))]
     rows += [("fast", "own", n, cost) for n, cost in costs.items()]
     table = pd.DataFrame(rows, columns=["engine", "profile", "n", "cost"])
@@ -196,7 +185,6 @@ def test_where_all_pairs_stop_paying_is_said_in_a_sentence(costs: dict[int, floa
 
 
 def test_a_settled_pile_costs_less_asleep_and_nothing_in_it_moves():
-    """Columns of disks at rest: awake each step solves its contacts."""
     engines = {
         ("pymunk:matched", change): partial(ENGINES["pymunk:matched"].make, **settings)
         for change, settings in (("", {}), ("sleeping", {"sleep_time_threshold": 0.5}))
@@ -214,7 +202,6 @@ def test_a_settled_pile_costs_less_asleep_and_nothing_in_it_moves():
 
 
 def test_a_settled_pile_is_a_row_awake_and_asleep():
-    """Of the engines that were timed both ways."""
     rows = [
         {"kind": IN_PILE, "engine": "a", "profile": "b", "change": change, "n": 100, "cost": cost}
         for change, cost in (("", 2e-5), ("sleeping", 1e-6))
@@ -241,8 +228,6 @@ def test_a_settled_pile_is_a_row_awake_and_asleep():
 
 
 def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
-    """A sleeper of 2 ms a step, the same for every size, is stopped only by a patience below
-    that."""
     engines = {"sleeper:own": partial(Sleeper, 2e-3)}
     samples, worst, stopped = sizes.costs(engines, (3, 4, 5), 1, 0.0, patience=1e-3, seed=0)
 
@@ -252,8 +237,6 @@ def test_an_engine_that_would_take_too_long_a_step_stops_and_is_reported():
 
 
 def test_the_gas_of_any_size_covers_the_same_share_and_overlaps_nowhere():
-    """Area of the disks over that of the box; nearest neighbours and walls are farther than they
-    reach."""
     for n in (3, 10, 100, 137):
         scene = sizes.gas(n, 0)
         side = scene.walls.max()
