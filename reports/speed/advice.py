@@ -68,33 +68,19 @@ class NoAdvice(Exception):
 
 @dataclass(frozen=True)
 class Attempt:
-    """One engine at one step size.
+    """One engine at one step size."""
 
-    Attributes:
-        name: `engine:profile`.
-        change: a row of `OPTIONS`, or `PLAIN`.
-        substeps: steps in a sample interval.
-        dt: s.
-        error: of the purpose; inf where the run failed, nan where it cannot be judged.
-        reason: why it failed, else "".
-        until: s up to which it keeps the error; nan where that is not known.
-        starts: its errors from each of `starts_within_a_step`; () where these were not played.
-        lasting: s of the scene up to which nine tenths of these keep the error.
-        cost: s per simulated second, nan where not timed.
-        broken: whether it failed by a verdict.
-    """
-
-    name: str
-    change: str
-    substeps: int
-    dt: float
-    error: float
-    reason: str = ""
-    until: float = nan
-    starts: tuple[float, ...] = ()
-    lasting: float = nan
-    cost: float = nan
-    broken: bool = False
+    name: str  # `engine:profile`
+    change: str  # a row of `OPTIONS`, or `PLAIN`
+    substeps: int  # steps in a sample interval
+    dt: float  # s
+    error: float  # of the purpose; inf where the run failed, nan where it cannot be judged
+    reason: str = ""  # why it failed
+    until: float = nan  # s up to which it keeps the error; nan where that is not known
+    starts: tuple[float, ...] = ()  # errors from `starts_within_a_step`; () where not played
+    lasting: float = nan  # s of the scene up to which nine tenths of these keep the error
+    cost: float = nan  # s per simulated second; nan where not timed
+    broken: bool = False  # whether it failed by a verdict
 
     @property
     def make(self) -> Callable[[], Engine]:
@@ -243,38 +229,28 @@ class OutOfReach(NamedTuple):
 class Advice:
     """The result of `Inquiry.advise`.
 
-    Attributes:
-        scene: the name of the scene.
-        purpose, bound: which error, and how large it may be.
-        until, duration: s, up to where errors are judged, and how long the scene is.
-        collisions: how many of the exact answer are judged.
-        step_sizes: s, those that were tried, coarse to fine.
-        keeping: for every engine that keeps the error and plays the whole scene without failing a
-            verdict, the coarsest step size that does from nine tenths of the starts within a step,
-            too, and keeps the error at every finer one; cheapest first.
-        short: the engines that do not keep it.
-        partial: those that keep it where it is judged, but do not play the whole scene, or fail a
-            verdict in it at every step size that keeps it; with the reason.
-        changes: options of the engines that keep it, changed one at a time.
-        noise: the upper quartile of |log(cost / cost of its own copy)| over the engines.
-        busy: cores that others kept busy when the timing began; nan where unknown.
-        statistics: where no library keeps the error, the advice for averages over time.
+    keeping: for every engine that keeps the error and plays the whole scene without failing a
+        verdict, the coarsest step size that does from nine tenths of the starts within a step, too,
+        and keeps the error at every finer one; cheapest first.
+    short: the engines that do not keep it.
+    partial: those that keep it where it is judged, but do not play the whole scene, or fail a
+        verdict in it at every step size that keeps it; with the reason.
     """
 
     scene: str
     purpose: str
     bound: float
-    until: float
-    duration: float
-    collisions: int
-    step_sizes: Sequence[float]
+    until: float  # s, up to where errors are judged
+    duration: float  # s, of the scene
+    collisions: int  # of the exact answer, that are judged
+    step_sizes: Sequence[float]  # s, those that were tried, coarse to fine
     keeping: Sequence[Attempt]
     short: Sequence[OutOfReach]
     partial: Sequence[Attempt]
-    changes: Sequence[ChangedOption]
-    noise: float
-    busy: float
-    statistics: Advice | None = None
+    changes: Sequence[ChangedOption]  # of the engines that keep it, one option at a time
+    noise: float  # the upper quartile of |log(cost / cost of its own copy)| over the engines
+    busy: float  # cores that others kept busy when the timing began; nan where unknown
+    statistics: Advice | None = None  # for averages over time, where no library keeps the error
 
     @property
     def judged(self) -> str:

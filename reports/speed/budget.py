@@ -27,36 +27,12 @@ from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
-TIME, INTERPLAY, SUM, ALL, TOTAL, RESIDUAL = (
-    "time of collisions",
-    "interplay",
-    "sum",
-    "all",
-    "engine",
-    "residual",
-)
+TIME, INTERPLAY, SUM, ALL = "time of collisions", "interplay", "sum", "all"
+TOTAL, RESIDUAL = "engine", "residual"
 TOTALS = (SUM, ALL, TOTAL)
-WHOSE = [
-    "scenario",
-    "seed",
-    "engine",
-    "profile",
-    "dt_s",
-    "until_s",
-    "horizon_s",
-    "duration_s",
-]
-COLUMNS = [
-    *WHOSE,
-    "contribution",
-    "position_radii",
-    "energy",
-    "off_engine_radii",
-    "off_reference_radii",
-    "off_deviation_radii",
-    "closed_deviation_radii",
-    "note",
-]
+WHOSE = ["scenario", "seed", "engine", "profile", "dt_s", "until_s", "horizon_s", "duration_s"]
+COLUMNS = [*WHOSE, "contribution", "position_radii", "energy", "off_engine_radii"]
+COLUMNS += ["off_reference_radii", "off_deviation_radii", "closed_deviation_radii", "note"]
 EXPLAINED = [*WHOSE, "error_radii", "residual_radii", "note"]
 LEAST = 1e-9  # radii; smaller errors are rounding and need no explanation
 TO = (0.01, 0.001)  # of an error: an error with a smaller residual counts as explained

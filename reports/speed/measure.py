@@ -42,17 +42,9 @@ HANGS, ALL_ROUNDS = 600.0, 3600.0
 SIZE, WORST_STEP, IN_PILE, TRUTH = "size", "worst step", "pile", "truth"
 SLEEPING = "sleeping"  # the option of engines that may let disks sleep
 WORDS = ("kind", "engine", "profile", "scenario", "change")
-NUMBERS = {"dt_s": float, "n": int, "copy_of": int, "round": int, "place": int} | {
-    "cost": float,
-    "wrapping": float,
-    "runs": int,
-}
-SOURCE = (
-    "reports/speed/**/*.py",
-    "reports/compare/**/*.py",
-    "reports/run/*.py",
-    "scenarios/**/*.py",
-)
+NUMBERS = {"dt_s": float, "n": int, "copy_of": int, "round": int, "place": int}
+NUMBERS |= {"cost": float, "wrapping": float, "runs": int}
+SOURCE = ("reports/speed/*.py", "reports/compare/*.py", "reports/run/*.py", "scenarios/**/*.py")
 TASK = "measurement"  # the kind of the rows in the store
 TRUTH_RUNS = 20  # of a closed form
 
@@ -98,25 +90,20 @@ def samples_table(rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 class Measured:
     """Everything that was measured, one number a row.
 
-    Attributes:
-        errors: kind, change, and the columns of `ladder.errors_of`.
-        budget: the columns of `budget.budget_of`.
-        samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place,
-            cost, wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes;
-            of the kinds of `stepping.overheads` in s each.
-        truths: as `closed_form` gives them.
-        left_out: (what, reason) of what could not be measured.
-        busy: cores that others kept busy when the timing began.
-        stopped: (`engine:profile`, number of disks) -> why it was not measured with so many.
+    samples: kind, scenario, engine, profile, change, dt_s, n, copy_of, round, place, cost,
+        wrapping, runs; cost in s per simulated second in a scene, in s a step for sizes; of the
+        kinds of `stepping.overheads` in s each.
     """
 
+    # kind, change, and the columns of `ladder.errors_of`
     errors: pd.DataFrame = field(default_factory=pd.DataFrame)
     budget: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=budget.COLUMNS))
     samples: pd.DataFrame = field(default_factory=lambda: samples_table([]))
-    truths: pd.DataFrame = field(default_factory=pd.DataFrame)
-    left_out: list[tuple[str, str]] = field(default_factory=list)
+    truths: pd.DataFrame = field(default_factory=pd.DataFrame)  # rows of `closed_form`
+    left_out: list[tuple[str, str]] = field(default_factory=list)  # what, reason
+    # (`engine:profile`, number of disks) -> why it was not measured with so many
     stopped: dict[tuple[str, int], str] = field(default_factory=dict)
-    busy: float = nan
+    busy: float = nan  # cores that others kept busy when the timing began
 
 
 @dataclass

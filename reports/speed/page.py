@@ -91,8 +91,7 @@ Columns = Mapping[str, str | Callable[[Row], Any]]
 def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
     """Write the page of `results`; `about` holds command, seed, machine, versions, started,
     seconds, load."""
-    played = results.points[np.isfinite(results.points.error)]
-    engines = played[WHO].drop_duplicates()
+    engines = results.points[np.isfinite(results.points.error)][WHO].drop_duplicates()
     lead = [
         f"{counted(len(engines), 'engine')} in {counted(len(results.scenes), 'scene')} with an"
         " exact answer. The error is the largest distance of any disk from its exact position, in"
@@ -120,16 +119,14 @@ def write_page(path: Path, results: Results, about: Mapping[str, Any]) -> None:
         driving_section(results),
         scenes_section(results),
     ]
-    if results.measured.left_out:
-        items = [f"{what}: {reason}" for what, reason in results.measured.left_out]
+    if items := [f"{what}: {reason}" for what, reason in results.measured.left_out]:
         sections.append(Section(f"Left out: {len(items)}", "", [Text(items=items)], True))
-    names = [*results.plan.engines, *(sweep.name for sweep in results.plan.sweeps)]
     page = Page(
         "Speed against accuracy",
         [*sections, run_section(about)],
         GENERATOR,
         lead,
-        names=names,
+        names=[*results.plan.engines, *(sweep.name for sweep in results.plan.sweeps)],
         links=neighbours(path, "speed"),
         footer=f"Made by {about['command']}. The errors come out the same, bit for bit; the times"
         " are this machine's. Every sample is in speed_samples.csv, every error in"
@@ -213,8 +210,7 @@ def drawn_lines(points: pd.DataFrame) -> list[Line]:
 
 
 def write_picture(path: Path, kept: pd.DataFrame) -> None:
-    """The pooled chart of error against cost as a file of its own, from the figures that the
-    repository keeps."""
+    # of the figures that the repository keeps, as a file of its own
     parts = {"pooled error": "error", "pooled cost": "cost", "pooled cost less idle steps": "bare"}
     rows = kept[kept.figure.isin(parts)].assign(figure=kept.figure.map(parts))
     points = rows.pivot(index=[*WHO, "at"], columns="figure", values="value").reset_index()
@@ -224,11 +220,17 @@ def write_picture(path: Path, kept: pd.DataFrame) -> None:
     put_text(path, svg_of(figure, label, alone=True))
 
 
-def chart_of(lines: Sequence[Line], label: str, title: str, caption: str, **axes: Any) -> Chart:
-    figure, plot = new_figure(7.6, 4.6)
-    draw_lines(
-        plot, lines, axes.get("x", COST), axes.get("y", ERROR), x_unit=axes.get("unit", "µs")
-    )
+def chart_of(
+    lines: Sequence[Line],
+    label: str,
+    title: str,
+    caption: str,
+    x: str = COST,
+    y: str = ERROR,
+    x_unit: str = "µs",
+) -> Chart:
+    figure, axes = new_figure(7.6, 4.6)
+    draw_lines(axes, lines, x, y, x_unit=x_unit)
     return Chart(svg_of(figure, label), title, caption)
 
 
@@ -409,8 +411,7 @@ def overview(budget: pd.DataFrame) -> Table:
 
 
 def contributions(budget: pd.DataFrame) -> Table:
-    """A row for each scene, which opens the root mean squares of each engine in radii: engine, the
-    residual, the contributions of anybody, sum and all."""
+    # a row for each scene, which opens the root mean squares of each engine in radii
     opens: dict[str, list[Part]] = {}
     extents = {}
     for scene, here in budget.groupby("scenario", sort=False):
@@ -467,19 +468,13 @@ def sweep_sections(results: Results) -> list[Section]:
     if results.sweeps.empty:
         return []
     pooled = results.pooled_sweeps
-    lines = [
-        Line(
-            f"{engine}:{profile}",
-            group.cost,
-            group.error,
-            str(profile).partition("+")[2] or str(profile),
-        )
-        for (engine, profile), group in pooled.groupby(WHO, sort=False)
-    ]
+    lines = []
+    for (engine, profile), group in pooled.groupby(WHO, sort=False):
+        name = str(profile).partition("+")[2] or str(profile)
+        lines.append(Line(f"{engine}:{profile}", group.cost, group.error, name))
     count = counted(results.sweeps.scenario.nunique(), "scene")
-    without = ", ".join(
-        f"{engine} in {scene}" for engine, scene in tables.without_ratio(results.sweeps)
-    )
+    absent = tables.without_ratio(results.sweeps)
+    without = ", ".join(f"{engine} in {scene}" for engine, scene in absent)
     caption = (
         "One line goes over more iterations or substeps at one dt; that of the matched profile from"
         " 4 times that dt to an eighth of it. Error and cost are divided by those of the matched"
@@ -487,8 +482,8 @@ def sweep_sections(results: Results) -> list[Section]:
         f" half of {count}."
         + (f" These have no ratio, because the divisor is 0: {without}." if without else "")
     )
-    words = {"x": "time / time as matched", "y": "error / error as matched", "unit": ""}
-    chart = chart_of(lines, "error against cost of sweeps", "Pooled", caption, **words)
+    x, y = "time / time as matched", "error / error as matched"
+    chart = chart_of(lines, "error against cost of sweeps", "Pooled", caption, x, y, "")
     says = (
         "There are two ways to reduce an error at a higher cost: more iterations or substeps at one"
         " dt, or a smaller dt. Where a line of iterations is level, these cost time and do not"
@@ -516,6 +511,11 @@ def sweeps_table(sweeps: pd.DataFrame) -> Table:
     )
 
 
+def interval(row: Row, value: str, digits: int) -> str:
+    known = np.isfinite(row[value])
+    return f"{number(row['low'], digits)} to {number(row['high'], digits)}" if known else ""
+
+
 def interval_of_seeds(row: Row) -> str:
     if row["seeds"] < 2:
         return NOT_REACHED
@@ -531,9 +531,8 @@ def size_sections(results: Results) -> list[Section]:
         for (engine, profile), group in costs.groupby(WHO, sort=False)
     ]
     caption = f"A gas that covers 0.3 of its box, e = 1, dt = 1/240 s. {BUILDS}"
-    words = {"x": "disks", "y": "engine time of a step, µs", "unit": ""}
     title = "Cost of a step against the number of disks"
-    chart = chart_of(lines, title, title, caption, **words)
+    chart = chart_of(lines, title, title, caption, "disks", "engine time of a step, µs", "")
     rows: dict[str, dict[str, TableCell]] = {}
     for row in costs.to_dict("records"):
         worst = f"worst {number(row['worst'])}"
@@ -557,11 +556,7 @@ def growth_table(growth: pd.DataFrame) -> Table:
         name_of,
         {
             "exponent from 100 disks on": "exponent",
-            "95 % interval": lambda row: (
-                f"{number(row['low'], 3)} to {number(row['high'], 3)}"
-                if np.isfinite(row["exponent"])
-                else "too few sizes"
-            ),
+            "95 % interval": lambda row: interval(row, "exponent", 3) or "too few sizes",
             "up to, disks": "most",
             "then": "stopped",
         },
@@ -593,7 +588,6 @@ def driving_section(results: Results) -> Section:
 
 
 def scenes_section(results: Results) -> Section:
-    """A row for each scenario, which opens its chart, its orders and all its points."""
     points = results.points.assign(name=names_of(results.points))
     rows, opens = {}, dict[str, list[Part]]()
     for scene, here in points.groupby("scenario", sort=False):
@@ -612,52 +606,41 @@ def scenes_section(results: Results) -> Section:
 def scene_parts(results: Results, scene: str, points: pd.DataFrame) -> list[Part]:
     noise, seeds = results.noise_floor(scene), int(points.seeds.max())
     until, whole = points.until_s.iloc[0], points.duration_s.iloc[0]
-    sentences = [
+    caption = (
         "A point is one dt; the next point to the right has half of it. Time: the median of the"
-        " rounds; thin: without that of as many steps and calls in an empty world.",
-        f"Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends."
-        if until < whole
-        else "",
-        f"The error is the median over {seeds} seeds, with its 95 % bootstrap interval."
-        if seeds > 1
-        else "",
-        "Noise floor: for half of the engines the ratio of two timings is"
-        f" {number(noise.low)} to {number(noise.high)}."
-        if noise.pairs
-        else "",
-        "The time does not include the wrap, which Python does for engines without one."
-        if (points.wrapping > 0).any()
-        else "",
-    ]
-    caption = " ".join(filter(None, sentences))
+        " rounds; thin: without that of as many steps and calls in an empty world."
+    )
+    if until < whole:
+        caption += f" Scored to {until:.3g} of {whole:.3g} s, where the exact answer ends."
+    if seeds > 1:
+        caption += f" The error is the median over {seeds} seeds, with its 95 % bootstrap interval."
+    if noise.pairs:
+        caption += (
+            " Noise floor: for half of the engines the ratio of two timings is"
+            f" {number(noise.low)} to {number(noise.high)}."
+        )
+    if (points.wrapping > 0).any():
+        caption += " The time does not include the wrap, which Python does for engines without one."
     chart = chart_of(drawn_lines(points), f"error against cost, {scene}", "", caption)
     orders = results.orders[results.orders.scenario == scene].merge(
         results.bindings[results.bindings.scenario == scene], on=["scenario", *WHO], how="left"
     )
     reached = {
-        (name_of(row), row["accuracy"]): row
+        (name_of(row), row["accuracy"]): TableCell(row["why"], css="soft")
+        if np.isnan(row["cost"])
+        else TableCell(row["cost"], f"at dt {number(row['dt_s'])} s")
         for row in results.reached[results.reached.scenario == scene].to_dict("records")
     }
 
     def cost_at(accuracy: str) -> Callable[[Row], TableCell]:
-        def cell(row: Row) -> TableCell:
-            got = reached[name_of(row), accuracy]
-            if np.isnan(got["cost"]):
-                return TableCell(got["why"], css="soft")
-            return TableCell(got["cost"], f"at dt {number(got['dt_s'])} s")
-
-        return cell
+        return lambda row: reached[name_of(row), accuracy]
 
     table = table_of(
         orders,
         name_of,
         {
             "order": lambda row: number(row["slope"], 2),
-            "interval": lambda row: (
-                f"{number(row['low'], 2)} to {number(row['high'], 2)}"
-                if np.isfinite(row["slope"])
-                else ""
-            ),
+            "interval": lambda row: interval(row, "slope", 2),
             "with finer steps the error": lambda row: TableCell(
                 VERDICTS.get(row["verdict"], row["verdict"]),
                 css="bad" if row["verdict"] in (ELSEWHERE, UNSTEADY) else "",

@@ -39,35 +39,23 @@ PAGE = 8.0  # s
 
 @dataclass(frozen=True)
 class Effort:
-    """The scenes, step sizes, rounds and numbers of disks that are measured.
-
-    Attributes:
-        scenes: what is measured if nothing is asked for; in the quick form one of each kind, so
-            that no one of them is the pooled curve: flight, collisions head-on, oblique and below
-            thresholds, walls, static disks, sliding, a stack, rows, a force and a torque, and
-            crowds (a test leaves out one after the other).
-        seeds: how many seeds of a random scene.
-        most_steps: of the finest dt of a ladder.
-        rounds: of timing, warm-up not counted.
-        budget: s of timing for one engine at one dt in one scene, beyond the first rounds.
-        sizes: numbers of disks.
-        patience: s a step may take before an engine drops out of the sizes.
-        sweep_scenes: in which iterations and substeps are increased: a stack, a crowd, a slide, and
-            collisions in a row.
-        option_scenes: in which engines with changed options are measured: three disks, a collision
-            that thresholds affect, one disk under gravity, many collisions, and a stack at rest.
-        budget_scenes: of which the error budget is made.
-    """
-
+    # what is measured if nothing is asked for; in the quick form one of each kind, so that no one
+    # of them is the pooled curve: flight, collisions head-on, oblique and below thresholds, walls,
+    # static disks, sliding, a stack, rows, a force and a torque, and crowds (a test leaves out one
+    # after the other)
     scenes: tuple[str, ...]
-    seeds: int
-    most_steps: int
-    rounds: int
-    budget: float
-    sizes: tuple[int, ...]
-    patience: float
+    seeds: int  # of a random scene
+    most_steps: int  # of the finest dt of a ladder
+    rounds: int  # of timing, warm-up not counted
+    budget: float  # s of timing for one engine at one dt in one scene, beyond the first rounds
+    sizes: tuple[int, ...]  # numbers of disks
+    patience: float  # s a step may take before an engine drops out of the sizes
+    # in which iterations and substeps are increased: a stack, a crowd, a slide, and collisions in a
+    # row
     sweep_scenes: tuple[str, ...]
     budget_scenes: tuple[str, ...]
+    # in which options are changed: three disks, a collision that thresholds affect, one disk under
+    # gravity, many collisions, and a stack at rest
     option_scenes: tuple[str, ...] = (
         "disk_between_static_disks",
         "slow_collision",

@@ -13,6 +13,8 @@ from crosscheck2d.reports.speed import budget, tables
 from crosscheck2d.reports.speed.measure import Measured
 from crosscheck2d.reports.speed.plan import SpeedPlan
 
+TABLES = ["pooled", "orders", "reached", "sizes", "pile", "options", "driving", "bindings"]
+TABLES += ["noise", "models", "sweeps", "explained", "versus"]
 QUIET = 0.05  # how far from 1 the middle half of an engine against itself may read
 
 
@@ -92,23 +94,7 @@ class Results:
     @property
     def files(self) -> dict[str, pd.DataFrame]:
         """The tables, by the names of their CSV files."""
-        files = {
-            "speed_samples": self.measured.samples,
-            "speed_errors": self.measured.errors,
-            "speed": self.points,
-            "speed_pooled": self.pooled,
-            "speed_orders": self.orders,
-            "speed_reached": self.reached,
-            "speed_sizes": self.sizes,
-            "speed_pile": self.pile,
-            "speed_options": self.options,
-            "speed_driving": self.driving,
-            "speed_bindings": self.bindings,
-            "speed_noise": self.noise,
-            "speed_models": self.models,
-            "speed_sweeps": self.sweeps,
-            "speed_budget": self.measured.budget,
-            "speed_explained": self.explained,
-            "speed_versus": self.versus,
-        }
-        return {f"{name}.csv": table for name, table in files.items()}
+        measured = ("samples", "errors", "budget")
+        tables = {"speed": self.points} | {f"speed_{name}": getattr(self, name) for name in TABLES}
+        tables |= {f"speed_{name}": getattr(self.measured, name) for name in measured}
+        return {f"{name}.csv": table for name, table in tables.items()}

@@ -83,6 +83,11 @@ def budgeted(
     return made.contributions(), made
 
 
+def budgets(scene: str, *names: str, substeps: int = 4) -> pd.DataFrame:
+    rows = [row for name in names for row in budget_of(scene, 0, name, substeps)]
+    return pd.DataFrame(rows, columns=budget.COLUMNS)
+
+
 def test_a_planted_engine_gets_its_contributions_and_its_bug_is_the_residual():
     contributions, made = budgeted("oblique_e09", KNOWN)
     moving = made.at.scenario.scene.radius
@@ -113,10 +118,8 @@ def test_the_parts_close_as_vectors_and_agree_with_the_whole():
 
     assert np.abs(reduce(add, causes).position - total.position).max() <= 1e-12
     assert np.abs(reduce(add, causes).energy - total.energy).max() <= 1e-12
-    assert (
-        np.abs((contributions[ALL] - contributions[SUM] - contributions[INTERPLAY]).position).max()
-        <= 1e-12
-    )
+    rest = contributions[ALL] - contributions[SUM] - contributions[INTERPLAY]
+    assert np.abs(rest.position).max() <= 1e-12
     # in a row of bounces each changes what the next can do
     assert contributions[INTERPLAY].radii > 0
 
@@ -124,7 +127,7 @@ def test_the_parts_close_as_vectors_and_agree_with_the_whole():
 def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
     # x by (alpha - 1/2) dt a t, so that energy is off by -(alpha - 1/2) dt m a2 t, of the energy at
     # hand.
-    rows = pd.DataFrame(budget_of("free_fall", 0, "pymunk:matched", 4)).set_index("contribution")
+    rows = budgets("free_fall", "pymunk:matched").set_index("contribution")
     at = window_of("free_fall", 0, 4)
     g, t = float(np.linalg.norm(at.scenario.scene.gravity)), at.truth.t
     offset = 0.5 * at.dt * g * t / at.scenario.scene.radius[0]
@@ -140,9 +143,7 @@ def test_the_flight_is_off_by_its_closed_form_in_place_and_energy():
 @pytest.mark.slow
 def test_every_engine_is_explained_to_a_thousandth_in_a_collision_and_a_bounce():
     scenes = ("head_on_unequal_e09", "wall_to_wall")
-    rows = pd.DataFrame(
-        [row for scene in scenes for name in BUILT_IN for row in budget_of(scene, 0, name, 4)]
-    )
+    rows = pd.concat([budgets(scene, *BUILT_IN) for scene in scenes])
     wide = rows.pivot(
         index=["scenario", "engine", "profile"], columns="contribution", values="position_radii"
     )
@@ -172,10 +173,8 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(
     monkeypatch.setitem(ENGINES, "reference:exercise", EngineRow(Refusing, "", 1.0, FLOAT64))
     (row,) = budget_of("free_fall", 0, "reference:exercise", 4)
 
-    assert (row["contribution"], row["note"]) == (
-        TOTAL,
-        "error: RuntimeError: no <b>such</b> thing",
-    )
+    assert row["contribution"] == TOTAL
+    assert row["note"] == "error: RuntimeError: no <b>such</b> thing"
     table = pd.DataFrame([row], columns=budget.COLUMNS)
     numbers, notes = page.contributions(table).opens["budget of free_fall"]
     assert isinstance(numbers, Table)
@@ -186,13 +185,7 @@ def test_an_engine_that_fails_the_scene_has_a_note_in_place_of_parts(
 
 
 def test_tables_have_the_largest_part_and_no_column_for_nothing():
-    rows = pd.DataFrame(
-        [
-            row
-            for name in ("pymunk:shipped", "box2d:matched")
-            for row in budget_of("slow_collision", 0, name, 4)
-        ]
-    )
+    rows = budgets("slow_collision", "pymunk:shipped", "box2d:matched")
     numbers, notes = page.contributions(rows).opens["budget of slow_collision"]
     largest = page.overview(rows).frame
 
@@ -207,8 +200,7 @@ def test_tables_have_the_largest_part_and_no_column_for_nothing():
 
 
 def left_over(scene: str, name: str) -> float:
-    rows = pd.DataFrame(budget_of(scene, 0, name, middle(scene)), columns=budget.COLUMNS)
-    row = budget.explain(rows).iloc[0]
+    row = budget.explain(budgets(scene, name, substeps=middle(scene))).iloc[0]
     return float(row.residual_radii / row.error_radii)
 
 
@@ -281,12 +273,8 @@ def test_the_sentence_says_what_is_cut_at_which_time_and_how_much_is_left():
 
 
 def test_the_budget_itself_tells_how_far_it_goes():
-    rows = [
-        row
-        for scene, k in (("gas_of_100", 4), ("free_fall", 4))
-        for row in budget_of(scene, 0, "pymunk:matched", k)
-    ]
-    table = budget.explain(pd.DataFrame(rows, columns=budget.COLUMNS)).set_index("scenario")
+    rows = pd.concat([budgets(scene, "pymunk:matched") for scene in ("gas_of_100", "free_fall")])
+    table = budget.explain(rows).set_index("scenario")
     gas, fall = table.loc["gas_of_100"], table.loc["free_fall"]
 
     assert 0 < gas.until_s < gas.horizon_s < gas.duration_s
@@ -296,7 +284,7 @@ def test_the_budget_itself_tells_how_far_it_goes():
 
 
 def test_a_row_has_the_error_and_what_is_left_of_the_budget():
-    rows = pd.DataFrame(budget_of("slow_collision", 0, "box2d:matched", 4), columns=budget.COLUMNS)
+    rows = budgets("slow_collision", "box2d:matched")
     contributions = rows.set_index("contribution").position_radii
     row = budget.explain(rows).iloc[0]
 

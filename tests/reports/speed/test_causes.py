@@ -78,17 +78,11 @@ JAVASCRIPT = [
 ]
 
 
-@pytest.mark.parametrize(("scene", "engine", "expected"), PYTHON)
+@pytest.mark.parametrize(
+    ("scene", "engine", "expected"),
+    [*PYTHON, *(pytest.param(*case, marks=[fetched, pytest.mark.slow]) for case in JAVASCRIPT)],
+)
 def test_the_default_that_bites_is_named_with_what_to_set(
-    scene: str, engine: str, expected: str, tmp_path: Path
-):
-    assert expected in cause(scene, engine, tmp_path)
-
-
-@fetched
-@pytest.mark.slow
-@pytest.mark.parametrize(("scene", "engine", "expected"), JAVASCRIPT)
-def test_the_default_of_a_javascript_engine_is_named_with_what_to_set(
     scene: str, engine: str, expected: str, tmp_path: Path
 ):
     assert expected in cause(scene, engine, tmp_path)

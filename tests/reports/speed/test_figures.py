@@ -3,6 +3,8 @@ engine by engine."""
 
 from __future__ import annotations
 
+import re
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,9 @@ from tests.measured import MEASURED
 from tests.reports.speed import statements as speed_figures
 from tests.reports.speed.statements import MATCHED, SHIPPED
 
+ROOT = Path(__file__).parents[3]
+FRONT = (ROOT / "README.md").read_text("utf-8")
+SPEED = (ROOT / "reports" / "speed" / "README.md").read_text("utf-8")
 WITH_MECHANISMS = [name for name in MECHANISMS if name in ENGINES and name in MEASURED]
 DIGITS = 2e-3  # four digits are kept
 
@@ -78,81 +83,56 @@ def test_the_kept_tables_have_every_scene_and_measured_engine():
 
 
 def orders(**stays: int) -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {
-                "scenario": f"scene {k}",
-                "engine": name.split(":")[0],
-                "profile": name.split(":")[1],
-                "coarsest_error": 1.0,
-                "failed": 0,
-                "steps": 4,
-                "finest_error": (
-                    0.95 if name in SHIPPED and k < stays.get(name.split(":")[0], 0) else 0.8
-                ),
-            }
-            for name in ENGINES
-            for k in range(2)
-        ]
-    )
+    """Two scenes; an engine's shipped profile comes no nearer in so many."""
+    rows = []
+    for name in ENGINES:
+        engine, profile = name.split(":")
+        for k in range(2):
+            error = 0.95 if name in SHIPPED and k < stays.get(engine, 0) else 0.8
+            rows.append((f"scene {k}", engine, profile, 1.0, error, 0, 4))
+    columns = ["scenario", "engine", "profile", "coarsest_error", "finest_error", "failed", "steps"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def test_the_sentence_on_finer_steps_counts_each_engine():
-    said = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
+    sentence, *lines = speed_figures.nearer(orders(box2d=1, box2d_v3=2)).splitlines()
 
-    assert said[0].startswith(
+    assert sentence.startswith(
         "In how many of 2 scenes the error falls by less than a tenth from the coarsest to the"
         " finest step, "
     )
-    counts = dict(
-        line.strip("| ").split(" | ")
-        for line in said
-        if line.startswith("| ") and line.strip("| ")[-1].isdigit()
-    )
+    cells = [line.strip("| ").split(" | ") for line in lines if line.startswith("| ")]
+    counts = {name: count for name, count in cells if count.isdigit()}
     assert counts["box2d:matched"] == "0"
-    assert {name for name, count in counts.items() if count != "0"} == {
-        "box2d:shipped",
-        "box2d_v3:shipped",
-    }
-    assert (counts["box2d:shipped"], counts["box2d_v3:shipped"]) == ("1", "2")
+    nonzero = {name: count for name, count in counts.items() if count != "0"}
+    assert nonzero == {"box2d:shipped": "1", "box2d_v3:shipped": "2"}
     assert speed_figures.nearer(orders(pymunk=1)) != speed_figures.nearer(orders(box2d=1))
 
 
 def test_no_nearer_is_read_from_the_ends_of_the_ladder():
     # A tenth less is nearer; a finest step that fails or is no better is not; nor count rounding
     # and all failed.
-    table = pd.DataFrame(
-        [
-            (1.0, 0.89, 0),
-            (1.0, 0.91, 0),
-            (1.0, np.inf, 1),
-            (np.inf, np.inf, 4),
-            (1e-14, 2e-14, 0),
-            (np.inf, 1.0, 1),
-        ],
-        columns=["coarsest_error", "finest_error", "failed"],
-    ).assign(steps=4)
+    rows = [(1.0, 0.89, 0), (1.0, 0.91, 0), (1.0, np.inf, 1)]
+    rows += [(np.inf, np.inf, 4), (1e-14, 2e-14, 0), (np.inf, 1.0, 1)]
+    columns = ["coarsest_error", "finest_error", "failed"]
+    table = pd.DataFrame(rows, columns=columns).assign(steps=4)
 
     assert speed_figures.no_nearer(table).tolist() == [False, True, True, False, False, False]
 
 
 def row(figure: str, name: str, at: str, value: float, note: str = "") -> dict:
-    return dict(zip(("engine", "profile"), name.split(":"))) | {
-        "figure": figure,
-        "at": at,
-        "value": value,
-        "note": note,
-    }
+    who = dict(zip(("engine", "profile"), name.split(":")))
+    return who | {"figure": figure, "at": at, "value": value, "note": note}
 
 
 def against(cheaper: dict[str, str], bare: dict[str, str], changed: str = "") -> pd.DataFrame:
-    rows = [row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")) for name in COMPARED]
-    rows += [
-        row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")) for name in COMPARED
-    ]
-    return pd.DataFrame(
-        [*rows, row(figures.AGAINST, "pymunk:matched", "sleeping", 2.0, changed or "0 of 1: ")]
-    )
+    """Figures of two scenes in which these engines cost less than our own solver, in "k of 2:
+    scenes"."""
+    rows = [row(figures.AGAINST, "pymunk:matched", "sleeping", 2.0, changed or "0 of 1: ")]
+    for name in COMPARED:
+        rows.append(row(figures.AGAINST, name, "", 2.0, cheaper.get(name, "0 of 2: ")))
+        rows.append(row(figures.AGAINST_BARE, name, "", np.nan, bare.get(name, "0 of 2: ")))
+    return pd.DataFrame(rows)
 
 
 def test_who_costs_less_than_our_own_solver_is_named():
@@ -181,24 +161,17 @@ def test_who_costs_less_than_our_own_solver_is_named():
 
 
 def pooled(worse: str = "") -> pd.DataFrame:
+    """Figures of three steps: every error is halved, every cost doubled; one engine is three times
+    as far off."""
     rows = []
     for name in ENGINES:
-        for step_size in range(3):
-            error = 0.1 * (3.0 if name == worse else 1.0) / 2**step_size
-            lost = "failed in 1 of 2" if name == "event_driven:float64" else "failed in 0 of 2"
-            rows += [
-                row("pooled error", name, str(step_size), error, lost),
-                row("pooled cost", name, str(step_size), 2.0**step_size),
-            ]
-        rows.append(
-            row(
-                "cost at accuracy",
-                name,
-                "1e-6",
-                1.0,
-                "0 of 2, never in 2" if name in COMPARED else "1 of 2",
-            )
-        )
+        lost = f"failed in {int(name == 'event_driven:float64')} of 2"
+        for k in range(3):
+            error = 0.1 * (3.0 if name == worse else 1.0) / 2**k
+            rows.append(row("pooled error", name, str(k), error, lost))
+            rows.append(row("pooled cost", name, str(k), 2.0**k))
+        reached = "0 of 2, never in 2" if name in COMPARED else "1 of 2"
+        rows.append(row("cost at accuracy", name, "1e-6", 1.0, reached))
     return pd.DataFrame(rows)
 
 
@@ -224,14 +197,13 @@ def test_the_caption_counts_scenes_and_failures():
 
 
 def test_the_readme_says_how_much_each_form_measures():
-    root = Path(__file__).parents[3]
-    text = " ".join((root / "reports" / "speed" / "README.md").read_text("utf-8").split())
+    text = " ".join(SPEED.split())
 
     assert f"the cost of up to {QUICK.sizes[-1]:,} disks".replace(",", " ") in text
     assert f"`--full` takes all scenes and up to {FULL.sizes[-1]:,} disks".replace(",", " ") in text
     assert set(FULL.scenes) == set(SCENARIOS)
     assert {len(scenario(name).substeps) for name in SCENARIOS} == {4}
-    assert "at 4 step sizes" in (root / "README.md").read_text("utf-8")
+    assert "at 4 step sizes" in FRONT
 
 
 @pytest.mark.parametrize(
@@ -239,7 +211,75 @@ def test_the_readme_says_how_much_each_form_measures():
 )
 def test_what_fails_a_verdict_is_infinitely_far_off(name: str, fails: bool):
     # A disk of 100 kg falls through one of 1 kg and the floor.
-    scene = str(Path(__file__).parents[3] / "tests" / "data" / "scenes" / "heavy_on_light.toml")
+    scene = str(ROOT / "tests" / "data" / "scenes" / "heavy_on_light.toml")
     (row,) = ladder.errors_of(scene, 0, name, ENGINES[name].make, [4])
     assert (row["status"], np.isinf(row["error_radii"])) == ("fails" if fails else "ok", fails)
     assert row["until_s"] == 3
+
+
+def test_the_caption_of_the_picture_follows_from_the_kept_table():
+    text = " ".join(SPEED.split())
+
+    assert speed_figures.caption(figures.read(figures.KEPT)) in text
+    assert "the geometric mean over the scenes, without the best and the worst quarter" in text
+
+
+def stated(text: str) -> list[tuple[float, float]]:
+    of_errors = " ".join(text.split()).split("divides their error ")[1].split(". They come")[0]
+    return [
+        (float(low), float(high)) for low, high in re.findall(r"by ([\d.]+) to ([\d.]+)", of_errors)
+    ]
+
+
+def outside(kept: pd.DataFrame, text: str) -> set[str]:
+    """The engines with end-of-step detection for which what the text says of half a step is not
+    true."""
+    falls, wrong = speed_figures.halving(kept)[0], set()
+    for names, (low, high) in zip(speed_figures.LATE_BY_KIND.values(), stated(text), strict=True):
+        for name in names:
+            # A number is printed to a tenth.
+            ratios = falls.loc[name].dropna()
+            if not ((ratios > low - 0.051) & (ratios < high + 0.051)).all():
+                wrong.add(name)
+    return wrong
+
+
+def test_what_half_a_step_buys_is_true_of_every_engine_with_end_of_step_detection():
+    # None is left out, and the ranges hold for each; one whose error grows is no exception without
+    # a word. The control: with a tenth of the coarsest error an engine falls out of its range,
+    # whichever it is.
+    kept, late = figures.read(figures.KEPT), {YARDSTICK, *COMPARED}
+    spoken_of = [name for names in speed_figures.LATE_BY_KIND.values() for name in names]
+    assert sorted(spoken_of) == sorted(late)
+    ordered = {"reference:ordered", "event_driven:float64"}
+    assert late & MEASURED == (set(DISTINCT) & MEASURED) - ordered
+    assert outside(kept, SPEED) == set()
+    assert ("below 1: the error grows" in " ".join(SPEED.split())) == (
+        speed_figures.halving(kept)[0] < 1
+    ).any(axis=None)
+
+    controlled = set()
+    for name in late:
+        worse = kept.copy()
+        of_name = (worse.figure == "pooled error") & (worse.engine + ":" + worse.profile == name)
+        finite = sorted(worse["at"][of_name & (worse.value < inf)], key=int)
+        if len(finite) < 2:  # it fails in too many scenes: there is no ratio
+            continue
+        worse.loc[of_name & (worse["at"] == finite[0]), "value"] /= 10
+        assert outside(worse, SPEED) == {name}
+        controlled.add(name)
+    assert {YARDSTICK, "pymunk:matched", "box2d:matched"} <= controlled
+
+
+def test_the_scenes_in_which_smaller_steps_do_not_help_are_counted_for_every_engine():
+    table = SPEED.split("falls by less than a tenth")[1]
+
+    assert [name for name in DISTINCT if name in MEASURED and f"\n| {name} | " not in table] == []
+
+
+def test_the_page_on_speed_ends_with_what_follows_from_the_kept_tables():
+    assert SPEED.endswith(f"less there.\n\n{speed_figures.measured()}")
+
+
+def test_nothing_else_is_said_of_who_costs_least():
+    assert (FRONT + SPEED).count("costs least") == 1

@@ -15,32 +15,18 @@ from crosscheck2d.reports.speed.measure import SIZE, Measured
 from crosscheck2d.reports.speed.plan import PLAIN, SCENE
 
 DT = np.array([0.4, 0.2, 0.1])
+PYMUNK: dict = {"engine": "pymunk", "profile": "matched", "change": PLAIN}
 
 
 def point(
     scenario: str = "one", step_size: int = 0, cost: float = 1.0, error: float = 0.1, **more: object
 ) -> dict:
-    return {
-        "scenario": scenario,
-        "engine": "pymunk",
-        "profile": "matched",
-        "change": PLAIN,
-        "step_size": step_size,
-        "dt_s": 0.4 / 2**step_size,
-        "cost": cost,
-        "low": cost,
-        "high": cost,
-        "best": cost,
-        "error": error,
-        "error_low": error,
-        "error_high": error,
-        "seeds": 1,
-        "failed": int(np.isinf(error)),
-        "status": "error" if np.isinf(error) else "ok",
-        "reason": "no" if np.isinf(error) else "",
-        "wrapping": 0.0,
-        "idle": 0.5,
-    } | more
+    failed = bool(np.isinf(error))
+    row = PYMUNK | {"scenario": scenario, "step_size": step_size, "dt_s": 0.4 / 2**step_size}
+    row |= dict.fromkeys(("cost", "low", "high", "best"), cost) | {"wrapping": 0.0, "idle": 0.5}
+    row |= dict.fromkeys(("error", "error_low", "error_high"), error) | {"seeds": 1}
+    row |= {"failed": int(failed), "status": "error" if failed else "ok"}
+    return row | {"reason": "no" if failed else ""} | more
 
 
 def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
@@ -52,18 +38,9 @@ def test_an_accuracy_that_was_not_timed_is_not_called_unreached():
 
 def test_the_pooled_cost_of_an_accuracy_counts_every_scene():
     why = ["", UNREACHABLE, FAILED, NOT_TIMED, "not down to dt 0.1 s"]
-    reached = pd.DataFrame(
-        {
-            "scenario": list("abcde"),
-            "engine": "pymunk",
-            "profile": "matched",
-            "accuracy": "1 %",
-            "cost": [5.0] + [np.nan] * 4,
-            "dt_s": np.nan,
-            "why": why,
-            "lost": [w in (UNREACHABLE, FAILED) for w in why],
-        }
-    )
+    columns = PYMUNK | {"scenario": list("abcde"), "accuracy": "1 %", "dt_s": np.nan, "why": why}
+    columns |= {"cost": [5.0] + [np.nan] * 4, "lost": [w in (UNREACHABLE, FAILED) for w in why]}
+    reached = pd.DataFrame(columns)
     row = tables.pooled_reached(reached, reached).iloc[0]
 
     assert np.isnan(row.cost)
@@ -81,13 +58,8 @@ def rows_of(table: Table) -> list[dict[str, str]]:
 
 
 def test_a_point_that_was_not_timed_has_its_error_and_a_failed_one_how_it_failed():
-    table = pd.DataFrame(
-        [
-            point(),
-            point(step_size=1, cost=np.nan, error=0.05),
-            point(step_size=2, cost=np.nan, error=np.inf),
-        ]
-    )
+    rows = [point(), point(step_size=1, cost=np.nan, error=0.05)]
+    table = pd.DataFrame([*rows, point(step_size=2, cost=np.nan, error=np.inf)])
     timed, untimed, failed = rows_of(page.points_table(table))
     (drawn,) = [line for line in page.drawn_lines(table) if not line.faint]
 
@@ -104,19 +76,11 @@ def sweep(value: str, step_size: int, **more: object) -> dict:
 
 
 def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
-    found = pd.DataFrame(
-        [
-            row | {"scenario": scene}
-            for scene in ("one", "two")
-            for row in (
-                point(step_size=2),
-                sweep("1", 0),
-                sweep("9", 1, cost=np.nan, error=np.inf, failed=1, status="error", reason="no"),
-            )
-        ]
-    )
-    pool = tables.pooled_sweeps(found)
-    lost = [row for row in rows_of(page.sweeps_table(found)) if row["failed"]]
+    failed = sweep("9", 1, cost=np.nan, error=np.inf, failed=1, status="error", reason="no")
+    rows = (point(step_size=2), sweep("1", 0), failed)
+    table = pd.DataFrame([row | {"scenario": name} for name in ("one", "two") for row in rows])
+    pool = tables.pooled_sweeps(table)
+    lost = [row for row in rows_of(page.sweeps_table(table)) if row["failed"]]
 
     assert pool.set_index("change").failed.to_dict() == {"": 0, "1": 0, "9": 2}
     assert [(row[""], row["value"], row["failed"]) for row in lost] == [
@@ -126,40 +90,23 @@ def test_a_sweep_that_fails_most_scenes_stays_in_the_pool_and_in_the_table():
 
 
 def test_a_scene_without_a_ratio_is_named():
-    rows = [
-        point("one", 2),
-        sweep("1", 0),
-        point("exact", 2, error=0.0),
-        sweep("1", 0, scenario="exact"),
-        point("gone", 2, cost=np.nan, error=np.inf),
-        sweep("1", 0, scenario="gone"),
-    ]
-    found = pd.DataFrame(rows)
+    rows = [point("one", 2), point("exact", 2, error=0.0)]
+    rows += [point("gone", 2, cost=np.nan, error=np.inf)]
+    rows += [sweep("1", 0, scenario=name) for name in ("one", "exact", "gone")]
+    table = pd.DataFrame(rows)
 
-    assert tables.without_ratio(found) == [("pymunk", "exact"), ("pymunk", "gone")]
-    assert set(tables.pooled_sweeps(found)["of"]) == {1}
+    assert tables.without_ratio(table) == [("pymunk", "exact"), ("pymunk", "gone")]
+    assert set(tables.pooled_sweeps(table)["of"]) == {1}
 
 
 def test_a_change_that_fails_has_its_row_with_how_it_failed():
-    table = pd.DataFrame(
-        {
-            "scenario": ["one", "two"],
-            "engine": "pymunk",
-            "profile": "matched",
-            "change": "no rotation",
-            "status": ["ok", "error"],
-            "reason": ["", "no"],
-            "error_ratio": [1.5, np.inf],
-            "cost_ratio": [1.0, np.nan],
-            "error_radii": [0.1, np.inf],
-            "error_radii_plain": 0.1,
-            "cost": [1.0, np.nan],
-            "cost_plain": 1.0,
-            "low": 1.0,
-            "high": 1.0,
-            "best": 1.0,
-        }
-    )
+    rows = [
+        ("one", "ok", "", 1.5, 1.0, 0.1),
+        ("two", "error", "no", np.inf, np.nan, np.inf),
+    ]
+    columns = ["scenario", "status", "reason", "error_ratio", "cost_ratio", "error_radii"]
+    table = pd.DataFrame(rows, columns=columns)
+    table = table.assign(**PYMUNK | {"change": "no rotation"}, error_radii_plain=0.1)
     ok, failed = rows_of(page.options_table(table))
 
     assert (ok["scene"], ok["error, × unchanged"], ok["failed"]) == ("one", "1.5", "")
@@ -167,20 +114,9 @@ def test_a_change_that_fails_has_its_row_with_how_it_failed():
 
 
 def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_reason():
-    sample = {
-        "kind": SIZE,
-        "engine": "pymunk",
-        "profile": "matched",
-        "n": 3,
-        "round": 0,
-        "cost": 1e-6,
-        "wrapping": 0.0,
-    }
-    measured = Measured(
-        samples=pd.DataFrame([sample]), stopped={("box2d:matched", 3): "refused: no"}
-    )
-    costs = tables.sizes(measured)
-    growth = tables.growth(costs, measured.stopped)
+    sample = PYMUNK | {"kind": SIZE, "n": 3, "round": 0, "cost": 1e-6, "wrapping": 0.0}
+    refused = {("box2d:matched", 3): "refused: no"}
+    growth = tables.growth(tables.sizes(Measured(samples=pd.DataFrame([sample]))), refused)
     rows = rows_of(page.growth_table(growth))
 
     assert growth.set_index("engine").stopped.to_dict() == {"pymunk": "", "box2d": "3: refused: no"}
@@ -192,41 +128,28 @@ def test_an_engine_that_refuses_the_fewest_disks_has_its_row_and_its_reason():
 
 def test_an_order_tells_how_many_steps_failed():
     # They have no part in its slope, which says nothing of them.
-    rows = [
-        {
-            "kind": "scene",
-            "scenario": "one",
-            "engine": "pymunk",
-            "profile": "matched",
-            "seed": 0,
-            "substeps": k,
-            "dt_s": 0.4 / k,
-            "error_radii": error,
-            "change_radii": 1.0,
-        }
-        for k, error in ((1, 0.8), (2, 0.4), (4, 0.2), (8, np.inf))
-    ]
-    row = tables.orders(Measured(errors=pd.DataFrame(rows)), 0).iloc[0]
+    known = PYMUNK | {"kind": SCENE, "scenario": "one", "seed": 0, "change_radii": 1.0}
+    errors = pd.DataFrame(
+        [
+            known | {"substeps": k, "dt_s": 0.4 / k, "error_radii": error}
+            for k, error in ((1, 0.8), (2, 0.4), (4, 0.2), (8, np.inf))
+        ]
+    )
+    row = tables.orders(Measured(errors=errors), 0).iloc[0]
 
     assert (row.verdict, row.failed, row.steps) == (ORDER, 1, 4)
     assert (row.coarsest_error, row.finest_error) == (0.8, np.inf)
 
 
-def own(scenario: str, cost: float) -> dict:
-    return point(scenario, cost=cost, engine="reference", profile="exercise")
+def own(scenario: str, cost: float, **more: object) -> dict:
+    return point(scenario, cost=cost, engine="reference", profile="exercise", **more)
 
 
 def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene():
     # At cost 2 against 4 it is cheaper; without idle steps of 0.5 and 3.9, not; one scene was not
     # timed.
-    rows = [
-        own("one", 1.0),
-        point("one", cost=3.0),
-        own("two", 4.0) | {"idle": 3.9},
-        point("two", cost=2.0),
-        own("three", 1.0),
-        point("three", cost=np.nan),
-    ]
+    rows = [own("one", 1.0), own("two", 4.0, idle=3.9), own("three", 1.0)]
+    rows += [point("one", cost=3.0), point("two", cost=2.0), point("three", cost=np.nan)]
     row = tables.against_own(pd.DataFrame(rows), pd.DataFrame()).iloc[0]
 
     assert (row.cheaper, row.cheaper_in, row.scenes, row.not_timed_in) == (1, "two", 2, "three")
@@ -236,29 +159,13 @@ def test_an_engine_that_is_cheaper_than_our_own_solver_is_named_with_the_scene()
 
 
 def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
-    known = {"scenario": "one"}
-    options = pd.DataFrame(
-        [
-            known
-            | {
-                "engine": "reference",
-                "profile": "exercise",
-                "change": "float32",
-                "cost": 9.0,
-                "cost_plain": 2.0,
-            },
-            known
-            | {
-                "engine": "pymunk",
-                "profile": "matched",
-                "change": "sleeping",
-                "cost": 1.0,
-                "cost_plain": 5.0,
-            },
-        ]
-    )
-    table = tables.against_own(pd.DataFrame([own("one", 2.0), point("one", cost=5.0)]), options)
-    row = table.set_index("change").loc["sleeping"]
+    # against our solver unchanged, in the same scene
+    rows = [("reference", "exercise", "float32", 9.0, 2.0)]
+    rows += [("pymunk", "matched", "sleeping", 1.0, 5.0)]
+    columns = ["engine", "profile", "change", "cost", "cost_plain"]
+    options = pd.DataFrame(rows, columns=columns).assign(scenario="one")
+    points = pd.DataFrame([own("one", 2.0), point("one", cost=5.0)])
+    row = tables.against_own(points, options).set_index("change").loc["sleeping"]
 
     assert (row.ratio, row.cheaper, row.cheaper_in) == (0.5, 1, "one")
     # our own solver was not asked for
@@ -267,20 +174,8 @@ def test_a_changed_setting_that_is_cheaper_than_our_own_solver_is_named():
 
 def test_where_no_timing_ended_there_is_a_table_without_times():
     # An engine that fails while it is timed takes those of its scene along; the errors stay.
-    error = {
-        "kind": SCENE,
-        "scenario": "one",
-        "engine": "pymunk",
-        "profile": "matched",
-        "change": PLAIN,
-        "dt_s": 0.4,
-        "substeps": 1,
-        "until_s": 1.0,
-        "duration_s": 1.0,
-        "status": "ok",
-        "reason": "",
-        "error_radii": 0.1,
-    }
+    error = PYMUNK | {"kind": SCENE, "scenario": "one", "dt_s": 0.4, "substeps": 1}
+    error |= {"until_s": 1.0, "duration_s": 1.0, "status": "ok", "reason": "", "error_radii": 0.1}
     (row,) = tables.points(Measured(errors=pd.DataFrame([error])), 0).to_dict("records")
 
     assert row["error"] == 0.1

@@ -13,9 +13,11 @@ import pandas as pd
 import pytest
 from playwright.sync_api import Browser
 
+from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.mechanisms.options import OPTIONS
 from crosscheck2d.adapters.mechanisms.table import MECHANISMS
 from crosscheck2d.adapters.play import play
+from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.pareto import ACCURACIES, FAILED, UNREACHABLE
 from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import opening
@@ -50,13 +52,14 @@ LITTLE = replace(
     budget_scenes=("head_on_equal_e09",),
 )
 CUTS = "Scenes that are not evaluated up to the end of their exact answer"
-SAID = {"load": 0.0, "seconds": 1.0}
+HEADER = about("crosscheck speed", 0) | {"load": 0.0, "seconds": 1.0}
+PLAN = SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2)
 
 
 @pytest.fixture(scope="module")
 def measured() -> Measured:
     with Progress() as progress:
-        return Measuring(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), progress).run()
+        return Measuring(PLAN, progress).run()
 
 
 @pytest.fixture(scope="module")
@@ -70,29 +73,31 @@ def results(measured: Measured) -> Results:
     errors.loc[refused, ["status", "reason"]] = ["unsupported", "no <b>such</b> thing"]
     errors.loc[crashed, ["status", "reason"]] = ["crashed", "worker died: SIGSEGV"]
     errors.loc[refused | crashed, "error_radii"] = np.inf
-    samples = measured.samples
-    timed = (
-        (samples.scenario == SCENES[0])
-        & (samples.engine == "pymunk")
-        & (samples.profile == "shipped")
-    )
-    changed = replace(
-        measured, errors=errors, samples=samples[~(timed & (samples.kind == "scene"))]
-    )
-    return Results(SpeedPlan(SCENES, PLAYED, LITTLE, 0, 2), changed)
+    where = {"scenario": SCENES[0], "engine": "pymunk", "profile": "shipped", "kind": "scene"}
+    samples = measured.samples.drop(rows_of(measured.samples, **where).index)
+    return Results(PLAN, replace(measured, errors=errors, samples=samples))
+
+
+def rows_of(table: pd.DataFrame, **values: str) -> pd.DataFrame:
+    return table[(table[list(values)] == pd.Series(values)).all(axis=1)]
+
+
+@pytest.fixture
+def page(results: Results, tmp_path: Path) -> Path:
+    return written(results, tmp_path)
+
+
+def written(results: Results, folder: Path) -> Path:
+    path = folder / "speed.html"
+    write_page(path, results, HEADER)
+    return path
 
 
 def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
     with opening(tmp_path, SPEED) as store:
-        write_all(store, results, about("crosscheck speed", 0) | SAID)
-    samples, errors = (
-        pd.read_csv(tmp_path / f"speed_{name}.csv") for name in ("samples", "errors")
-    )
-    one = samples[
-        (samples.kind == "scene")
-        & (samples.engine == "event_driven")
-        & (samples.scenario == SCENES[0])
-    ]
+        write_all(store, results, HEADER)
+    samples, errors = (pd.read_csv(tmp_path / f"speed_{n}.csv") for n in ("samples", "errors"))
+    one = rows_of(samples, kind="scene", engine="event_driven", scenario=SCENES[0])
 
     assert sorted(one[one.copy_of == 1]["round"]) == [-1, 0, 1]
     assert (one.groupby(["dt_s", "copy_of"]).size() == 3).all()
@@ -100,19 +105,12 @@ def test_every_sample_and_every_error_is_kept(results: Results, tmp_path: Path):
 
 
 def test_errors_are_those_of_the_comparison(results: Results):
-    from crosscheck2d.adapters.engines import ENGINES
-    from crosscheck2d.reports.compare.comparison import compare
-
-    row = results.points[
-        (results.points.scenario == SCENES[0]) & (results.points.engine == "reference")
-    ].iloc[1]
+    row = rows_of(results.points, scenario=SCENES[0], engine="reference").iloc[1]
     scene = scenario(SCENES[0])
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", scene, row.dt_s)
     table = compare(scene, [run]).table
-    assert (
-        row.error
-        == table[(table.metric == "position_max_radii") & (table.versus == "truth")].value.iloc[0]
-    )
+    (value,) = rows_of(table, metric="position_max_radii", versus="truth").value
+    assert row.error == value
 
 
 def test_what_failed_is_named_beside_the_chart(results: Results):
@@ -139,11 +137,7 @@ def test_the_front_of_a_chart_is_the_event_driven_engine(results: Results):
     assert min(min(line.y) for line in lines if "event_driven" not in line.name) > LOWEST
 
 
-def test_the_page_of_speed_opens_with_which_engine_for_what(
-    browser: Browser, results: Results, tmp_path: Path
-):
-    page = tmp_path / "speed.html"
-    write_page(page, results, about("crosscheck speed", 0) | SAID)
+def test_the_page_of_speed_opens_with_which_engine_for_what(browser: Browser, page: Path):
     tab, heard = opened(browser, page.as_uri(), viewport={"width": 1280, "height": 900})
     top = tab.locator("#which table").bounding_box()
     rows = tab.locator("#which tbody th").all_inner_texts()
@@ -153,11 +147,7 @@ def test_the_page_of_speed_opens_with_which_engine_for_what(
 
     assert top is not None
     assert top["y"] < 450
-    assert [row.splitlines()[0] for row in rows] == [
-        "Single collisions",
-        "Crowds",
-        "Spin",
-    ]
+    assert [row.splitlines()[0] for row in rows] == ["Single collisions", "Crowds", "Spin"]
     assert len(costs) == 3 * len(PLAYED)
     assert any("crosscheck advise my_scene.toml --error 1%" in text for text in lead)
     assert heard == []
@@ -177,9 +167,8 @@ def test_times_that_mean_nothing_are_called_so(results: Results):
 
 
 def test_what_cannot_be_reached_is_above_what_costs(results: Results):
-    reached = results.reached[results.reached.scenario == SCENES[0]].set_index(
-        ["engine", "profile", "accuracy"]
-    )
+    reached = rows_of(results.reached, scenario=SCENES[0])
+    reached = reached.set_index(["engine", "profile", "accuracy"])
 
     assert reached.loc[("pymunk", "shipped", "10 %")].why == FAILED
     assert np.isfinite(reached.loc[("reference", "exercise", "1 %")].cost)
@@ -188,18 +177,14 @@ def test_what_cannot_be_reached_is_above_what_costs(results: Results):
 
 
 def test_a_random_scene_has_an_interval_over_its_seeds(results: Results):
-    row = results.points[
-        (results.points.scenario == "asteroids") & (results.points.engine == "reference")
-    ].iloc[0]
+    row = rows_of(results.points, scenario="asteroids", engine="reference").iloc[0]
 
     assert row.seeds == 3
     assert row.error_low < row.error < row.error_high
 
 
 def test_a_pooled_failure_counts_as_infinitely_wrong(results: Results):
-    row = results.pooled[
-        (results.pooled.engine == "pymunk") & (results.pooled.profile == "shipped")
-    ].iloc[0]
+    row = rows_of(results.pooled, engine="pymunk", profile="shipped").iloc[0]
 
     assert (row.failed, np.isinf(row.error_high)) == (1, True)
 
@@ -216,18 +201,16 @@ def test_every_option_of_an_engine_is_set_against_it_in_every_scene(results: Res
 
 def test_float32_breaks_what_it_must(results: Results):
     # Negative control of the option table: in a bouncing ball 2**-24 a step shows, and is not 1.
-    row = results.options[
-        (results.options.scenario == "bouncing_ball_e1") & (results.options.engine == "reference")
-    ]
+    row = rows_of(results.options, scenario="bouncing_ball_e1", engine="reference").iloc[0]
 
-    assert abs(row.error_ratio.iloc[0] - 1) > 1e-3
+    assert abs(row.error_ratio - 1) > 1e-3
 
 
 def test_a_sweep_meets_its_engine_where_it_is_matched(results: Results):
     # 10 iterations are what pymunk has as matched: the same error, to the bit, and 1 of 1 where all
     # are pooled.
     table = results.sweeps
-    here = table[(table.engine == "pymunk") & (table.scenario == "slide_on_incline")]
+    here = rows_of(table, engine="pymunk", scenario="slide_on_incline")
     turned = here[here.change == "10"].iloc[0]
     same = here[(here.change == "") & (here.dt_s == turned.dt_s)].iloc[0]
     pooled = results.pooled_sweeps
@@ -249,7 +232,7 @@ def test_the_cheapest_model_is_named_for_every_scene(results: Results):
 
 def test_figures_come_back_as_they_were_kept(results: Results, tmp_path: Path):
     path = tmp_path / "figures.csv"
-    figures.write(path, results, about("crosscheck speed", 0) | SAID)
+    figures.write(path, results, HEADER)
     kept = figures.ratios(figures.read(path))
 
     assert "# processor: " in path.read_text()
@@ -267,8 +250,6 @@ def test_a_ratio_that_drifts_beyond_the_gate_is_named():
 
 
 def test_the_kept_figures_have_every_ratio_that_is_gated():
-    from crosscheck2d.adapters.engines import ENGINES
-
     assert set(figures.ratios(figures.read())) == {
         (name, n)
         for name, row in ENGINES.items()
@@ -280,20 +261,18 @@ def test_the_kept_figures_have_every_ratio_that_is_gated():
 
 
 def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
-    rows = [
-        row for name in PLAYED if name in MECHANISMS for row in budget_of("gas_of_100", 0, name, 4)
-    ]
-    both = pd.concat(
-        [results.measured.budget, pd.DataFrame(rows, columns=results.measured.budget.columns)]
-    )
+    names = [name for name in PLAYED if name in MECHANISMS]
+    rows = [row for name in names for row in budget_of("gas_of_100", 0, name, 4)]
+    budget = results.measured.budget
+    both = pd.concat([budget, pd.DataFrame(rows, columns=budget.columns)])
     cut = Results(results.plan, replace(results.measured, budget=both))
-    whole, shorter = (page_of(each, tmp_path) for each in (results, cut))
+    whole, shorter = (unescape(written(each, tmp_path).read_text()) for each in (results, cut))
     (gas,) = cut_scenes(cut.explained).itertuples()
 
-    for page in (whole, shorter):
-        assert said_of_pool(results.pooled) in page
+    for text in (whole, shorter):
+        assert said_of_pool(results.pooled) in text
         assert "pymunk:shipped 1" in said_of_pool(results.pooled)
-        assert 'id="versus"' in page
+        assert 'id="versus"' in text
     assert f"gas_of_100 at {gas.until_s:.2g} of {gas.horizon_s:.2g} s" in shorter
     assert CUTS in shorter
     assert "1 scene is cut" in shorter
@@ -301,29 +280,19 @@ def test_the_page_says_what_is_left_out(results: Results, tmp_path: Path):
     assert CUTS not in whole
 
 
-def page_of(results: Results, folder: Path) -> str:
-    path = folder / "speed.html"
-    write_page(path, results, about("crosscheck speed", 0) | SAID)
-    return unescape(path.read_text())
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (400, "dark")])
 def test_the_page_opens_every_scene_and_asks_nothing_of_anywhere(
-    browser: Browser, results: Results, tmp_path: Path, width: int, scheme: str
+    browser: Browser, page: Path, width: int, scheme: str
 ):
-    page = tmp_path / "speed.html"
-    write_page(page, results, about("crosscheck speed", 0) | SAID)
-    tab, heard = opened(
-        browser, page.as_uri(), viewport={"width": width, "height": 900}, color_scheme=scheme
-    )
+    size = {"width": width, "height": 900}
+    tab, heard = opened(browser, page.as_uri(), viewport=size, color_scheme=scheme)
     assert tab.locator("main svg").count() == 3  # pooled, sweeps, sizes
     for scene in SCENES:
         tab.locator(f"#{scene} button.open").click()
         tab.locator(f"#{scene} + tr.opened svg").wait_for()  # a row is unpacked after the click
     assert tab.locator("main svg").count() == 3 + len(SCENES)
-    assert (
-        tab.get_by_text("where the exact answer ends").count() == 1
-    )  # the asteroids' answer ends before they do
+    # the asteroids' answer ends before they do
+    assert tab.get_by_text("where the exact answer ends").count() == 1
     assert overhang(tab) <= 0
     tab.locator("#budget summary").click()
     # with mechanisms: three engines; two disabled; the row of a scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from time import sleep
 
 import numpy as np
@@ -12,14 +13,9 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.run.stepping import Spent
-from crosscheck2d.reports.run.timing import (
-    FEWEST_ROUNDS,
-    WARM_UP,
-    Sample,
-    Timed,
-    interleaved,
-)
+from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
+from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, Spent
+from crosscheck2d.reports.run.timing import FEWEST_ROUNDS, WARM_UP, Sample, Timed, interleaved
 from crosscheck2d.reports.speed import ladder, sizes
 from crosscheck2d.reports.speed.ladder import scored
 from crosscheck2d.reports.speed.measure import IN_PILE, Measured, samples_table
@@ -41,23 +37,25 @@ def table(samples: list[Sample]) -> pd.DataFrame:
     return pd.DataFrame([sample._asdict() for sample in samples])
 
 
+def timed(rounds: int, budget: float, *sleepers: partial) -> pd.DataFrame:
+    """A row of `summed_up` for each of these, in `near_miss`."""
+    engines = {("sleeper:own", 1, k): make for k, make in enumerate(sleepers)}
+    return summed_up(table(ladder.times_of("near_miss", 0, engines, rounds, budget)), ["key"])
+
+
 def test_an_engine_that_sleeps_a_fixed_time_costs_that_time():
     # Loading takes five times as long as a step, and hearing of collisions fifty times: neither is
     # in it.
     part = scored("near_miss", 0).scenario
     steps = part.intervals
-    samples = ladder.times_of(
-        "near_miss", 0, {("sleeper:own", 1, 0): partial(Sleeper, EACH)}, 3, 1.0
-    )
-    best = summed_up(table(samples), ["key"]).best.iloc[0]
+    best = timed(3, 1.0, partial(Sleeper, EACH)).best.iloc[0]
 
     assert steps * EACH / part.duration <= best <= (1 + SLACK) * steps * EACH / part.duration
 
 
 def test_what_wrapping_in_python_took_is_given_separately():
     # A quarter of each step goes into wrapping: it is left out of the cost, and reported beside it.
-    engines = {("sleeper:own", 1, 0): partial(Sleeper, EACH, EACH / 4)}
-    row = summed_up(table(ladder.times_of("near_miss", 0, engines, 3, 1.0)), ["key"]).iloc[0]
+    row = timed(3, 1.0, partial(Sleeper, EACH, EACH / 4)).iloc[0]
 
     rate = scenario("near_miss").intervals / scenario("near_miss").duration
     assert row.wrapping == pytest.approx(rate * EACH / 4)
@@ -67,8 +65,7 @@ def test_what_wrapping_in_python_took_is_given_separately():
 def test_an_engine_against_itself_reads_one():
     # The noise floor of two sleepers is the clock's own: sleeping is never early, and the fastest
     # is on time.
-    engines = {("sleeper:own", 1, copy): partial(Sleeper, EACH) for copy in (0, 1)}
-    best = summed_up(table(ladder.times_of("near_miss", 0, engines, 15, 3.0)), ["key"]).best
+    best = timed(15, 3.0, *[partial(Sleeper, EACH)] * 2).best
 
     assert best[1] / best[0] == pytest.approx(1.0, abs=0.05)
 
@@ -86,11 +83,8 @@ def test_every_round_visits_all_in_an_order_of_its_own_and_keeps_every_sample():
 
 def test_what_is_slow_sits_out_the_rounds_left_but_not_the_first():
     # Its time is used up after one sample; the other goes on.
-    rounds = (
-        table(interleaved([fixed(0.1), fixed(9.0)], 8, 1.0, seed=0))
-        .groupby("key")["round"]
-        .agg(list)
-    )
+    samples = table(interleaved([fixed(0.1), fixed(9.0)], 8, 1.0, seed=0))
+    rounds = samples.groupby("key")["round"].agg(list)
 
     assert rounds["9.0"] == list(range(WARM_UP, FEWEST_ROUNDS))
     assert rounds["0.1"] == list(range(WARM_UP, 8))
@@ -202,25 +196,10 @@ def test_a_settled_pile_costs_less_asleep_and_nothing_in_it_moves():
 
 
 def test_a_settled_pile_is_a_row_awake_and_asleep():
-    rows = [
-        {"kind": IN_PILE, "engine": "a", "profile": "b", "change": change, "n": 100, "cost": cost}
-        for change, cost in (("", 2e-5), ("sleeping", 1e-6))
-    ]
-    samples = samples_table(
-        [
-            {
-                "round": 0,
-                "wrapping": 0.0,
-                "runs": 1,
-                "dt_s": 0.0,
-                "copy_of": 0,
-                "place": 0,
-                "scenario": "",
-                **row,
-            }
-            for row in rows
-        ]
-    )
+    known = dict.fromkeys(("dt_s", "copy_of", "place", "round", "wrapping"), 0)
+    known |= {"kind": IN_PILE, "engine": "a", "profile": "b", "n": 100, "runs": 1}
+    costs = (("", 2e-5), ("sleeping", 1e-6))
+    samples = samples_table([known | {"change": change, "cost": cost} for change, cost in costs])
 
     (row,) = pile(Measured(samples=samples)).to_dict("records")
     assert row == {"name": "a:b", "n": 100, "": 20.0, "sleeping": 1.0}
@@ -246,3 +225,22 @@ def test_the_gas_of_any_size_covers_the_same_share_and_overlaps_nowhere():
         assert apart.min() > 2 * sizes.RADIUS
         assert scene.position.min() > sizes.RADIUS
         assert scene.position.max() < side - sizes.RADIUS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "measured"),
+    [("walls gravity", {READ}), ("walls gravity static", {EMPTY, CALL, READ})],
+)
+def test_what_a_file_refuses_is_not_timed(words: str, measured: set[str], tmp_path: Path):
+    # Its steps in the scene are; the empty step needs a disk that cannot move.
+    path = tmp_path / "ball.js"
+    line = 'models = "disks walls gravity static forces rotation wrap"'
+    text = TEMPLATES["javascript"].read_text()
+    assert line in text
+    path.write_text(text.replace(line, f'models = "{words}"'))
+    make, who = row_of_file(path).make, "ball"
+    samples = ladder.times_of("bouncing_ball_e09", 0, {(who, 1, 0): make}, 1, 0.1, also={who: make})
+
+    assert {sample.key for sample in samples} == {(who, 1, 0), *((who, each) for each in measured)}
+    assert all(sample.cost > 0 for sample in samples)
