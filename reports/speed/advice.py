@@ -93,7 +93,6 @@ class Attempt:
 
     @property
     def is_library(self) -> bool:
-        """Whether the engine is not a solver of this project."""
         return row_of(self.name).outside or self.name.endswith(OWN)
 
     @property
@@ -103,11 +102,9 @@ class Attempt:
         return sorted(self.starts)[count - 1] if count else nan
 
     def kept_in(self, bound: float) -> int:
-        """From how many of the starts it keeps the error."""
         return sum(error <= bound for error in self.starts)
 
     def holds(self, bound: float) -> bool:
-        """Whether it keeps the error in the scene itself and from nine tenths of the starts."""
         return self.error <= bound and self.kept_in(bound) >= NINE_TENTHS * len(self.starts)
 
 
@@ -121,7 +118,6 @@ class Question(NamedTuple):
     bound: float
 
     def play(self, attempt: Attempt) -> Attempt:
-        """The attempt from the beginning of the scene up to the horizon."""
         return self.play_part(scored(self.scene, self.seed), attempt)
 
     def play_part(self, part: Scored, attempt: Attempt) -> Attempt:
@@ -254,14 +250,12 @@ class Advice:
 
     @property
     def judged(self) -> str:
-        """The part of the scene in which errors are judged, as the end of a sentence."""
         early = self.until < self.duration and not self.collisions
         part = f"up to {number(self.until)} of {number(self.duration)} s"
         return f"{part}, before any collision" if early else part
 
     @property
     def quiet(self) -> bool:
-        """Whether its times can be compared."""
         return self.noise <= LOUD and not self.busy > BUSY
 
     @property
@@ -312,7 +306,6 @@ class Inquiry:
 
     @property
     def ladder(self) -> tuple[int, ...]:
-        """Steps in a sample interval, coarse to fine."""
         scenario = self.part.scenario
         return doublings(scenario, MOST_WORK // max(scenario.scene.n, FEW))
 
@@ -364,7 +357,6 @@ class Inquiry:
         return replace(advice, statistics=averages.advise(libraries))
 
     def attempts(self, asked: Iterable[tuple[str, str, int]]) -> list[Attempt]:
-        """(`engine:profile`, change, substeps) played, in their order; each in a worker process."""
         dt = self.part.scenario.dt
         wanted = [Attempt(name, change, k, dt(k), nan) for name, change, k in asked]
         return [
@@ -375,8 +367,6 @@ class Inquiry:
         ]
 
     def from_every_start(self, wanted: Sequence[Attempt], every: int = 1) -> list[Attempt]:
-        """The attempts with their errors from every `every`-th of the starts within a step, and
-        until when nine tenths of these keep the bound."""
         play = partial(self.question.play_starts, every=every)
         what = f"playing from {STARTS // every} instants of a step"
         return [
@@ -398,7 +388,6 @@ class Inquiry:
     def outcomes(
         self, wanted: Sequence[Attempt], play: Callable[[Attempt], Attempt], what: str
     ) -> list[tuple[Attempt, Attempt | Failure]]:
-        """Each attempt, in order, with what a worker process makes of it."""
         tasks = {attempt.task: partial(play, attempt) for attempt in wanted}
         results = dict(done(tasks, self.workers, self.progress, what, PATIENCE))
         return [(attempt, results[attempt.task]) for attempt in wanted]

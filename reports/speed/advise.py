@@ -76,8 +76,6 @@ def bound_of(error: str) -> float:
 
 
 def snippet_of(advice: Advice, scene: str, seed: int) -> str:
-    """Code with the settings of the library that is advised first, in the scene itself or, where
-    none is, for its averages; "" if none is."""
     ranked = [*advice.ranked, *(advice.statistics.ranked if advice.statistics else ())]
     for _, attempt in ranked:
         if attempt.is_library:
@@ -152,22 +150,15 @@ def finite(value: float) -> float | None:
 
 def print_advice(advice: Advice, snippet: str = "") -> None:
     console = Console()
-    console.print(
-        f"{advice.scene}: {PURPOSES[advice.purpose].what}, at most {number(advice.bound)},"
-        f" {advice.judged}",
-        highlight=False,
-    )
-    console.print()
+    question = f"{PURPOSES[advice.purpose].what}, at most {number(advice.bound)}"
+    console.print(f"{advice.scene}: {question}, {advice.judged}\n", highlight=False)
     if advice.keeping and not advice.quiet:  # before the costs that it concerns
         console.print(f"{sentence_on_times(advice)}\n", highlight=False)
     for group in (LIBRARIES, OWN_SOLVERS):
         print_group(console, advice, group)
     if advice.partial:
-        print_texts(
-            console,
-            {one.name: one.reason for one in advice.partial},
-            "Not advised: what goes wrong in the whole scene",
-        )
+        reasons = {attempt.name: attempt.reason for attempt in advice.partial}
+        print_texts(console, reasons, "Not advised: what goes wrong in the whole scene")
         console.print()
     if advice.short:
         print_texts(console, {row.best.name: row.reason for row in advice.short}, "Why")
@@ -184,24 +175,21 @@ def print_advice(advice: Advice, snippet: str = "") -> None:
 def print_group(console: Console, advice: Advice, group: str) -> None:
     """Print the libraries, or the solvers of this project: those that keep the error, and until
     when the others do; and where no library does, which do for averages over time."""
-
-    def member(one: Attempt) -> bool:
-        return one.is_library is (group == LIBRARIES)
-
-    ranked = [(rank, one) for rank, one in advice.ranked if member(one)]
-    short = [row for row in advice.short if member(row.best)]
-    partial = any(member(one) for one in advice.partial)
+    library = group == LIBRARIES
+    ranked = [(rank, each) for rank, each in advice.ranked if each.is_library is library]
+    short = [row for row in advice.short if row.best.is_library is library]
+    partial = any(attempt.is_library is library for attempt in advice.partial)
     if ranked:
         print_choices(console, advice, ranked, group)
     elif short or partial:
+        engine = "library" if library else "solver of this project"
         right = " that is right in the whole scene" if partial else ""
-        one = ("library" if group == LIBRARIES else "solver of this project") + right
-        console.print(f"No {one} keeps this error at any step size tried.", style="bold")
+        console.print(f"No {engine}{right} keeps this error at any step size tried.", style="bold")
     if short:
         print_short(console, advice, short, group)
     if ranked or short or partial:
         console.print()
-    if group == LIBRARIES and advice.statistics is not None:
+    if library and advice.statistics is not None:
         statistics = advice.statistics
         console.print(
             f"Averages over time need less: `--for {STATISTICS}` (energies, distance from the"
@@ -216,41 +204,32 @@ def print_group(console: Console, advice: Advice, group: str) -> None:
 def print_choices(
     console: Console, advice: Advice, ranked: Sequence[tuple[int, Attempt]], group: str
 ) -> None:
-    """The first `SHOWN` ranks, and the names and costs of the others; no ranks where times cannot
-    be compared."""
-    shown = [(rank, one) for rank, one in ranked if rank <= SHOWN]
     rows = [
-        [
-            str(rank) if advice.quiet else "–",
-            one.name,
-            number(one.dt * 1e3),
-            number(one.error),
-            number(one.usually),
-            number(one.cost * 1e6),
-        ]
-        for rank, one in shown
+        [str(rank) if advice.quiet else "–", each.name]
+        + [number(value) for value in (each.dt * 1e3, each.error, each.usually, each.cost * 1e6)]
+        for rank, each in ranked
+        if rank <= SHOWN
     ]
     headings = ["", "engine", "dt, ms", "error", "9 of 10\nwithin", "µs per\nsimulated s"]
-    title = f"{group.capitalize()}, cheapest first, in the whole scene"
+    title = f"{group.capitalize()}, cheapest first"
     if advice.until < advice.duration:
-        title = (
-            f"{group.capitalize()}, cheapest first: error {advice.judged}; cost of the whole scene"
-        )
+        title += f": error {advice.judged}; cost of the whole scene"
+    else:
+        title += ", in the whole scene"
     print_table(console, headings, rows, title)
     console.print(
         f"9 of 10 within: the error of nine tenths of runs from {STARTS} instants of a step.",
         highlight=False,
     )
-    if dearer := ranked[len(shown) :]:
-        names = ", ".join(f"{one.name} ({number(one.cost * 1e6)} µs)" for _, one in dearer)
+    if dearer := ranked[len(rows) :]:
+        names = ", ".join(f"{each.name} ({number(each.cost * 1e6)} µs)" for _, each in dearer)
         console.print(f"Also within it: {names}.", highlight=False)
 
 
 def print_short(
     console: Console, advice: Advice, rows_short: Sequence[OutOfReach], group: str
 ) -> None:
-    """Print how near the engines come that do not keep the error; and of one that only grows until
-    when they keep it, at the usual step size of the scene and at the one that keeps it longest."""
+    # how near they come; and of an error that only grows until when they keep it
 
     def until(one: Attempt) -> list[str]:
         return ["–" if isnan(t) else number(t) for t in (one.until, one.lasting)] + [ms(one.dt)]

@@ -120,7 +120,6 @@ def budget_of(scene: str, seed: int, name: str, substeps: int) -> list[dict[str,
 
 
 def window_of(scene: str, seed: int, substeps: int) -> Window:
-    """The scene up to where end-of-step detection alone puts a disk farther off than `LIMIT`."""
     scenario, truth = scored(scene, seed)
     whole = Window(scenario, truth, scenario.dt(substeps))
     late = whole.played(partial(with_mechanisms, [])).trajectory
@@ -134,8 +133,6 @@ def window_of(scene: str, seed: int, substeps: int) -> Window:
 
 @dataclass(frozen=True)
 class Window:
-    """A scenario, its truth in all of it, and a dt in s."""
-
     scenario: Scenario
     truth: Trajectory
     dt: float
@@ -211,7 +208,6 @@ class Budget:
         }
 
     def contribution(self, mechanism: Mechanism) -> Offset:
-        """In the reference with end-of-step detection, on top of the mechanisms it acts on."""
         below = [each for each in self.mechanisms if each.name in mechanism.on_top]
         return self.reference([*below, mechanism]) - self.reference(below)
 

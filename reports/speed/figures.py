@@ -76,7 +76,6 @@ def figures(results: Results) -> pd.DataFrame:
 
 
 def write(path: Path, results: Results, header: Mapping[str, Any]) -> None:
-    """As CSV, below comment lines with the machine, the versions and how quiet the machine was."""
     noise = results.noise_floor()
     about = {
         "command": header["command"],
@@ -132,8 +131,6 @@ def ratios(kept: pd.DataFrame) -> dict[tuple[str, int], float]:
 def drifted(
     kept: Mapping[tuple[str, int], float], fresh: Mapping[tuple[str, int], float]
 ) -> list[str]:
-    """A sentence for every ratio that differs from the kept one by more than `LOOSE`, or that
-    only one of the two tables has."""
     sentences = [
         f"{name}, {n} disks: only one of the two has it"
         for name, n in sorted(set(kept) ^ set(fresh))

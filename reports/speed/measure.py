@@ -66,7 +66,6 @@ class Kept:
         return digest(f"{self.plan} {json.dumps(task)}".encode())
 
     def get(self, task: tuple[Any, ...]) -> Any:
-        """The result of the task; None if it has none."""
         row = self.store.get(TASK, self.key(task))
         if row is None:
             return None
@@ -116,7 +115,6 @@ class Measuring:
     measured: Measured = field(default_factory=Measured)
 
     def run(self) -> Measured:
-        """Both passes of the plan; none where no scene has an exact answer."""
         reach = self.find_reach()
         measurements = list(self.plan.measurements(reach))
         if any(measurement.kind == SCENE for measurement in measurements):
@@ -158,7 +156,6 @@ class Measuring:
         return played
 
     def measure_budget(self, reach: Reach) -> None:
-        """The error budgets of the engines whose mechanisms are known, at the middle dt."""
         seed = self.plan.seed
         tasks = {
             ("budget", scene, name): partial(budget.budget_of, scene, seed, name, middle(scene))
@@ -174,8 +171,6 @@ class Measuring:
         self.measured.budget = pd.DataFrame(chain.from_iterable(rows), columns=budget.COLUMNS)
 
     def measure_times(self, played: Sequence[Measurement]) -> None:
-        """The cost of everything that was played to the end, in one process and one thing at a
-        time."""
         self.measured.busy = busy_cores()
         tasks = timings(self.plan, played)
         results = dict(done(tasks, 1, self.progress, "time", ALL_ROUNDS, self.kept))

@@ -236,7 +236,6 @@ class SpeedPlan:
 
 
 def middle(scene: str) -> int:
-    """Steps in a sample interval at the dt that the report shows."""
     return open_scene(scene, 0).middle_substeps
 
 

@@ -93,7 +93,6 @@ class Results:
 
     @property
     def files(self) -> dict[str, pd.DataFrame]:
-        """The tables, by the names of their CSV files."""
         measured = ("samples", "errors", "budget")
         tables = {"speed": self.points} | {f"speed_{name}": getattr(self, name) for name in TABLES}
         tables |= {f"speed_{name}": getattr(self.measured, name) for name in measured}

@@ -63,7 +63,6 @@ def pile(n: int) -> Scene:
 def pile_costs(
     engines: Mapping[tuple[str, str], Make], rounds: int, budget: float, seed: int
 ) -> list[Sample]:
-    """Samples in s a step of a pile of `PILE` disks that has settled, by the key of the engine."""
     piles = {key: RunningGas(make(), pile(PILE), SETTLED) for key, make in engines.items()}
     timed = [Timed(key, running, running.steps) for key, running in piles.items()]
     samples = interleaved(timed, rounds, budget, seed)

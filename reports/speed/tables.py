@@ -250,8 +250,6 @@ def pooled_reached(part: pd.DataFrame, found: pd.DataFrame) -> pd.DataFrame:
 
 
 def noise(measured: Measured) -> pd.DataFrame:
-    """A row for each scenario and engine: ratio of the median costs of an engine and its copy in
-    the same rounds."""
     samples = measured.samples[measured.samples.kind == SCENE]
     both = (
         summed_up(samples, [*HERE, "dt_s", "copy_of"])
