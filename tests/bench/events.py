@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -54,14 +55,7 @@ def rate(n: int, packing: float, collisions: int) -> tuple[float, float]:
 
 def in_a_box(n: int, packing: float) -> Scene:
     scene, torus = gas(n, packing)
-    return Scene(
-        position=scene.position,
-        velocity=scene.velocity,
-        radius=scene.radius,
-        mass=scene.mass,
-        restitution=1.0,
-        walls=box(torus[0] - 0.5, torus[1] + 0.5),
-    )
+    return replace(scene, walls=box(torus[0] - 0.5, torus[1] + 0.5))
 
 
 def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, float]:
@@ -70,18 +64,11 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
     import billiards
 
     (left, bottom), (right, top) = scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))
-    other = billiards.Billiard(
-        [
-            billiards.InfiniteWall((left, bottom), (right, bottom)),
-            billiards.InfiniteWall((right, bottom), (right, top)),
-            billiards.InfiniteWall((right, top), (left, top)),
-            billiards.InfiniteWall((left, top), (left, bottom)),
-        ]
-    )
-    for position, velocity, radius, mass in zip(
-        scene.position, scene.velocity, scene.radius, scene.mass
-    ):
-        other.add_ball(position, velocity, radius, mass)
+    corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
+    ends = zip(corners, corners[1:] + corners[:1])
+    other = billiards.Billiard([billiards.InfiniteWall(start, end) for start, end in ends])
+    for ball in zip(scene.position, scene.velocity, scene.radius, scene.mass):
+        other.add_ball(*ball)
     started = perf_counter()
     theirs = [(t, i, j) for t, i, j in other.evolve(until) if isinstance(j, int | np.integer)]
     slow = perf_counter() - started
@@ -91,27 +78,18 @@ def against_billiards(scene: Scene, until: float) -> tuple[float, float, int, fl
         started = perf_counter()
         engine.advance(until)
         fast = min(fast, perf_counter() - started)
-    ours = [
-        tuple(collision)
-        for collision in engine.collisions[engine.collisions[:, 2] >= 0][:, :3].tolist()
-    ]
-    same = 0
-    while same < min(len(ours), len(theirs)) and {*ours[same][1:]} == {
-        *map(float, theirs[same][1:3])
-    }:
-        same += 1
-    return slow, fast, len(engine.collisions), ours[same - 1][0] if same else 0.0
+    ours = engine.collisions[engine.collisions[:, 2] >= 0][:, :3].tolist()
+    same = 0.0
+    for (t, *mine), (_, *other_pair) in zip(ours, theirs):
+        if {*mine} != {*map(float, other_pair)}:
+            break
+        same = t
+    return slow, fast, len(engine.collisions), same
 
 
 def alone(code: str, **environment: str) -> float:
-    ran = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return float(ran.stdout)
+    env = os.environ | environment
+    return float(subprocess.check_output([sys.executable, "-c", code], env=env, text=True))
 
 
 def memory() -> float:

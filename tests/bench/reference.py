@@ -16,8 +16,6 @@ measures some ratios anew.
 from __future__ import annotations
 
 import csv
-import subprocess
-import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -37,6 +35,7 @@ from crosscheck2d.reference_impl import exercise, neighbours, ordered
 from crosscheck2d.reports.run.machine import about, busy_cores
 from crosscheck2d.scenarios.model import Scene
 from tests.adapters.event_driven.gases import boxed_asteroids, boxed_gas
+from tests.bench.events import alone
 from tests.reference_impl.test_ordered import CASES, off
 
 Step = Callable[[int], object]  # advances so many steps
@@ -182,15 +181,6 @@ def status(key: str) -> float:
     return 1024.0 * float(line.split()[1])
 
 
-def memory(n: int) -> float:
-    code = f"from tests.bench.reference import added; print(added({n}))"
-    return float(
-        subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout
-    )
-
-
 def gases() -> Iterator[Figure]:
     for n in (20, 100, 1000):
         yield from compared("gas", n, engines(boxed_gas(n, 0.3), DT), LEAST if n == 1000 else {})
@@ -206,8 +196,9 @@ def sizes() -> Iterator[Figure]:
     # 1.1 to 1.3 in five runs, 1.7 on a machine with smaller caches: the fastest of so many disks is
     # faster, so that a disk has 1.4 near pairs instead of 0.4, and a new list no longer fits
     yield Figure("gas", SIZES[-1], f"disk and step over one of {SIZES[0]}", ratio, at_most=1.6)
+    code = "from tests.bench.reference import added; print(added({}))"
     for n in (SIZES[-1], HUGE):
-        yield Figure("gas", n, "memory a disk", memory(n), unit="B", at_most=300.0)
+        yield Figure("gas", n, "memory a disk", alone(code.format(n)), unit="B", at_most=300.0)
 
 
 def first_of(scene: Scene, n: int) -> Scene:
@@ -261,20 +252,12 @@ def in_order() -> Iterator[Figure]:
         yield Figure(scene, 21, "largest error", max(errors), unit="m", at_most=1e-6)
 
 
-def header() -> str:
-    saved = about("python -m tests.bench.reference", 0)
-    lines = {
-        "started": saved["started"],
-        **saved["machine"],
-        **saved["versions"],
-        "busy cores": f"{busy_cores():.2f}",
-    }
-    return "".join(f"# {key}: {value}\n" for key, value in lines.items())
-
-
 def main() -> None:
+    header = about("python -m tests.bench.reference", 0)
+    lines = {"started": header["started"], **header["machine"], **header["versions"]}
+    lines["busy cores"] = f"{busy_cores():.2f}"
     with FIGURES.open("w", newline="", encoding="utf-8") as file:
-        file.write(header())
+        file.writelines(f"# {key}: {value}\n" for key, value in lines.items())
         table = csv.writer(file, lineterminator="\n")
         table.writerow(Figure._fields)
         for part in (gases, small, sizes, in_order):
