@@ -142,7 +142,6 @@ class CollisionOrder:
         return found
 
     def begin(self, t: float) -> None:
-        """Put each disk on its latest leg that begins before `t` s."""
         while self.begun < len(self.legs) and (row := self.legs[self.begun])[0] < t:
             self.now[int(row[1])] = row
             self.begun += 1
@@ -182,14 +181,13 @@ class CollisionOrder:
         return Near(contact, way, max(closing, 0.0))
 
     def held(self, i: int) -> tuple[Contact, ...]:
-        """The contacts on which disk i rests."""
         return self.path.legs[i][self.tangents.leg[i]].held
 
     def outcomes(
         self, near: list[Near], t: float
     ) -> tuple[list[TieOutcome], list[list[tuple[int, int]]]]:
-        """The outcomes of these contacts over all orders, as `CollisionLaw.outcomes`, without those
-        from which no disk diverges until the end; and the collisions of each, as `Path.named`."""
+        """Over all orders; without those from which no disk diverges until the end. And
+        `Path.named`."""
         k, scene = digits(BITS), self.scene
         with k.precise():
             bodies, v, ends = Bodies(scene, k), Velocities(), list[TieOutcome]()

@@ -72,8 +72,8 @@ class TruthRecord:
     def motion(
         self, scene: Scene, thrusts: Sequence[Thrust], t: Array
     ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Position and velocity (k, n, 2) m, m/s, and angle and spin (k, n) rad, rad/s, at the
-        times t (k,) s before the horizon."""
+        """Position and velocity, and angle and spin, (k, n, ...) each, at t (k,) s before the
+        horizon."""
         position, velocity = np.empty((len(t), scene.n, 2)), np.empty((len(t), scene.n, 2))
         turning = world_thrusts(scene, [replace(p, force=np.zeros(2)) for p in thrusts], t)
         angle, spin = turning.angle.copy(), turning.angular_velocity.copy()
@@ -95,8 +95,6 @@ class TruthRecord:
         return (position, velocity), (angle, spin)
 
     def sampled(self, scene: Scene, thrusts: Sequence[Thrust], t: Array) -> Trajectory:
-        """The motion at the times t (k,) s up to where it is known, and to the horizon of float64;
-        later times are left out."""
         t = np.asarray(t, float)
         moved, turned = self.motion(scene, thrusts, t)
         # A disk that rests on a wall from the start has a contact without impulse at t = 0. One
@@ -167,7 +165,6 @@ def powers(e: float, k: Array | int) -> Array:
 
 
 def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: str) -> TruthRecord:
-    """The record of a path whose error is at most `error` m up to its end."""
     until, path = float64_horizon(scenario, within_float64(scenario, path, error))
     end = min(path.end, scenario.duration) if path.reason else np.inf
     if method == CERTIFIED and path.searched < end:
@@ -233,7 +230,6 @@ def last_time(holds: Callable[[float], bool], end: float) -> float:
 
 
 def legs_of(path: Path, end: float) -> Array:
-    """The legs of a path that begin before `end` s, (l, 15) as in `TruthRecord.legs`."""
     flights = [
         (i, leg)
         for i, legs in enumerate(path.legs)
@@ -281,7 +277,6 @@ def _row(event: Event) -> list[float]:
 
 
 def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
-    """The legs with bounces, each with the time, s, at which it ends."""
     for k in np.flatnonzero(legs[:, SPEED] > 0):
         follows = k + 1 < len(legs) and legs[k + 1, DISK] == legs[k, DISK]
         yield legs[k], min(end, legs[k + 1, T] if follows else np.inf)
@@ -311,8 +306,6 @@ def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]
 
 
 def wall_of_bounces(scene: Scene, leg: Array, place: Array) -> int:
-    """The wall on which the disk of a leg bounces at `place` (2,) m: the nearest one parallel to
-    the leg."""
     span, (_, distance) = scene.walls[:, 1] - scene.walls[:, 0], nearest(place[None], scene.walls)
     slope = np.abs((span * leg[NORMAL]).sum(axis=1)) / np.hypot(*span.T)
     return int(np.argmin(np.abs(distance[0] - scene.radius[int(leg[DISK])]) + slope))

@@ -87,7 +87,6 @@ class Motion:
         }
 
     def run(self) -> Path:
-        """The motion up to `until`, or up to where it has no exact answer."""
         try:
             self.begin()
             while self.advance():
@@ -106,7 +105,6 @@ class Motion:
         return self.path
 
     def begin(self) -> None:
-        """Begin the thrusts of t = 0, find the disks that rest, and predict all."""
         while self.starts_and_stops and self.starts_and_stops[-1][0] == 0:
             self.set_thrusts(self.starts_and_stops.pop()[1])
         for contact in lie_down(self.finder):
@@ -114,7 +112,6 @@ class Motion:
         self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
 
     def advance(self) -> bool:
-        """Carry out the next event; False if there is none before `until`."""
         soonest = self.due.min()
         if self.starts_and_stops and self.starts_and_stops[-1][0] <= soonest:
             t, disk = self.starts_and_stops.pop()
@@ -161,7 +158,6 @@ class Motion:
         return first, list(once.values())
 
     def record(self, i: int) -> Record:
-        """The record of a disk that is due."""
         record = self.records[i]
         assert record is not None
         return record
@@ -180,7 +176,6 @@ class Motion:
             raise
 
     def stale(self, record: Record) -> bool:
-        """Whether a partner has had an event since the record was made."""
         counts = self.bodies.count
         return any(
             c.kind == "body" and counts[c.j] != then
@@ -188,7 +183,6 @@ class Motion:
         )
 
     def predict(self, i: int) -> None:
-        """Find the next contact of disk i."""
         k = self.k
         if self.bodies.jet[i] is not None:
             return self.probe(Contact("probe", i, i))
@@ -220,7 +214,6 @@ class Motion:
             self.expect(i, self.now if at_once else self.now + after, contacts)
 
     def expect(self, i: int, t: Number, contacts: tuple[Contact, ...]) -> None:
-        """Set the record of disk i."""
         counts = self.bodies.count
         self.records[i] = Record(
             t, contacts, tuple(counts[c.j] if c.kind == "body" else 0 for c in contacts)
@@ -228,7 +221,6 @@ class Motion:
         self.due[i] = float(t) if float(t) <= self.until else np.inf
 
     def press(self, contact: Contact) -> None:
-        """Begin a lasting contact: from now on the disk rests on the wall."""
         if not press(self.finder, contact, self.now):
             if self.join(contact):
                 return
@@ -241,7 +233,7 @@ class Motion:
         self.follow_up({contact.i})
 
     def join(self, contact: Contact) -> bool:
-        """Let the disks that forces keep in contact move as one from now on; False if none do."""
+        """Let the disks that forces keep in contact move as one; False if none do."""
         bodies, before = self.bodies, {key(c) for held in self.bodies.held for c in held}
         groups = lasting(self.finder, contact, self.now)
         for group in groups:
@@ -260,8 +252,8 @@ class Motion:
         return bool(groups)
 
     def ungroup(self, disks: set[int]) -> set[int]:
-        """Let the disks that move as one with these go on by themselves, each on the wall that it
-        is pressed onto; those disks."""
+        """Let these disks' groups go on one by one, each on the wall it is pressed onto; those
+        disks."""
         bodies, k = self.bodies, self.k
         members = disks.union(*(bodies.group[i] for i in disks))
         pairs = {key(c): c for i in members for c in bodies.held[i] if bodies.group[i]}
@@ -288,7 +280,6 @@ class Motion:
         return members
 
     def collide(self, contacts: list[Contact]) -> None:
-        """Resolve the contacts of one instant; if their order matters there is no exact answer."""
         self.refuse_corners(contacts)
         alone = len(contacts) == 1 and self.finder.alone(contacts[0], float(self.now))
         if alone:
@@ -353,12 +344,9 @@ class Motion:
         self.go_on(limit, touches, disks, None, first if rolls else None)
 
     def other_side(self, contact: Contact, i: int) -> str:
-        """The other side of a contact of disk i, in words."""
         return self.bodies.name(contact) if contact.i == i else f"disk {contact.i}"
 
     def refuse_corners(self, contacts: Sequence[Contact]) -> None:
-        """Raise `MotionEnds` if a disk reaches an edge of the wrap or the end of its wall, or stops
-        sliding, at the instant at which it touches another."""
         comes = {
             "edge": "reaches the edge of the wrap",
             "end": "reaches the end of wall {}",
@@ -371,13 +359,11 @@ class Motion:
                 raise MotionEnds(float(self.now), reason, [contact.i])
 
     def after_one(self, touch: Touch, v: Velocities) -> TieOutcome:
-        """The outcome of a single contact."""
         law = self.bodies.law
         after, collision = law.collide(touch, v)
         return TieOutcome(after, [collision], frozenset([touch.contact] if law.sticks else ()))
 
     def after_all(self, touches: Sequence[Touch], v: Velocities) -> TieOutcome:
-        """The outcome of contacts at one instant, if it is the same in every order."""
         bodies = self.bodies
         resting = frozenset(contact for held in bodies.held for contact in held)
         ends, tried = bodies.law.outcomes(touches, v, resting, bodies.stays_still)
@@ -395,7 +381,6 @@ class Motion:
         raise end
 
     def log_all(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
-        """Log the collisions of one instant; the first one of each of `contacts` is new."""
         arriving = {key(contact) for contact in contacts}
         for collision in collisions:
             self.log(collision, key(collision.contact) in arriving)
@@ -444,7 +429,6 @@ class Motion:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
 
     def log(self, collision: Collision, new: bool) -> None:
-        """Log a collision, and the disks whose collisions accumulate."""
         contact, j = collision.contact, self.bodies.partner(collision.contact)
         self.path.events.append(
             Event(self.now, contact.i, j, collision.impulse, float(collision.cosine), new)
@@ -452,13 +436,12 @@ class Motion:
         self.accumulating += self.recent.add(float(self.now), contact)
 
     def rest(self, contact: Contact) -> None:
-        """Log that a disk comes to rest: a contact that begins without an impulse."""
+        """Log a contact that begins without an impulse."""
         self.path.events.append(
             Event(self.now, contact.i, self.bodies.partner(contact), self.k.exact(0.0), 0.0)
         )
 
     def stop(self, contact: Contact) -> None:
-        """Let a disk rest on a wall on which its bounces have died out."""
         bodies, i = self.bodies, contact.i
         wall = below(self.finder, contact._replace(kind="wall"), self.now)
         bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now), True)
@@ -466,7 +449,6 @@ class Motion:
         self.follow_up({i})
 
     def roll(self, contact: Contact) -> None:
-        """End the slip of a disk on a wall with friction: it rolls, if friction is large enough."""
         bodies, i, side = self.bodies, contact.i, contact.side
         vx, vy, spin = bodies.velocity_at(i, self.now)
         # The spin without slip, to all digits.
@@ -475,8 +457,6 @@ class Motion:
         self.follow_up({i})
 
     def leave(self, contact: Contact) -> None:
-        """Move a disk off the end of the wall it rests on: onto the next wall in line, or into free
-        flight."""
         bodies, i, k = self.bodies, contact.i, self.k
         held = [c for c in bodies.held[i] if c.kind == "wall" and c.j == contact.j]
         v, end = (
@@ -509,8 +489,6 @@ class Motion:
         self.follow_up({i})
 
     def wrap(self, contact: Contact) -> None:
-        """Move a disk to the opposite edge of the wrap; if it overlaps another one there, there is
-        no exact answer."""
         i = contact.i
         if self.bodies.group[i]:
             reason = f"disk {i} crosses the edge of the wrap while it touches another"
@@ -530,14 +508,12 @@ class Motion:
         self.expect(contact.i, self.now + self.k.exact(after), (contact,))
 
     def set_thrusts(self, disk: int) -> set[int]:
-        """Begin or end a thrust; the disks whose motion that changes."""
         members = self.ungroup({disk})
         on = [p for p in self.thrusts if p.disk == disk and p.start <= float(self.now) < p.stop]
         self.bodies.set_thrusts(disk, self.now, on)
         return members
 
     def follow_up(self, disks: set[int]) -> None:
-        """Add the new legs of these disks to the path, and predict the disks again."""
         moving = sorted(i for i in disks if i < self.scene.n and not self.scene.static[i])
         for i in moving:
             self.path.legs[i].append(self.bodies.legs[i])
@@ -549,14 +525,11 @@ class Motion:
 
 
 def turns_with_disk(thrusts: Sequence[Thrust]) -> bool:
-    """Whether one of these thrusts turns with its disk."""
     return any(thrust.frame == "body" and thrust.force.any() for thrust in thrusts)
 
 
 def trace(
     scene: Scene, thrusts: Sequence[Thrust], until: float, k: Numbers, work: WorkLimit | None = None
 ) -> Path:
-    """The motion of `scene` under `thrusts` up to `until` s, within the limits of `work`. Raises as
-    `Bodies`."""
     with k.precise():
         return Motion(scene, thrusts, until, k, work or WorkLimit()).run()

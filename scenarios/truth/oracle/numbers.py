@@ -60,7 +60,6 @@ class Numbers:
 
 
 def mpfr(bits: int) -> Numbers:
-    """MPFR's correctly rounded numbers. Raises ImportError where gmpy2 is missing."""
     import gmpy2
 
     tie = gmpy2.mpfr(2) ** -(bits // 2)
@@ -90,7 +89,6 @@ def mpfr(bits: int) -> Numbers:
 
 
 def decimals(bits: int) -> Numbers:
-    """The standard library's decimal numbers, of the same accuracy."""
     context = decimal.Context(
         prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
     )
@@ -116,8 +114,6 @@ def decimals(bits: int) -> Numbers:
 
 
 def balls(bits: int) -> Numbers:
-    """Arb's real balls, which are proven to contain the exact number. Raises ImportError where
-    python-flint is missing."""
     import flint
 
     nought = flint.arb(0)
@@ -170,5 +166,4 @@ def digits(bits: int) -> Numbers:
 
 
 def has_balls() -> bool:
-    """Whether python-flint is installed."""
     return find_spec("flint") is not None

@@ -84,7 +84,6 @@ class Path:
     searched: float = np.inf
 
     def cut(self, end: float, reason: str) -> Path:
-        """The motion up to an earlier end, for another reason."""
         return Path(self.legs, self.events, end, reason, searched=self.searched)
 
 
@@ -123,12 +122,10 @@ class RecentCollisions:
         return [i for i in disks if self.within(i, SUSPECT, t)]
 
     def within(self, i: int, count: int, t: float) -> bool:
-        """Whether the latest `count` collisions of disk i, up to t s, lie within an instant."""
         collisions = self.collisions[i]
         return len(collisions) >= count and t - collisions[-count][0] <= self.instant
 
     def close(self, contacts: Sequence[Contact], t: float) -> None:
-        """Forget the collisions of these contacts: they have closed, at t s."""
         closed = {key(contact) for contact in contacts}
         for i in {i for c in contacts for i in c.disks if i < len(self.collisions)}:
             collisions = self.collisions[i]
@@ -156,10 +153,6 @@ class RecentCollisions:
         return list(contacts.values())
 
     def ends(self, i: int, t: float, name: Callable[[Contact, int], str]) -> MotionEnds:
-        """Why the motion ends where the collisions of disk i accumulate, up to t s.
-
-        name: the other side of a contact of disk i, in words.
-        """
         latest = [contact for at, contact in self.collisions[i] if at > t - NAMED]
         others = sorted({name(contact, i) for contact in latest})
         disks = [i, *(int(other[5:]) for other in others if other.startswith("disk"))]
@@ -168,7 +161,6 @@ class RecentCollisions:
 
 
 def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
-    """The reason why simultaneous contacts of these disks have no exact answer."""
     what, their = f"disks {', '.join(map(str, disks))} touch at once", "their"
     if len(disks) == 1:
         what, their = f"disk {disks[0]} touches several walls at once", "its"

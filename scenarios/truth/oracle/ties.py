@@ -168,8 +168,7 @@ class CollisionLaw:
         return after, collision._replace(slip_ended=slip_ended)
 
     def _kicked(self, v: Velocity, i: int, jx: Number, jy: Number, kick: Number) -> Velocity:
-        """A velocity after the impulse (jx, jy) N s on the rim of body i, whose angular impulse is
-        r `kick`, clockwise."""
+        """After (jx, jy) N s on the rim of body i, whose angular impulse is r `kick`, clockwise."""
         assert self.friction is not None
         w, turns = self.inverse_mass[i], self.friction.radius[i] * self.friction.inverse_inertia[i]
         return v[0] + w * jx, v[1] + w * jy, v[2] - turns * kick
