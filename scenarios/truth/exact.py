@@ -15,9 +15,8 @@ from crosscheck2d.scenarios.truth.cache import keep, key_of, look_up
 from crosscheck2d.scenarios.truth.oracle.bodies import Leg
 from crosscheck2d.scenarios.truth.oracle.events import trace, turns_with_disk
 from crosscheck2d.scenarios.truth.oracle.numbers import Numbers, Undecided, balls, digits, has_balls
-from crosscheck2d.scenarios.truth.oracle.path import Path
+from crosscheck2d.scenarios.truth.oracle.path import Path, TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.oracle.resting import FOR_SERIES
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.record import (
     CERTIFIED,
     TWO_PRECISIONS,
@@ -136,7 +135,7 @@ def certified(scenario: Scenario, forced: Sequence[Thrust], clock: TimeLimit) ->
             path = trace(
                 scenario.scene, forced, until, balls(bits), WorkLimit(allowed_steps(bits), clock)
             )
-            error, reached = spread(path, until), until
+            error, reached = widest(widths(path), min(path.end, until)), until
             if error < accuracy and not clock.expired:
                 return record_of(scenario, path, error, bits, CERTIFIED)
         except Undecided as doubt:
@@ -177,10 +176,6 @@ def exact_until(path: Path, until: float, accuracy: float) -> tuple[float, float
         return end, most
     held = last_time(lambda t: widest(table, t) < accuracy, end)
     return held, widest(table, held)
-
-
-def spread(path: Path, until: float) -> float:
-    return widest(widths(path), min(path.end, until))
 
 
 def widths(path: Path) -> Array:

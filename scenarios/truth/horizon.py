@@ -181,27 +181,25 @@ class TangentVectors:
 
     def release_delay(self, i: int, leg: Leg, t: float) -> Array:
         """(d,) s: at the end of its wall, at the stroke of another disk, or where its slip ends."""
+        late: Array
         if leg.turn is not None and leg.held and leg.held == self.path.legs[i][self.leg[i]].held:
-            return self.slip_end_delay(i, leg)
+            contact, arm = leg.held[0], float(self.scene.radius[i])
+            start, end = self.scene.walls[contact.j]
+            way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
+            slower = float(acceleration(leg) @ way + arm * rate(leg))
+            if not slower:  # no slip ends: a group of disks begins or ends
+                return np.zeros_like(self.late)
+            late = -(self.dv[i] @ way + arm * self.dw[i]) / slower
+            return late
         spans = [
             self.scene.walls[c.j, 1] - self.scene.walls[c.j, 0]
             for c in leg.held
             if c.kind == "wall"
         ]
         if len(spans) == 1 and (speed := float(spans[0] @ along(leg, t)[1])):
-            late: Array = -self.dx[i] @ spans[0] / speed
+            late = -self.dx[i] @ spans[0] / speed
             return late
         return self.late if t == self.instant else np.zeros_like(self.late)
-
-    def slip_end_delay(self, i: int, leg: Leg) -> Array:
-        contact, arm = leg.held[0], float(self.scene.radius[i])
-        start, end = self.scene.walls[contact.j]
-        way, arm = (end - start) / np.hypot(*(end - start)), arm * contact.side
-        slower = float(acceleration(leg) @ way + arm * rate(leg))
-        if not slower:  # no slip ends: a group of disks begins or ends
-            return np.zeros_like(self.late)
-        late: Array = -(self.dv[i] @ way + arm * self.dw[i]) / slower
-        return late
 
     def hold(self, i: int, wall: int | None) -> None:
         way = np.zeros(2)
@@ -261,7 +259,7 @@ class TangentVectors:
         self, one: Body, two: Body, normal: Array, tilt: Array, impulse: float, more: Array
     ) -> tuple[float, Array]:
         """N s, the impulse of friction on `two` along the tangent, and its deviations (d,); see
-        `oracle/friction.py`.
+        `oracle/ties.py`.
 
         tilt, more: (d, 2) and (d,) N s, the deviations of the normal and of the impulse.
         """

@@ -125,7 +125,10 @@ class CollisionOrder:
         """The contact of a collision, here with speed 0, and those within the rounding of it that
         are connected to it by disks; none if it is the only one."""
         t, own = float(event.t), {event.i, event.j}
-        self.begin(t)
+        # Each disk is put on its latest leg that begins before.
+        while self.begun < len(self.legs) and (row := self.legs[self.begun])[0] < t:
+            self.now[int(row[1])] = row
+            self.begun += 1
         waiting, done, found = [i for i in own if i >= 0], set[int](), list[Near]()
         if not any(own - {i, j} or j not in own for i in waiting for j in self.close(i, t)):
             return []
@@ -140,11 +143,6 @@ class CollisionOrder:
                     waiting += [j] * (j >= 0)
             done.add(i)
         return found
-
-    def begin(self, t: float) -> None:
-        while self.begun < len(self.legs) and (row := self.legs[self.begun])[0] < t:
-            self.now[int(row[1])] = row
-            self.begun += 1
 
     def close(self, i: int, t: float) -> list[int]:
         """The disks, and -1 - wall, whose gap to disk i is at most `CLOSE` at `t` s."""

@@ -13,7 +13,7 @@ from crosscheck2d.scenarios.truth.closed_forms import Collision, answer, flight,
 from crosscheck2d.scenarios.truth.horizon import DIVERGED
 from crosscheck2d.scenarios.truth.oracle.bodies import nearest
 from crosscheck2d.scenarios.truth.oracle.jets import count_pieces, push
-from crosscheck2d.scenarios.truth.oracle.path import Event, Path
+from crosscheck2d.scenarios.truth.oracle.path import Path
 from crosscheck2d.scenarios.truth.order import float64_horizon
 
 EPS = float(np.finfo(float).eps)
@@ -170,12 +170,12 @@ def record_of(scenario: Scenario, path: Path, error: float, bits: int, method: s
     if method == CERTIFIED and path.searched < end:
         method = SEARCHED
     legs = legs_of(path, end)
-    rows = [_row(event) for event in path.events if float(event.t) < end]
-    rows += [
-        collision
-        for leg, stop in bouncing(legs, min(end, float(np.nextafter(scenario.duration, np.inf))))
-        for collision in bounces(scenario, leg, stop)
+    rows = [
+        [float(t), *((i, j) if j < 0 or i < j else (j, i)), float(impulse), cosine]
+        for t, i, j, impulse, cosine, _ in path.events
+        if float(t) < end
     ]
+    rows += bounces(scenario, legs, min(end, float(np.nextafter(scenario.duration, np.inf))))
     outcomes = [
         [k, i, *map(float, v[:2])]
         for k, one in enumerate(path.outcomes)
@@ -271,44 +271,29 @@ def reach_of_jets(scenario: Scenario, legs: Array) -> float:
     return total
 
 
-def _row(event: Event) -> list[float]:
-    i, j = (event.i, event.j) if event.j < 0 or event.i < event.j else (event.j, event.i)
-    return [float(event.t), i, j, float(event.impulse), event.cosine]
-
-
-def bouncing(legs: Array, end: float) -> Iterator[tuple[Array, float]]:
-    for k in np.flatnonzero(legs[:, SPEED] > 0):
-        follows = k + 1 < len(legs) and legs[k + 1, DISK] == legs[k, DISK]
-        yield legs[k], min(end, legs[k + 1, T] if follows else np.inf)
-
-
-def bounces(scenario: Scenario, leg: Array, stop: float) -> Iterator[list[float]]:
-    """Rows as in `TruthRecord.events` for the bounces on a leg before `stop` s that last
+def bounces(scenario: Scenario, legs: Array, end: float) -> Iterator[list[float]]:
+    """Rows as in `TruthRecord.events` for the bounces on legs before `end` s that last
     `LEAST_SHARE` of the duration or more."""
     scene = scenario.scene
-    e, v, g, disk = scene.restitution, leg[SPEED], leg[FALL], int(leg[DISK])
-    least = LEAST_SHARE * scenario.duration
-    count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
-    for k in range(1, count):
-        t = leg[T] + 2 * v / g * float(powers(e, k))
-        if t >= stop:
-            return
-        place, sliding = flight(t - leg[T], leg[PLACE], leg[VELOCITY], leg[ACCELERATION])
-        before, beside = v * e ** (k - 1), np.hypot(*sliding)
-        kick = scene.mass[disk] * (1 + e) * before
-        yield [
-            t,
-            disk,
-            -1 - wall_of_bounces(scene, leg, place),
-            kick,
-            before / np.hypot(before, beside),
-        ]
-
-
-def wall_of_bounces(scene: Scene, leg: Array, place: Array) -> int:
-    span, (_, distance) = scene.walls[:, 1] - scene.walls[:, 0], nearest(place[None], scene.walls)
-    slope = np.abs((span * leg[NORMAL]).sum(axis=1)) / np.hypot(*span.T)
-    return int(np.argmin(np.abs(distance[0] - scene.radius[int(leg[DISK])]) + slope))
+    e, least = scene.restitution, LEAST_SHARE * scenario.duration
+    span = scene.walls[:, 1] - scene.walls[:, 0]
+    for row in np.flatnonzero(legs[:, SPEED] > 0):
+        leg, follows = legs[row], row + 1 < len(legs) and legs[row + 1, DISK] == legs[row, DISK]
+        stop = min(end, legs[row + 1, T] if follows else np.inf)
+        v, g, disk = leg[SPEED], leg[FALL], int(leg[DISK])
+        count = max(0, int(np.ceil(np.log(least * g / (2 * v)) / np.log(e))))
+        for k in range(1, count):
+            t = leg[T] + 2 * v / g * float(powers(e, k))
+            if t >= stop:
+                break
+            place, sliding = flight(t - leg[T], leg[PLACE], leg[VELOCITY], leg[ACCELERATION])
+            # the nearest wall parallel to the leg
+            _, distance = nearest(place[None], scene.walls)
+            slope = np.abs((span * leg[NORMAL]).sum(axis=1)) / np.hypot(*span.T)
+            wall = int(np.argmin(np.abs(distance[0] - scene.radius[disk]) + slope))
+            before, beside = v * e ** (k - 1), np.hypot(*sliding)
+            kick = scene.mass[disk] * (1 + e) * before
+            yield [t, disk, -1 - wall, kick, before / np.hypot(before, beside)]
 
 
 def remains(scene: Scene, legs: Array, disks: Sequence[int], end: float) -> Iterator[str]:

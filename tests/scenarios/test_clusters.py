@@ -12,7 +12,7 @@ from crosscheck2d.scenarios.model import Thrust
 from crosscheck2d.scenarios.truth.exact import computed
 from crosscheck2d.scenarios.truth.oracle.clusters import collapse, complementary
 from crosscheck2d.scenarios.truth.oracle.numbers import digits, has_balls, mpfr
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit, WorkLimit
+from crosscheck2d.scenarios.truth.oracle.path import TimeLimit, WorkLimit
 from crosscheck2d.scenarios.truth.record import CERTIFIED, SEARCHED
 from tests.scenarios.random_scenes import random_scenario
 from tests.scenarios.test_oracle import asked, states

@@ -25,7 +25,7 @@ from crosscheck2d.scenarios.truth.exact import computed, with_oracle
 from crosscheck2d.scenarios.truth.oracle import work as oracle_work
 from crosscheck2d.scenarios.truth.oracle.events import trace
 from crosscheck2d.scenarios.truth.oracle.numbers import Undecided, balls, digits, has_balls
-from crosscheck2d.scenarios.truth.oracle.work import TimeLimit
+from crosscheck2d.scenarios.truth.oracle.path import TimeLimit
 from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.reports.terminal.command_line import crosscheck
 

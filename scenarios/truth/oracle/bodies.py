@@ -10,10 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.scenarios.model import Array, Scene, Thrust
-from crosscheck2d.scenarios.truth.oracle.friction import Friction, limited
 from crosscheck2d.scenarios.truth.oracle.jets import count_pieces, push
 from crosscheck2d.scenarios.truth.oracle.numbers import Number, Numbers
-from crosscheck2d.scenarios.truth.oracle.ties import CollisionLaw, Contact, Touch, Velocity
+from crosscheck2d.scenarios.truth.oracle.ties import (
+    CollisionLaw,
+    Contact,
+    Friction,
+    Touch,
+    Velocity,
+    limited,
+)
 
 STATIC, FALLING = 0, 1
 """Kinds of acceleration: none, gravity; each disk under a thrust is a kind of its own, from 2 on;
@@ -280,27 +286,21 @@ class Bodies:
         """
         self.asleep[i] = False
         self.held[i], self.common[i] = contacts, common
-        touched_now = self.touched_now(i, now)
+        # What has been noted at this instant holds on another acceleration, too.
+        noted = [
+            (pairs, pair)
+            for pairs in (self.separated, self.in_step)
+            for pair, counts in pairs.items()
+            if i in pair
+            and counts == (self.count[pair[0]], self.count[pair[1]])
+            and self.legs[i].t is now
+        ]
         if contacts and self.law.friction is not None:
             self.sliding[i] = 0 if rolls else self.k.sign(self.slip(contacts[0], v))
         x, y, _, _ = self.state_at(i, now)
         self.begin(i, self.leg(i, now, x, y, v))
-        for pairs, pair in touched_now:
+        for pairs, pair in noted:
             pairs[pair] = self.count[pair[0]], self.count[pair[1]]
-
-    def touched_now(
-        self, i: int, now: Number
-    ) -> list[tuple[dict[tuple[int, int], tuple[int, int]], tuple[int, int]]]:
-        """The entries of `separated` and `in_step` that body i has got at this instant: they hold
-        on another acceleration, too."""
-        if self.legs[i].t is not now:
-            return []
-        return [
-            (pairs, pair)
-            for pairs in (self.separated, self.in_step)
-            for pair, counts in pairs.items()
-            if i in pair and counts == (self.count[pair[0]], self.count[pair[1]])
-        ]
 
     def slip(self, contact: Contact, v: Velocity) -> Number:
         """m/s, the velocity of the contact point along the wall, positive from its start to its
@@ -332,16 +332,14 @@ class Bodies:
             if kind == FALLING:
                 level = square_to(self.scene.walls[walls[0].j], self.scene.gravity)
                 kind, along = (STATIC, self.k.exact(0.0)) if level else (-1 - walls[0].j, along)
-            if self.law.friction is not None and not (kind == STATIC and self.lies(i)):
+            # On a level wall friction does not act without slip and torque.
+            lies = kind == STATIC and not self.sliding[i] and self.rates[i] is self.nought
+            if self.law.friction is not None and not lies:
                 kind = 2 + i
                 along, rate = self.rubbed(walls[0], along, load, self.law.friction)
             ax, ay = along * tx, along * ty
         self.kind[i] = kind
         return ax, ay, rate
-
-    def lies(self, i: int) -> bool:
-        """On a level wall friction does not act: no slip and no torque."""
-        return not self.sliding[i] and self.rates[i] is self.nought
 
     def rubbed(
         self, contact: Contact, along: Number, load: Number, friction: Friction

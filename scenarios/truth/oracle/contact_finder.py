@@ -227,10 +227,14 @@ class ContactFinder:
         for contact in self.touching(i, float(now)):
             if key(contact) in known:
                 continue
-            if self.touches_now(contact, now):
-                found.append((contact, 0))
-                continue
             if contact.kind == "body":
+                (a, b), legs = sorted((contact.i, contact.j)), bodies.legs
+                # a pair that is known to touch at this instant, without approach
+                counts = bodies.count[a], bodies.count[b]
+                at_once = legs[a].t is now or legs[b].t is now
+                if at_once and bodies.separated.get((a, b)) == counts:
+                    found.append((contact, 0))
+                    continue
                 touch, reach = self.touch(contact, now), bodies.reach(contact)
                 gap = self.k.sign(touch.dx * touch.dx + touch.dy * touch.dy - reach * reach)
                 within = True
@@ -239,14 +243,6 @@ class ContactFinder:
                 within = bodies.foot_on(contact.j, x, y)
             found += [(contact, gap)] if gap <= 0 and within else []
         return found
-
-    def touches_now(self, contact: Contact, now: Number) -> bool:
-        if contact.kind != "body":
-            return False
-        i, j = sorted((contact.i, contact.j))
-        legs, count = self.bodies.legs, self.bodies.count
-        at_once = legs[i].t is now or legs[j].t is now
-        return at_once and self.bodies.separated.get((i, j)) == (count[i], count[j])
 
     def cluster(self, contacts: Sequence[Contact], now: Number) -> list[Touch]:
         """All contacts that touch now, of the disks in `contacts` and of all disks connected to

@@ -24,6 +24,7 @@ from crosscheck2d.scenarios.truth.oracle.path import (
     Path,
     RecentCollisions,
     Record,
+    WorkLimit,
     ambiguous,
 )
 from crosscheck2d.scenarios.truth.oracle.resting import (
@@ -51,7 +52,6 @@ from crosscheck2d.scenarios.truth.oracle.ties import (
     Velocities,
     key,
 )
-from crosscheck2d.scenarios.truth.oracle.work import WorkLimit
 
 MOST_IDLE = 100  # contacts in a row without a collision: the digits no longer decide
 
@@ -288,8 +288,13 @@ class Motion:
             touches = self.finder.cluster(contacts, self.now)
         disks = sorted({i for touch in touches for i in touch.contact.disks})
         v = {i: self.bodies.velocity_at(i, self.now) for i in disks}
-        outcome = self.after_one(touches[0], v) if alone else self.after_all(touches, v)
-        self.log_all(outcome.collisions, contacts)
+        if alone:
+            after, collision = self.bodies.law.collide(touches[0], v)
+            still = frozenset(contacts if self.bodies.law.sticks else ())
+            outcome = TieOutcome(after, [collision], still)
+        else:
+            outcome = self.after_all(touches, v)
+        self.log(outcome.collisions, contacts)
         touched = {i for collision in outcome.collisions for i in collision.contact.disks} or set(
             disks
         )
@@ -319,7 +324,7 @@ class Motion:
             limit = limit_of_series(self.finder, touches, v, self.until - now)
         except NoLimit as fault:
             if i in recent.since:
-                end = recent.ends(i, now, self.other_side)
+                end = recent.ends(i, now, bodies.name)
                 end.few_bits = fault.few_bits
                 raise end from None
             return
@@ -337,14 +342,11 @@ class Motion:
             for event in self.path.events
             if float(event.t) <= since or not pairs & {(event.i, event.j), (event.j, event.i)}
         ]
-        self.log_all(limit.collisions, [])
+        self.log(limit.collisions, [])
         recent.close(contacts, now)
         first = contacts[0]
         rolls = len(contacts) == 1 and bodies.no_slip_on[first.i] == first
         self.go_on(limit, touches, disks, None, first if rolls else None)
-
-    def other_side(self, contact: Contact, i: int) -> str:
-        return self.bodies.name(contact) if contact.i == i else f"disk {contact.i}"
 
     def refuse_corners(self, contacts: Sequence[Contact]) -> None:
         comes = {
@@ -357,11 +359,6 @@ class Motion:
                 what = comes[contact.kind].format(contact.j)
                 reason = f"disk {contact.i} {what} while it touches another"
                 raise MotionEnds(float(self.now), reason, [contact.i])
-
-    def after_one(self, touch: Touch, v: Velocities) -> TieOutcome:
-        law = self.bodies.law
-        after, collision = law.collide(touch, v)
-        return TieOutcome(after, [collision], frozenset([touch.contact] if law.sticks else ()))
 
     def after_all(self, touches: Sequence[Touch], v: Velocities) -> TieOutcome:
         bodies = self.bodies
@@ -380,11 +377,13 @@ class Motion:
         end.few_bits = ends[-1].unresolved == ENDLESS and not self.k.proves
         raise end
 
-    def log_all(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
+    def log(self, collisions: Sequence[Collision], contacts: Sequence[Contact]) -> None:
         arriving = {key(contact) for contact in contacts}
-        for collision in collisions:
-            self.log(collision, key(collision.contact) in arriving)
-            arriving.discard(key(collision.contact))
+        for contact, impulse, cosine, _ in collisions:
+            j, new = self.bodies.partner(contact), key(contact) in arriving
+            self.path.events.append(Event(self.now, contact.i, j, impulse, float(cosine), new))
+            self.accumulating += self.recent.add(float(self.now), contact)
+            arriving.discard(key(contact))
         self.idle = 0 if collisions else self.idle + 1
         if self.idle > MOST_IDLE:
             reason = f"numbers of {self.k.bits} bits have used up their digits"
@@ -427,13 +426,6 @@ class Motion:
         self.follow_up(touched | members)
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
-
-    def log(self, collision: Collision, new: bool) -> None:
-        contact, j = collision.contact, self.bodies.partner(collision.contact)
-        self.path.events.append(
-            Event(self.now, contact.i, j, collision.impulse, float(collision.cosine), new)
-        )
-        self.accumulating += self.recent.add(float(self.now), contact)
 
     def rest(self, contact: Contact) -> None:
         """Log a contact that begins without an impulse."""

@@ -60,57 +60,47 @@ class Numbers:
 
 
 def mpfr(bits: int) -> Numbers:
+    """MPFR's correctly rounded numbers. Raises ImportError where gmpy2 is missing."""
     import gmpy2
-
-    tie = gmpy2.mpfr(2) ** -(bits // 2)
-
-    def sign(x: Number) -> int:
-        return 1 if x > tie else -1 if x < -tie else 0
 
     def precise() -> AbstractContextManager[Any]:
         context: AbstractContextManager[Any] = gmpy2.context(gmpy2.get_context(), precision=bits)
         return context
 
-    def exact(x: float) -> Number:
-        # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
-        return gmpy2.mpfr(x, 53)
-
-    return Numbers(
-        "mpfr",
-        bits,
-        exact,
-        gmpy2.sqrt,
-        sign,
-        precise,
-        tie,
-        lambda a, b: exact((a + b) / 2),
-        _nothing,
-    )
+    # A float64 has 53 bits, fewer than any precision used here: nothing is rounded.
+    return _rounded("mpfr", bits, lambda x: gmpy2.mpfr(x, 53), gmpy2.sqrt, precise)
 
 
 def decimals(bits: int) -> Numbers:
+    """The standard library's decimal numbers, of the same accuracy."""
     context = decimal.Context(
         prec=ceil(bits * log10(2)) + 1, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX
     )
-    tie = decimal.Decimal(2) ** -(bits // 2)
+    return _rounded(
+        "decimal",
+        bits,
+        decimal.Decimal,
+        lambda x: x.sqrt(context),
+        lambda: decimal.localcontext(context),
+    )
+
+
+def _rounded(
+    name: str,
+    bits: int,
+    exact: Callable[[float], Number],
+    sqrt: Callable[[Number], Number],
+    precise: Callable[[], AbstractContextManager[Any]],
+) -> Numbers:
+    tie = exact(2.0) ** -(bits // 2)
 
     def sign(x: Number) -> int:
         return 1 if x > tie else -1 if x < -tie else 0
 
     def between(a: float, b: float) -> Number:
-        return decimal.Decimal((a + b) / 2)
+        return exact((a + b) / 2)
 
-    return Numbers(
-        "decimal",
-        bits,
-        decimal.Decimal,
-        lambda x: x.sqrt(context),
-        sign,
-        lambda: decimal.localcontext(context),
-        tie,
-        between,
-        _nothing,
-    )
+    return Numbers(name, bits, exact, sqrt, sign, precise, tie, between, lambda _x: 0.0)
 
 
 def balls(bits: int) -> Numbers:
@@ -135,28 +125,18 @@ def balls(bits: int) -> Numbers:
         finally:
             flint.ctx.prec = before
 
-    def between(a: float, b: float) -> Number:
-        return flint.arb(a).union(flint.arb(b))
-
-    def spread(x: Number) -> float:
-        return float(x.rad())
-
     return Numbers(
-        "arb",
-        bits,
-        flint.arb,
-        lambda x: x.sqrt(),
-        sign,
-        precise,
-        nought,
-        between,
-        spread,
+        name="arb",
+        bits=bits,
+        exact=flint.arb,
+        sqrt=lambda x: x.sqrt(),
+        sign=sign,
+        precise=precise,
+        tie=nought,
+        between=lambda a, b: flint.arb(a).union(flint.arb(b)),
+        spread=lambda x: float(x.rad()),
         proves=True,
     )
-
-
-def _nothing(_x: Number) -> float:
-    return 0.0
 
 
 def digits(bits: int) -> Numbers:

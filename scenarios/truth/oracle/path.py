@@ -1,10 +1,14 @@
-"""The motion that the event loop computes: legs, collisions, and why and when it ends."""
+"""The motion that the event loop computes: legs, collisions, and why and when it ends; and the
+limits on the work for it: a number of steps, the same on every machine, and a time limit where
+somebody waits for the answer."""
 
 from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import inf
+from time import monotonic
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +23,8 @@ INSTANT = 1e-9  # ... within this many s accumulate; in a fast scene ...
 SHARE = 1e-7  # ... within this share of the time in which a disk moves by its radius
 SUSPECT, OFTEN = 16, 4  # collisions of a disk, and of one contact of it, that may accumulate
 NAMED = 1e-5  # s before that; the bodies it collides with in this time are named in the reason
+# collisions, edges crossed, records made anew, orders of simultaneous collisions tried
+MOST_STEPS = 60_000
 
 
 class MotionEnds(Exception):
@@ -152,9 +158,9 @@ class RecentCollisions:
                     waiting += sorted(more - {*waiting})
         return list(contacts.values())
 
-    def ends(self, i: int, t: float, name: Callable[[Contact, int], str]) -> MotionEnds:
+    def ends(self, i: int, t: float, name: Callable[[Contact], str]) -> MotionEnds:
         latest = [contact for at, contact in self.collisions[i] if at > t - NAMED]
-        others = sorted({name(contact, i) for contact in latest})
+        others = sorted({name(c) if c.i == i else f"disk {c.i}" for c in latest})
         disks = [i, *(int(other[5:]) for other in others if other.startswith("disk"))]
         reason = f"the collisions of disk {i} on {' and '.join(others)} accumulate"
         return MotionEnds(self.since[i], reason, disks)
@@ -174,3 +180,38 @@ def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
     return (
         f"{what} and the outcome depends on the order of {their} collisions ({len(ends)} outcomes)"
     )
+
+
+class TimeLimit:
+    """A time limit for all attempts at an answer, from the creation of the object on.
+
+    An answer that it cuts short depends on the machine, and is never cached.
+
+    Attributes:
+        end: s, as of `monotonic`, when the time runs out.
+        reason: why an answer that is cut short ends.
+        expired: whether an attempt was cut short.
+    """
+
+    def __init__(self, seconds: float = inf, reason: str = "") -> None:
+        self.end, self.reason, self.expired = monotonic() + seconds, reason, False
+
+
+class WorkLimit:
+    """The limits of one attempt: `left` steps, and a share of the time that its clock has left."""
+
+    def __init__(
+        self, left: int = MOST_STEPS, clock: TimeLimit | None = None, share: float = 1.0
+    ) -> None:
+        self.left, self.clock, now = left, clock or TimeLimit(), monotonic()
+        self.stop = now + share * (self.clock.end - now)
+
+    def step(self, t: float, bits: int) -> None:
+        """Count a step that led to `t` s in numbers of `bits` bits; raises `MotionEnds` if none is
+        left."""
+        self.left -= 1
+        if self.left < 0:
+            raise MotionEnds(t, f"the work allowed for an answer in {bits} bits is used up")
+        if monotonic() > self.stop:
+            self.clock.expired = True
+            raise MotionEnds(t, self.clock.reason)

@@ -128,8 +128,7 @@ def untouched(
     own = (np.hypot(vx, vy) + np.hypot(ax, ay) * left / 2) * left + hop_height(leg)
     states = np.array([moved(row, float(leg.t)) for row in table])
     heights = np.array([hop_height(each) for each in bodies.legs])
-    energy = spin_energy(bodies, leg.t)
-    others = travel(bodies, states, left, thrusts, energy)
+    others = travel(bodies, states, leg.t, left, thrusts)
     distance = np.hypot(states[:, 0] - x, states[:, 1] - y) - bodies.radii - bodies.radii[i]
     slack = FAR * (np.abs(states[:, :2]).max() + 1)
     needed = (own + others) * SAFE
@@ -201,28 +200,22 @@ def apart(bodies: Bodies, i: int, j: int, now: Number) -> float:
 
 
 def travel(
-    bodies: Bodies, states: Array, left: float, thrusts: Sequence[Thrust], spins: float
+    bodies: Bodies, states: Array, now: Number, left: float, thrusts: Sequence[Thrust]
 ) -> Array:
     """(b,) m, the largest distance that each body can move within `left` s, from states (b, 6) as
-    of `moved`; see `untouched`. spins: J, rotational energy that friction may turn into motion."""
+    of `moved`; see `untouched`. Friction may turn the energy of rotation into motion."""
     mass = np.append(bodies.scene.mass, np.full(len(states) - bodies.scene.n, np.inf))
     moves = np.isfinite(mass)
     accelerations = [float(np.hypot(*thrust.force)) / mass[thrust.disk] for thrust in thrusts]
     acceleration = float(np.hypot(*bodies.scene.gravity)) + sum(accelerations)
     hops = np.array([0.0 if leg.hop is None else float(leg.hop.speed) ** 2 for leg in bodies.legs])
     energy = (mass[moves] * ((states[moves, 2:4] ** 2).sum(axis=1) + hops[moves])).sum() / 2
-    energy += spins
+    turns = np.isfinite(bodies.scene.inertia) & ~bodies.scene.static
+    spins = np.array([float(bodies.turn_at(i, now).spin) for i in range(bodies.scene.n)])
+    energy += float((bodies.scene.inertia[turns] * spins[turns] ** 2).sum() / 2)
     speed = np.sqrt(energy) + np.sqrt(mass[moves].sum() / 2) * acceleration * left
     rise: Array = np.sqrt(2 / mass) * speed * left
     return rise
-
-
-def spin_energy(bodies: Bodies, now: Number) -> float:
-    """J, where there is friction; else 0."""
-    scene = bodies.scene
-    turns = np.isfinite(scene.inertia) & ~scene.static
-    spins = np.array([float(bodies.turn_at(i, now).spin) for i in range(scene.n)])
-    return float((scene.inertia[turns] * spins[turns] ** 2).sum() / 2)
 
 
 def hop_height(leg: Leg) -> float:
@@ -475,7 +468,9 @@ def lie_down(finder: ContactFinder) -> list[Contact]:
     lying = [
         c
         for c, approach in start(finder)
-        if c.kind == "wall" and approach == 0 and _pressed(bodies, c)
+        if c.kind == "wall"
+        and approach == 0
+        and bodies.k.sign(bodies.outward(c, *bodies.free[c.i][1:])) < 0  # pressed onto it
     ]
     return [c for c in lying if press(finder, c, now)]
 
@@ -527,11 +522,6 @@ def nearly_in_line(finder: ContactFinder, i: int, now: float) -> str:
             a, b = sorted((a, b))
             return f"; walls {a} and {b} are in line but for rounding: write them as one wall"
     return ""
-
-
-def _pressed(bodies: Bodies, contact: Contact) -> bool:
-    _, ax, ay = bodies.free[contact.i]
-    return bodies.k.sign(bodies.outward(contact, ax, ay)) < 0
 
 
 def start(finder: ContactFinder) -> list[tuple[Contact, Fraction]]:
