@@ -102,7 +102,7 @@ class Scenario:
     source: str  # where the scene or its formula comes from
     scene: Scene  # the initial state and the physics
     duration: float  # s, a whole number of sample intervals
-    sample_interval: float  # s; every engine is sampled at i * sample_interval
+    sample_interval: float = 1 / 60  # s; every engine is sampled at i * sample_interval
     substeps: Sequence[int] = (1, 2, 4, 8)  # k of dt = sample_interval / k, coarse to fine
     thrusts: Sequence[Thrust] = ()  # piecewise-constant
     # Times (k,) s -> the exact `Trajectory` at these times, up to its horizon; raises `NoTruth`.
