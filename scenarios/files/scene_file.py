@@ -71,12 +71,17 @@ def scenario_of(table: dict[str, Any], source: str) -> Scenario:
 
 def _read(parse: Callable[[], dict[str, Any]], named: str, source: str) -> Scenario:
     try:
-        file = _checked(parse())
+        table = parse()
+        disks = table.get("disk")
+        context = {"disks": len(disks) if isinstance(disks, list) else math.inf}
+        file = SceneToml.model_validate(table, context=context)
         if not (faults := list(_outside_wrap(file))):
             scenario = _scenario(file, source)
             faults = list(_overlaps(scenario.scene, len(file.wall)))
     except SceneFileError as error:
         faults = error.faults
+    except ValidationError as error:
+        faults = [_sentence(fault) for fault in error.errors(include_url=False)]
     except RecursionError:
         faults = ["arrays in arrays in arrays; must be as flat as a scene is"]
     except (
@@ -131,17 +136,6 @@ def _parsed(path: Path) -> dict[str, Any]:
             ) from None
         raise SceneFileError(
             [f"{str(error).split(';')[0].lower()}; must be a readable TOML file"]
-        ) from None
-
-
-def _checked(table: dict[str, Any]) -> SceneToml:
-    disks = table.get("disk")
-    try:
-        context = {"disks": len(disks) if isinstance(disks, list) else math.inf}
-        return SceneToml.model_validate(table, context=context)
-    except ValidationError as error:
-        raise SceneFileError(
-            _sentence(fault) for fault in error.errors(include_url=False)
         ) from None
 
 
