@@ -32,5 +32,4 @@ def boxed(seed: int, restitution: float = 1.0, gravity: float = 0.0) -> Scene:
 
 
 def lasting(scene: Scene, duration: float) -> Scenario:
-    """The question what becomes of it in that time, s."""
     return Scenario("boxed", "?", "the exercise between walls", scene, duration, duration / 100)
