@@ -75,7 +75,7 @@ def test_a_disk_beside_the_top_of_another_one_is_refused_by_name():
 def test_a_row_pushed_along_a_floor_moves_as_one_and_stops_pushing():
     # F / (m1 + m2 + m3) while the thrust acts
     row = lay_out(
-        position=[[0, 0.5], [1, 0.5], [2, 0.5]],
+        [[0, 0.5], [1, 0.5], [2, 0.5]],
         radius=0.5,
         mass=[1, 2, 3],
         gravity=[0, -9.8],
@@ -96,10 +96,7 @@ def test_a_row_pushed_along_a_floor_moves_as_one_and_stops_pushing():
 @pytest.mark.parametrize("n", [3, 5, 12, 25])
 def test_touching_equal_disks_in_a_row_reverse_their_velocities(n: int):
     v = 0.1 * np.arange(n, 0, -1)
-    row = lay_out(
-        position=[[0.5 * i, 0] for i in range(n)],
-        velocity=[[speed, 0] for speed in v],
-    )
+    row = lay_out([[0.5 * i, 0] for i in range(n)], [[speed, 0] for speed in v])
     one = asked(row, 1.0)
     record = computed(one)
 
@@ -115,12 +112,7 @@ def test_touching_equal_disks_in_a_row_reverse_their_velocities(n: int):
 
 def test_a_block_of_touching_disks_has_more_orders_than_can_be_tried():
     places = [[0.5 * x, 0.5 * y] for x in range(4) for y in range(4)]
-    block = lay_out(
-        position=[[-2, 0.125], *places],
-        velocity=[[4, 0], *[[0, 0]] * 16],
-        restitution=0.9,
-        friction=0.3,
-    )
+    block = lay_out([[-2, 0.125], *places], [[4, 0], *[[0, 0]] * 16], restitution=0.9, friction=0.3)
     reason = computed(asked(block, 1.0)).reason
     assert "more orders than can be tried, and the outcome may depend on the order" in reason
 
@@ -166,7 +158,7 @@ def test_a_disk_does_not_stay_in_the_air_when_the_one_below_is_pushed_away():
 
 def test_a_disk_that_lies_on_a_static_one_between_others_stays():
     scene = lay_out(
-        position=[[0, 0.5], [0, 1.5], [1, 1.5]],
+        [[0, 0.5], [0, 1.5], [1, 1.5]],
         radius=0.5,
         mass=[np.inf, 1, np.inf],
         gravity=[0, -8],

@@ -21,7 +21,7 @@ from tests.scenarios.exercise_box import boxed, lasting
 
 
 def under_thrust(force: float, away: float = 0.0, duration: float = 2.0) -> Scenario:
-    scene = lay_out(position=[[away, 0.0]], velocity=[2.0, 0.0], restitution=0.9)
+    scene = lay_out([[away, 0.0]], [2.0, 0.0], restitution=0.9)
     return with_oracle(
         Scenario(
             "thrust", "?", "", scene, duration, 0.02, thrusts=[Thrust(0, 0.0, 1.0, [force, 0.0])]
@@ -70,12 +70,7 @@ def test_a_thrust_out_of_scale_is_refused_at_once(force: float):
 @pytest.mark.parametrize("length", [1e-300, 1e-165, 1e-10, 1e-9])
 def test_a_wall_whose_square_is_nothing_is_refused_and_a_short_one_is_met(length: float):
     # it was a division by 0
-    scene = lay_out(
-        position=[[0, 0]],
-        velocity=[1, 0],
-        radius=0.5,
-        walls=[[[1, 0], [1, length]]],
-    )
+    scene = lay_out([[0, 0]], [1, 0], radius=0.5, walls=[[[1, 0], [1, length]]])
     one = Scenario("short", "?", "", scene, 1.0, 0.1)
     if length < 1e-9:
         with pytest.raises(NoTruth, match="too short to follow exactly"):
@@ -96,8 +91,8 @@ def test_no_record_breaks_its_promise(
     force: float, away: float, radius: float, duration: float, gravity: tuple
 ):
     scene = lay_out(
-        position=[[away, 0.0], [away, 40.0]],
-        velocity=[[1.0, 0.0], [0.0, -1.0]],
+        [[away, 0.0], [away, 40.0]],
+        [[1.0, 0.0], [0.0, -1.0]],
         radius=[radius] * 2,
         mass=[1.0, 2.0],
         gravity=gravity,
@@ -158,9 +153,7 @@ def test_a_horizon_by_metres_is_caught(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_the_answer_up_to_the_bound_of_work_is_kept_and_says_so(monkeypatch: pytest.MonkeyPatch):
-    scene = lay_out(
-        position=[[0, 0]], velocity=[-2.19, 2.08], radius=0.3, walls=box([-0.5] * 2, [0.5] * 2)
-    )
+    scene = lay_out([[0, 0]], [-2.19, 2.08], radius=0.3, walls=box([-0.5] * 2, [0.5] * 2))
     one = with_oracle(Scenario("long", "?", "", scene, 1e6, 1.0, (1,)))
     monkeypatch.setattr(oracle, "WORK", 400)
     record = computed(one)

@@ -88,8 +88,8 @@ CHANGES: dict[str, Scenario] = {
     "two falling disks": asked(lay_out(**TWO, restitution=0.75, gravity=DOWN), 1.5),
     "a static disk under gravity": asked(
         lay_out(
-            position=[[0.125, 1.5], [0, 0]],
-            velocity=[[0.0, 0.5], [0, 0]],
+            [[0.125, 1.5], [0, 0]],
+            [[0.0, 0.5], [0, 0]],
             radius=[0.25, 0.5],
             mass=[1, np.inf],
             gravity=DOWN,
@@ -125,8 +125,8 @@ CHANGES: dict[str, Scenario] = {
     ),
     "a collision on a disk that lies": asked(
         lay_out(
-            position=[[-0.125, 1.5], [0, 0.5]],
-            velocity=[[0, -1], [0, 0]],
+            [[-0.125, 1.5], [0, 0.5]],
+            [[0, -1], [0, 0]],
             radius=[0.25, 0.5],
             gravity=DOWN,
             walls=FLOOR,
@@ -224,8 +224,8 @@ def test_at_the_horizon_moved_starts_are_as_far_off_as_it_says(name: str):
 
 
 ROW = lay_out(
-    position=[[-3, 0.125], [-1.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [2.5, 0.25], [2.5, -1.0]],
-    velocity=[[3, 0.125], [0, 0], [0, 0], [0, 0], [-1, -0.5], [0.25, 1]],
+    [[-3, 0.125], [-1.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [2.5, 0.25], [2.5, -1.0]],
+    [[3, 0.125], [0, 0], [0, 0], [0, 0], [-1, -0.5], [0.25, 1]],
     radius=[0.5, 0.5, 0.5, 0.5, 0.375, 0.25],
     walls=box([-4, -2], [4, 2]),
 )

@@ -83,8 +83,8 @@ def test_the_oracle_agrees_with_the_closed_form_of_the_catalogue():
 
 def test_what_comes_after_the_thrust_is_answered():
     scene = lay_out(
-        position=[[0, 3], [4, 3]],
-        velocity=[[0, 0], [-1, 0]],
+        [[0, 3], [4, 3]],
+        [[0, 0], [-1, 0]],
         mass=[2, 1],
         angular_velocity=[2, 0],
         gravity=[0, -9.8],

@@ -187,8 +187,8 @@ def test_time_runs_backwards_at_restitution_one():
 
 def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
     bumper = lay_out(
-        position=[[0.3, 2.0], [0, 0.5]],
-        velocity=[[-0.2, 0], [0, 0]],
+        [[0.3, 2.0], [0, 0.5]],
+        [[-0.2, 0], [0, 0]],
         radius=[0.25, 0.5],
         mass=[1, np.inf],
         walls=[[[1, -3], [2, -3]]],
@@ -211,12 +211,7 @@ def test_a_ball_falls_on_a_static_disk_a_wall_end_and_a_resting_pair_of_them():
 
 
 def test_thrusts_carry_a_disk_into_a_wall():
-    scene = lay_out(
-        position=[[0, 0]],
-        radius=0.5,
-        mass=2,
-        walls=[[[2, -1], [2, 1]]],
-    )
+    scene = lay_out([[0, 0]], radius=0.5, mass=2, walls=[[[2, -1], [2, 1]]])
     one = asked(scene, 4.0, thrusts=[Thrust(0, 0.0, 1.0, [3.0, 0.0], 0.5)])
     record = computed(one)
 
@@ -226,7 +221,7 @@ def test_thrusts_carry_a_disk_into_a_wall():
 
 
 def test_an_edge_of_the_wrap_sets_the_centre_onto_the_other():
-    scene = lay_out(position=[[1, 0]], velocity=[1, 0], radius=0.1, wrap=[[-2, -2], [2, 2]])
+    scene = lay_out([[1, 0]], [1, 0], radius=0.1, wrap=[[-2, -2], [2, 2]])
     one = asked(scene, 10.0)
     truth = states(one, computed(one))
 

@@ -20,10 +20,7 @@ from crosscheck2d.scenarios.truth.oracle.ties import CollisionLaw, Contact, Touc
 from crosscheck2d.scenarios.truth.record import TruthRecord
 from tests.scenarios.test_oracle import asked, states
 
-ROW = lay_out(
-    position=[[-2, 0], [0, 0], [0.5, 0], [1, 0]],
-    velocity=[[1, 0], [0, 0], [0, 0], [0, 0]],
-)
+ROW = lay_out([[-2, 0], [0, 0], [0.5, 0], [1, 0]], [[1, 0], [0, 0], [0, 0], [0, 0]])
 
 
 def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_approaches():
@@ -37,9 +34,7 @@ def test_contacts_that_touch_are_resolved_one_after_the_other_where_only_one_app
 
 
 def test_a_corner_at_a_right_angle_has_one_outcome():
-    scene = lay_out(
-        position=[[0, 0]], velocity=[1, 1], radius=0.5, walls=box([-2, -2], [2, 2]), restitution=0.5
-    )
+    scene = lay_out([[0, 0]], [1, 1], radius=0.5, walls=box([-2, -2], [2, 2]), restitution=0.5)
     one = asked(scene, 2.5)
     truth = states(one, computed(one))
 
@@ -48,17 +43,11 @@ def test_a_corner_at_a_right_angle_has_one_outcome():
 
 
 BREAK = lay_out(
-    position=[[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]],
-    velocity=[[1, 0], [0, 0], [0, 0]],
-    radius=0.5,
+    [[-2, 0], [np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5]], [[1, 0], [0, 0], [0, 0]], radius=0.5
 )
-BALL = lay_out(
-    position=[[0, 1], [0, 2]], walls=[[[-9, 0], [9, 0]]], gravity=[0, -9.81], restitution=0.1
-)
+BALL = lay_out([[0, 1], [0, 2]], walls=[[[-9, 0], [9, 0]]], gravity=[0, -9.81], restitution=0.1)
 ASIDE = replace(BALL, position=[[0, 1], [0.03, 2]])
-SEAM = lay_out(
-    position=[[1.5, 0], [-1.8, 0.1]], velocity=[[1, 0], [0, 0]], radius=0.3, wrap=[[-2, -2], [2, 2]]
-)
+SEAM = lay_out([[1.5, 0], [-1.8, 0.1]], [[1, 0], [0, 0]], radius=0.3, wrap=[[-2, -2], [2, 2]])
 
 
 @pytest.mark.parametrize(
@@ -91,7 +80,7 @@ def test_the_truth_ends_where_there_is_no_more_of_it(
     assert states(one, record).reason == record.reason
 
 
-CROWD = lay_out(position=np.arange(402).reshape(201, 2), radius=0.1)
+CROWD = lay_out(np.arange(402).reshape(201, 2), radius=0.1)
 
 
 @pytest.mark.parametrize(
@@ -136,10 +125,7 @@ def row(
     steps = 0.5 + np.array([*gaps, *[0.0] * (len(speeds) - 1 - len(gaps))])
     x = np.append(0.0, np.cumsum(steps))
     return lay_out(
-        position=np.stack([x, 0 * x], -1),
-        velocity=np.stack([speeds, 0 * x], -1),
-        mass=mass,
-        restitution=restitution,
+        np.stack([x, 0 * x], -1), np.stack([speeds, 0 * x], -1), mass=mass, restitution=restitution
     )
 
 
@@ -233,7 +219,7 @@ def test_a_wedge_of_a_whole_part_of_180_degrees_has_one_outcome(
 
 
 TILTED = lay_out(
-    position=[[0, 1]],
+    [[0, 1]],
     radius=0.5,
     gravity=[0, -9.81],
     restitution=0.5,

@@ -30,6 +30,12 @@ KINDS = [None, mpfr]
 """Of numbers: balls where they are installed, digits."""
 
 
+def falling(position, velocity=(0, 0), restitution=0.5, walls=FLOOR, **fields) -> Scene:
+    return lay_out(
+        position, velocity, restitution=restitution, walls=walls, gravity=[0, -9.81], **fields
+    )
+
+
 def rests(record: TruthRecord) -> list[tuple[float, int, int]]:
     return [(t, int(i), int(j)) for t, i, j, kick, _ in record.events.tolist() if kick == 0]
 
@@ -67,12 +73,11 @@ def test_a_ball_on_a_slope_rests_when_its_bounces_end_and_slides_from_then_on(
 ):
     # at t_1 (1 + e) / (1 - e) with g cos(slope), along the slope with g sin(slope) all the time
     along, up = np.array([np.cos(slope), np.sin(slope)]), np.array([-np.sin(slope), np.cos(slope)])
-    scene = lay_out(
-        position=[(0.5 + height) * up],
-        velocity=[speed * along],
+    scene = falling(
+        [(0.5 + height) * up],
+        [speed * along],
         radius=0.5,
         mass=2.0,
-        gravity=[0, -9.81],
         walls=[[-5000 * along, 5000 * along]],
         restitution=restitution,
     )
@@ -107,7 +112,7 @@ def test_a_ball_placed_on_a_slope_is_followed_to_the_end(degrees, friction, lift
     )
     along = np.array([np.cos(a), -np.sin(a)])
     scene = lay_out(
-        position=[-3 * along + (0.2 + lift) * up],
+        [-3 * along + (0.2 + lift) * up],
         radius=0.2,
         gravity=[0, -10],
         walls=[[-4 * along, 80 * along]],
@@ -136,7 +141,7 @@ def test_what_overlaps_by_a_rounding_touches(height: float):
     # 0.9 - 0.6 and 0.3 differ by 5e-17, 0.3 - 0.1 and 0.2 by 3e-17
     floor = 0.6 if height > 0.5 else 0.0
     scene = lay_out(
-        position=[[0, height], [0, height + 0.4]],
+        [[0, height], [0, height + 0.4]],
         radius=[0.3, 0.1],
         gravity=[0, -10],
         walls=[[[-9, floor], [9, floor]]],
@@ -156,8 +161,8 @@ def test_a_collision_on_a_resting_disk_is_the_limit_of_small_gaps(
 ):
     # the two alternate with the floor until they part
     scene = lay_out(
-        position=[[0, 0.25], [0, 1.5]],
-        velocity=[[0, 0], [0, -1]],
+        [[0, 0.25], [0, 1.5]],
+        [[0, 0], [0, -1]],
         mass=[1, heavy],
         restitution=restitution,
         walls=FLOOR,
@@ -214,14 +219,12 @@ def hopping(scene: Scene, until: float, least: float) -> np.ndarray:
 
 
 def test_a_simulation_that_never_rests_comes_near_as_its_hops_shrink():
-    scene = lay_out(
-        position=[[0, 0.4], [-0.2, 2.6]],
-        velocity=[[0.5, 0], [0.4, 0]],
+    scene = falling(
+        [[0, 0.4], [-0.2, 2.6]],
+        [[0.5, 0], [0.4, 0]],
         radius=[0.3, 0.25],
         mass=[2, 1],
         restitution=0.6,
-        walls=FLOOR,
-        gravity=[0, -9.81],
     )
     one = asked(scene, 1.0)
     record = computed(one)
@@ -277,9 +280,7 @@ def test_energy_falls_nothing_overlaps_and_mirror_and_order_do_not_matter(
 
 def test_a_tail_that_something_can_reach_is_not_cut_short(monkeypatch: pytest.MonkeyPatch):
     # the planted bug: rule Z1 taken for granted
-    scene = lay_out(
-        position=[[0, 0.5], [0.1, 1.2]], restitution=0.9, walls=FLOOR, gravity=[0, -9.81]
-    )
+    scene = falling([[0, 0.5], [0.1, 1.2]], restitution=0.9)
     one = asked(scene, 1.0)
     right = states(one, computed(one))
     monkeypatch.setattr(oracle_resting, "untouched", lambda *_: True)
@@ -291,12 +292,8 @@ def test_a_tail_that_something_can_reach_is_not_cut_short(monkeypatch: pytest.Mo
 
 def test_a_resting_disk_slides_off_its_wall_or_on_to_the_next():
     # at 2 m/s off the edge: a parabola, as 4 > r g
-    scene = lay_out(
-        position=[[-1, 0.25]],
-        velocity=[2, 0],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-3, 0], [0, 0]], [[1, 0], [0, 0]], [[-9, -9], [9, -9]]],
+    scene = falling(
+        [[-1, 0.25]], [2, 0], walls=[[[-3, 0], [0, 0]], [[1, 0], [0, 0]], [[-9, -9], [9, -9]]]
     )
     one = asked(scene, 1.5)
     truth, t = states(one, computed(one)), one.times
@@ -323,9 +320,7 @@ def pieces(length: float, both: bool) -> list[list[list[float]]]:
 @pytest.mark.parametrize(("length", "both"), [(1.0, False), (1.375, False), (1.0, True)])
 def test_a_floor_of_pieces_is_a_floor(length: float, both: bool):
     for x, u in ((0.0, 0.0), (-1.25, 0.75)):
-        scene = lay_out(
-            position=[[x, 1.25]], velocity=[u, 0], gravity=[0, -9.81], restitution=0.5, walls=FLOOR
-        )
+        scene = falling([[x, 1.25]], [u, 0])
         whole, apart = (
             asked(replace(scene, walls=walls), 2.0) for walls in (FLOOR, pieces(length, both))
         )
@@ -338,13 +333,7 @@ def test_a_floor_of_pieces_is_a_floor(length: float, both: bool):
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_disk_that_passes_a_joint_in_its_bounces_rests_on_the_wall_beyond(turned: bool):
     second = [[4, 0], [0, 0]] if turned else [[0, 0], [4, 0]]
-    scene = lay_out(
-        position=[[-1, 0.3125]],
-        velocity=[4, 0],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 0], [4, 0]]],
-    )
+    scene = falling([[-1, 0.3125]], [4, 0], walls=[[[-4, 0], [4, 0]]])
     whole, apart = (
         asked(replace(scene, walls=walls), 2.0)
         for walls in (scene.walls, [[[-4, 0], [0, 0]], second])
@@ -363,12 +352,8 @@ def test_a_truth_that_ends_at_a_joint_says_that_the_walls_are_not_in_line():
     # A joint one unit in the last place off the line: a slow disk turns about it. Below the line it
     # bounces off the next wall to its rest.
     joint = float(np.nextafter(0.7, np.inf))
-    scene = lay_out(
-        position=[[-1, 1]],
-        velocity=[1, 0],
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 0.7], [0.25, joint]], [[0.25, joint], [4, 0.7]]],
+    scene = falling(
+        [[-1, 1]], [1, 0], walls=[[[-4, 0.7], [0.25, joint]], [[0.25, joint], [4, 0.7]]]
     )
     reason = computed(asked(scene, 2.0)).reason
     one = replace(scene, walls=[[[-4, 0.7], [4, 0.7]]])
@@ -382,15 +367,9 @@ def test_a_truth_that_ends_at_a_joint_says_that_the_walls_are_not_in_line():
 
 
 def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
-    wedge = lay_out(
-        position=[[0, 0.625]],
-        radius=0.5,
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]],
-    )
+    wedge = falling([[0, 0.625]], radius=0.5, walls=[[[-4, 3], [0, 0]], [[0, 0], [4, 3]]])
     balanced = lay_out(
-        position=[[0, 0], [0, 0.75], [0, 1.5]],
+        [[0, 0], [0, 0.75], [0, 1.5]],
         radius=[0.5, 0.25, 0.5],
         mass=[np.inf, 1, 1],
         gravity=[0, -9.81],
@@ -405,7 +384,7 @@ def test_what_lies_in_a_wedge_or_on_a_static_disk_stays():
 
 
 def test_a_thrust_lifts_a_resting_disk_and_lets_it_fall():
-    scene = lay_out(position=[[0, 0.25]], mass=2, gravity=[0, -9.81], restitution=0.5, walls=FLOOR)
+    scene = falling([[0, 0.25]], mass=2)
     one = asked(scene, 5.0, thrusts=[Thrust(0, 1.0, 1.5, [0.0, 4 * 9.81])])
     record = computed(one)
     truth, t = states(one, record), one.times
@@ -423,13 +402,7 @@ def test_a_thrust_lifts_a_resting_disk_and_lets_it_fall():
 def test_a_disk_in_the_corner_of_a_tilted_box_rests_on_both_walls():
     # Along one wall it bounces off the other to rest, as the two stand at right angles; at 106
     # degrees the bounces on both come so close that rounding decides their order first.
-    square = lay_out(
-        position=[[0, 2.25]],
-        radius=0.5,
-        gravity=[0, -9.81],
-        restitution=0.5,
-        walls=[[[-4, 3], [0, 0]], [[0, 0], [3, 4]]],
-    )
+    square = falling([[0, 2.25]], radius=0.5, walls=[[[-4, 3], [0, 0]], [[0, 0], [3, 4]]])
     record = computed(asked(square, 8.0))
     assert record.reason == ""
     assert {j for _, _, j in rests(record)} == {-1, -2}
@@ -477,7 +450,7 @@ def test_round_the_end_of_a_wall_no_momentum_is_said_to_stay():
 
 def dropped(restitution: float, duration: float = 1.0, scale: float = 1.0) -> Scenario:
     scene = lay_out(
-        position=[[0, scale]],
+        [[0, scale]],
         radius=scale / 4,
         restitution=restitution,
         gravity=[0, -9.81 / scale],
@@ -511,8 +484,8 @@ def test_bounces_are_exact_where_the_restitution_is_close_to_one(miss: float):
 def test_the_collisions_of_a_fast_disk_in_a_narrow_box_do_not_accumulate(restitution: float):
     # a collision each 1e-11 s: 64 of them within 1e-9 s
     scene = lay_out(
-        position=[[0, 0]],
-        velocity=[1e5, 3e4],
+        [[0, 0]],
+        [1e5, 3e4],
         radius=0.001,
         restitution=restitution,
         walls=box([-1.001e-3, -1.001e-3], [1.001e-3, 1.001e-3]),

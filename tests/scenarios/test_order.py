@@ -23,11 +23,7 @@ def three(turn: float, late: tuple[float, float, float] = (0, 0, 0), mass: float
     mass."""
     angle = turn + 2 * np.pi / 3 * np.arange(3)
     way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return lay_out(
-        position=(1 + np.array(late)[:, None]) * way,
-        velocity=-way,
-        mass=[mass, 1.0, 1.0],
-    )
+    return lay_out((1 + np.array(late)[:, None]) * way, -way, mass=[mass, 1.0, 1.0])
 
 
 def turned(points: list[list[float]], turn: float) -> Array:
@@ -41,8 +37,8 @@ def wall_and_disk(turn: float, late: float = 0.0) -> Scene:
     velocity = np.array([[0.0, -1.0], [-1.0, -0.75]])
     meet = np.array([[0.0, 0.25], [0.0, 0.25] + slant])
     return lay_out(
-        position=turned((meet - [[1.75], [1.75 + late]] * velocity).tolist(), turn),
-        velocity=turned(velocity.tolist(), turn),
+        turned((meet - [[1.75], [1.75 + late]] * velocity).tolist(), turn),
+        turned(velocity.tolist(), turn),
         mass=[1.0, 2.0],
         walls=[turned([[-5.0, 0.0], [5.0, 0.0]], turn)],
     )
@@ -50,8 +46,8 @@ def wall_and_disk(turn: float, late: float = 0.0) -> Scene:
 
 def corner(turn: float, restitution: float) -> Scene:
     return lay_out(
-        position=turned([[2.0, 2.0]], turn),
-        velocity=turned([[-1.0, -1.0]], turn),
+        turned([[2.0, 2.0]], turn),
+        turned([[-1.0, -1.0]], turn),
         restitution=restitution,
         walls=[turned([[0, 0], [5, 0]], turn), turned([[0, 5], [0, 0]], turn)],
     )
@@ -89,7 +85,7 @@ def test_collisions_that_their_order_does_not_change_keep_their_horizon():
         for restitution in (0.5, 1.0):
             assert record_of_scene(corner(turn, restitution)).horizon == np.inf
     row = lay_out(
-        position=[[-2.0, 0.0], [0.0, 0.0], [0.5 + 1e-16, 0.0], [1.0 + 3e-16, 0.0], [3.0, 0.0]],
-        velocity=[[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-1.0, 0.0]],
+        [[-2.0, 0.0], [0.0, 0.0], [0.5 + 1e-16, 0.0], [1.0 + 3e-16, 0.0], [3.0, 0.0]],
+        [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-1.0, 0.0]],
     )
     assert record_of_scene(row, 4.0).horizon == np.inf

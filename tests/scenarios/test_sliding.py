@@ -101,7 +101,7 @@ def test_a_disk_slides_on_slopes_steeper_than_mu_times_one_plus_k(k: float, tang
 def test_the_oracle_slides_from_the_same_slope_on():
     for mu, slips in ((0.2501, False), (0.2499, True)):
         scene = lay_out(
-            position=[[0.1875, 0.25]],
+            [[0.1875, 0.25]],
             radius=0.3125,
             walls=[[[-4, 3], [4, -3]]],
             gravity=[0.0, -10.0],

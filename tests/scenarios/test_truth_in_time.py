@@ -51,8 +51,8 @@ mass = 1.0
 
 def boxed(speed: float = 1.1) -> Scenario:
     scene = lay_out(
-        position=[[0.3, 0.4], [0.7, 0.6]],
-        velocity=[[speed, 0.7], [-0.4, 0.9]],
+        [[0.3, 0.4], [0.7, 0.6]],
+        [[speed, 0.7], [-0.4, 0.9]],
         radius=0.05,
         walls=box([0.0, 0.0], [1.0, 1.0]),
     )
