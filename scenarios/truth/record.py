@@ -34,40 +34,30 @@ NORMAL, SPEED, FALL, TURN = slice(8, 10), 10, 11, slice(12, 15)
 
 @dataclass(frozen=True, eq=False)
 class TruthRecord:
-    """An exact motion as a list of flights, with its error bound and its horizon.
+    """An exact motion as a list of flights, with its error bound and its horizon."""
 
-    Attributes:
-        legs: (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2; then, where the disk bounces on a
-            wall until it rests, the normal nx, ny, the speed m/s after the first bounce and the
-            acceleration m/s2 towards the wall, else 0; then, where there is friction, angle rad,
-            spin rad/s and its rate rad/s2, else 0. Sorted by disk, then by time.
-        events: (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
-            |v_n| / |v|; an impulse of 0 is no collision: from then on the disk rests on the other.
-        horizon: s; the motion is not known after it.
-        error_bound: m.
-        bits: precision of the numbers it was computed with.
-        method: "closed form", `TWO_PRECISIONS` (half as many bits give the same), `CERTIFIED`
-            (interval arithmetic), or `SEARCHED`.
-        reason: why it ends where it does.
-        float64_horizon: s; up to then float64 engines are compared with it, see `order.py`.
-        outcomes: (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends
-            because the order of collisions matters that are simultaneous but for a rounding.
-        orders: (p, 3) outcome, disk, other: for each outcome one order of collisions that leads to
-            it.
-        remains: sentences on what still holds after the end.
-    """
-
+    # (l, 15) disk, t s, x, y m, vx, vy m/s, ax, ay m/s2; then, where the disk bounces on a wall
+    # until it rests, the normal nx, ny, the speed m/s after the first bounce and the acceleration
+    # m/s2 towards the wall, else 0; then, where there is friction, angle rad, spin rad/s and its
+    # rate rad/s2, else 0. Sorted by disk, then by time.
     legs: Array = field(repr=False)
+    # (h, 5) t s, disk, other disk or -1 - wall, impulse N s, cosine of the impact angle
+    # |v_n| / |v|; an impulse of 0 is no collision: from then on the disk rests on the other.
     events: Array = field(repr=False)
-    horizon: float
-    error_bound: float
-    bits: int
+    horizon: float  # s; the motion is not known after it
+    error_bound: float  # m
+    bits: int  # precision of the numbers it was computed with
+    # "closed form", `TWO_PRECISIONS` (half as many bits give the same), `CERTIFIED` (interval
+    # arithmetic), or `SEARCHED`
     method: str
-    reason: str
-    float64_horizon: float = np.inf
+    reason: str  # why it ends where it does
+    float64_horizon: float = np.inf  # s; up to then float64 engines are compared, see `order.py`
+    # (o, 4) outcome, disk, vx, vy m/s: all possible outcomes, where the motion ends because the
+    # order of collisions matters that are simultaneous but for a rounding
     outcomes: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 4))))
+    # (p, 3) outcome, disk, other: for each outcome one order of collisions that leads to it
     orders: Array = field(repr=False, default_factory=lambda: frozen(np.zeros((0, 3))))
-    remains: tuple[str, ...] = ()
+    remains: tuple[str, ...] = ()  # sentences on what still holds after the end
 
     def motion(
         self, scene: Scene, thrusts: Sequence[Thrust], t: Array

@@ -14,6 +14,7 @@ from contextlib import suppress
 import numpy as np
 
 from crosscheck2d.scenarios.model import Scene, Thrust
+from crosscheck2d.scenarios.truth.oracle import resting
 from crosscheck2d.scenarios.truth.oracle.bodies import Bodies
 from crosscheck2d.scenarios.truth.oracle.contact_finder import ContactFinder
 from crosscheck2d.scenarios.truth.oracle.contacts import Pressed
@@ -26,22 +27,6 @@ from crosscheck2d.scenarios.truth.oracle.path import (
     Record,
     WorkLimit,
     ambiguous,
-)
-from crosscheck2d.scenarios.truth.oracle.resting import (
-    NO_GAP,
-    NO_MATTER,
-    NoLimit,
-    below,
-    gap_of,
-    in_step_after,
-    lasting,
-    lie_down,
-    limit_of_series,
-    nearly_in_line,
-    next_in_line,
-    press,
-    probe,
-    settle,
 )
 from crosscheck2d.scenarios.truth.oracle.ties import (
     ENDLESS,
@@ -92,7 +77,9 @@ class Motion:
             while self.advance():
                 self.work.step(float(self.now), self.k.bits)
         except MotionEnds as end:
-            advice = [nearly_in_line(self.finder, i, float(self.now)) for i in end.disks[:1]]
+            advice = [
+                resting.nearly_in_line(self.finder, i, float(self.now)) for i in end.disks[:1]
+            ]
             self.path.end, self.path.reason = end.t, "".join([str(end), *advice])
             self.path.disks, self.path.outcomes = end.disks, end.outcomes
             self.path.few_bits = end.few_bits
@@ -107,7 +94,7 @@ class Motion:
     def begin(self) -> None:
         while self.starts_and_stops and self.starts_and_stops[-1][0] == 0:
             self.set_thrusts(self.starts_and_stops.pop()[1])
-        for contact in lie_down(self.finder):
+        for contact in resting.lie_down(self.finder):
             self.rest(contact)
         self.follow_up(set(np.flatnonzero(~self.scene.static).tolist()))
 
@@ -221,7 +208,7 @@ class Motion:
         self.due[i] = float(t) if float(t) <= self.until else np.inf
 
     def press(self, contact: Contact) -> None:
-        if not press(self.finder, contact, self.now):
+        if not resting.press(self.finder, contact, self.now):
             if self.join(contact):
                 return
             on = [self.bodies.name(held) for held in self.bodies.held[contact.i]]
@@ -235,7 +222,7 @@ class Motion:
     def join(self, contact: Contact) -> bool:
         """Let the disks that forces keep in contact move as one; False if none do."""
         bodies, before = self.bodies, {key(c) for held in self.bodies.held for c in held}
-        groups = lasting(self.finder, contact, self.now)
+        groups = resting.lasting(self.finder, contact, self.now)
         for group in groups:
             for i in group.disks:
                 ours = [c for c in group.contacts if i in c.disks]
@@ -321,14 +308,18 @@ class Motion:
         disks = {k for contact in contacts for k in contact.disks}
         v = {k: bodies.velocity_at(k, self.now) for k in disks}
         try:
-            limit = limit_of_series(self.finder, touches, v, self.until - now)
-        except NoLimit as fault:
+            limit = resting.limit_of_series(self.finder, touches, v, self.until - now)
+        except resting.NoLimit as fault:
             if i in recent.since:
                 end = recent.ends(i, now, bodies.name)
                 end.few_bits = fault.few_bits
                 raise end from None
             return
-        if limit is None and len(touches) > 1 and gap_of(self.finder, touches, self.now) <= NO_GAP:
+        if (
+            limit is None
+            and len(touches) > 1
+            and resting.gap_of(self.finder, touches, self.now) <= resting.NO_GAP
+        ):
             limit = bodies.law.closed(touches, v, frozenset())
         if limit is None:
             return
@@ -362,14 +353,14 @@ class Motion:
 
     def after_all(self, touches: Sequence[Touch], v: Velocities) -> TieOutcome:
         bodies = self.bodies
-        resting = frozenset(contact for held in bodies.held for contact in held)
-        ends, tried = bodies.law.outcomes(touches, v, resting, bodies.stays_still)
+        held = frozenset(contact for contacts in bodies.held for contact in contacts)
+        ends, tried = bodies.law.outcomes(touches, v, held, bodies.stays_still)
         self.work.left -= tried
         if len(ends) == 1 and ends[0].velocities:
             return ends[0]
-        with suppress(NoLimit):
+        with suppress(resting.NoLimit):
             rest = self.until - float(self.now)
-            if limit := limit_of_series(self.finder, touches, v, rest, NO_MATTER):
+            if limit := resting.limit_of_series(self.finder, touches, v, rest, resting.NO_MATTER):
                 return limit
         disks = [i for i in v if i < self.scene.n]
         known = [end for end in ends if end.velocities]
@@ -408,7 +399,7 @@ class Motion:
         if outcome.searched:
             self.path.searched = min(self.path.searched, float(self.now))
         members, still_keys = self.ungroup(touched) - touched, {key(c) for c in outcome.still}
-        velocities, in_step = in_step_after(self.finder, outcome, touches)
+        velocities, in_step = resting.in_step_after(self.finder, outcome, touches)
         for i in sorted(touched):
             bodies.held[i] = tuple(c for c in bodies.held[i] if key(c) in still_keys)
             vx, vy, spin = velocities[i]
@@ -422,7 +413,7 @@ class Motion:
             bodies.no_slip_on[rolls_on.i] = rolls_on
         stop = None
         if bounce is not None and 0 < self.scene.restitution < 1:
-            stop = settle(self.finder, bounce, self.now, self.thrusts)
+            stop = resting.settle(self.finder, bounce, self.now, self.thrusts)
         self.follow_up(touched | members)
         if stop is not None and bounce is not None:
             self.expect(bounce.i, stop, (bounce._replace(kind="rest"),))
@@ -435,7 +426,7 @@ class Motion:
 
     def stop(self, contact: Contact) -> None:
         bodies, i = self.bodies, contact.i
-        wall = below(self.finder, contact._replace(kind="wall"), self.now)
+        wall = resting.below(self.finder, contact._replace(kind="wall"), self.now)
         bodies.hold(i, self.now, (*bodies.held[i], wall), bodies.velocity_at(i, self.now), True)
         self.rest(wall)
         self.follow_up({i})
@@ -455,7 +446,7 @@ class Motion:
             bodies.velocity_at(i, self.now),
             self.scene.walls[contact.j, 1 if contact.side > 0 else 0],
         )
-        following = next_in_line(self.finder, held[0], contact.side)
+        following = resting.next_in_line(self.finder, held[0], contact.side)
         if bodies.group[i]:
             reason = f"disk {i} reaches the end of wall {contact.j} while it touches another"
             raise MotionEnds(float(self.now), reason, [i])
@@ -496,7 +487,7 @@ class Motion:
 
     def probe(self, contact: Contact) -> None:
         """Find how long a disk under a thrust that turns with it certainly touches nothing."""
-        after = probe(self.finder, contact.i, self.now)
+        after = resting.probe(self.finder, contact.i, self.now)
         self.expect(contact.i, self.now + self.k.exact(after), (contact,))
 
     def set_thrusts(self, disk: int) -> set[int]:

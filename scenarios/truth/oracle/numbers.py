@@ -32,31 +32,18 @@ class Undecided(ArithmeticError):
 
 @dataclass(frozen=True)
 class Numbers:
-    """One kind of numbers at one precision.
+    """One kind of numbers at one precision."""
 
-    Attributes:
-        name: the library's type.
-        bits: of each number.
-        exact: float64 -> the same number, unrounded.
-        sqrt: number -> its root.
-        sign: number -> -1, 0 or 1; 0 where it is below `tie`.
-        precise: makes the context in which all arithmetic is done.
-        between: two float64 -> a number between them; for balls, one that contains both.
-        spread: number -> the radius of a ball; 0 for other numbers.
-        tie: smaller numbers count as zero; in s, m and m/s, as scenes are of the order of 1.
-        proves: whether these are balls.
-    """
-
-    name: str
-    bits: int
-    exact: Callable[[float], Number]
+    name: str  # the library's type
+    bits: int  # of each number
+    exact: Callable[[float], Number]  # the same number, unrounded
     sqrt: Callable[[Number], Number]
-    sign: Callable[[Number], int]
-    precise: Callable[[], AbstractContextManager[Any]]
-    tie: Number
-    between: Callable[[float, float], Number]
-    spread: Callable[[Number], float]
-    proves: bool = False
+    sign: Callable[[Number], int]  # -1, 0 or 1; 0 below `tie`
+    precise: Callable[[], AbstractContextManager[Any]]  # in which all arithmetic is done
+    tie: Number  # smaller numbers count as zero; in s, m and m/s, as scenes are of the order of 1
+    between: Callable[[float, float], Number]  # for balls, one that contains both
+    spread: Callable[[Number], float]  # the radius of a ball; 0 for other numbers
+    proves: bool = False  # whether these are balls
 
 
 def mpfr(bits: int) -> Numbers:

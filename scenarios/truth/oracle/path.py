@@ -66,42 +66,25 @@ class Record(NamedTuple):
 
 @dataclass
 class Path:
-    """A computed motion.
+    """A computed motion."""
 
-    Attributes:
-        legs: of each disk, in order of time.
-        events: the collisions.
-        end, reason: s, up to when there is an exact answer, and why it ends there.
-        disks: those that the reason concerns.
-        outcomes: the possible outcomes at the end, if they are known.
-        named: the collisions of each outcome: disk, other disk or -1 - wall.
-        few_bits: whether it ends because its numbers have too few bits.
-        searched: s, from when on it rests on a search, see `TieOutcome`.
-    """
-
-    legs: list[list[Leg]]
+    legs: list[list[Leg]]  # of each disk, in order of time
     events: list[Event] = field(default_factory=list)
-    end: float = np.inf
-    reason: str = ""
-    disks: list[int] = field(default_factory=list)
-    outcomes: list[TieOutcome] = field(default_factory=list)
+    end: float = np.inf  # s, up to when there is an exact answer
+    reason: str = ""  # why it ends there
+    disks: list[int] = field(default_factory=list)  # those that the reason concerns
+    outcomes: list[TieOutcome] = field(default_factory=list)  # at the end, if they are known
+    # the collisions of each outcome: disk, other disk or -1 - wall
     named: list[list[tuple[int, int]]] = field(default_factory=list)
-    few_bits: bool = False
-    searched: float = np.inf
+    few_bits: bool = False  # whether it ends because its numbers have too few bits
+    searched: float = np.inf  # s, from when on it rests on a search, see `TieOutcome`
 
     def cut(self, end: float, reason: str) -> Path:
         return Path(self.legs, self.events, end, reason, searched=self.searched)
 
 
 class RecentCollisions:
-    """The latest collisions of each disk of a scene.
-
-    Attributes:
-        instant: s; so many collisions within it accumulate. At e = 1 it is 0: there are finitely
-            many collisions in a finite time (Vaserstein, Commun. Math. Phys. 69, 31, 1979).
-        since: disk -> s, when its collisions began to accumulate.
-        closed: the latest contacts of each disk whose collisions have died out.
-    """
+    """The latest collisions of each disk of a scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.collisions: list[deque[tuple[float, Contact]]] = [
@@ -112,10 +95,13 @@ class RecentCollisions:
             float(np.hypot(*scene.velocity.T).max()),
             float(np.sqrt(np.hypot(*scene.gravity) * radius)),
         )
+        # s; so many collisions within it accumulate. At e = 1 it is 0: there are finitely many
+        # collisions in a finite time (Vaserstein, Commun. Math. Phys. 69, 31, 1979).
         self.instant = min(INSTANT, SHARE * radius / fastest) if fastest else INSTANT
         if scene.restitution == 1:
             self.instant = 0.0
-        self.since: dict[int, float] = {}
+        self.since: dict[int, float] = {}  # s, when the collisions of a disk began to accumulate
+        # the latest contacts of each disk whose collisions have died out
         self.closed: list[deque[tuple[float, Contact]]] = [deque(maxlen=OFTEN) for _ in scene.mass]
 
     def add(self, t: float, contact: Contact) -> list[int]:
@@ -183,18 +169,12 @@ def ambiguous(disks: Sequence[int], ends: Sequence[TieOutcome]) -> str:
 
 
 class TimeLimit:
-    """A time limit for all attempts at an answer, from the creation of the object on.
-
-    An answer that it cuts short depends on the machine, and is never cached.
-
-    Attributes:
-        end: s, as of `monotonic`, when the time runs out.
-        reason: why an answer that is cut short ends.
-        expired: whether an attempt was cut short.
-    """
+    """A time limit for all attempts at an answer, from the creation of the object on. An answer
+    that it cuts short, for this reason, depends on the machine, and is never cached."""
 
     def __init__(self, seconds: float = inf, reason: str = "") -> None:
-        self.end, self.reason, self.expired = monotonic() + seconds, reason, False
+        self.end, self.reason = monotonic() + seconds, reason
+        self.expired = False  # whether an attempt was cut short
 
 
 class WorkLimit:
