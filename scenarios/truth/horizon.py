@@ -91,35 +91,26 @@ class Body(NamedTuple):
 
 class TangentVectors:
     """Deviations of a motion, to first order, carried along a path: one for a rounding error of
-    each number of the initial state.
-
-    Attributes:
-        moving: the disks that are not static.
-        t: (n,) s, the time up to which each disk has been carried.
-        leg: (n,) the index of its leg then.
-        dx, dv, dw: (n, d, 2) m, m/s and (n, d) rad/s, the deviations of each disk then, for each of
-            the d numbers.
-        collided_at, v, spin: (n,) s, (n, 2) m/s and (n,) rad/s, the time of the last collision of
-            each disk, and its velocity after that.
-        instant: s, the latest collision.
-        late: (d,) s, its delay for each deviation.
-        diverged: s, when the first disk diverges; inf: none has so far.
-    """
+    each of the d numbers of the initial state."""
 
     def __init__(self, scenario: Scenario, path: Path) -> None:
         scene = scenario.scene
         self.scene, self.path, self.moving = scene, path, np.flatnonzero(~scene.static).tolist()
+        # (n,) s, up to when each disk has been carried; its leg then; and its deviations then:
+        # (n, d, 2) m and m/s, (n, d) rad/s
         self.t, self.leg = np.zeros(scene.n), [0] * scene.n
         self.dx, self.dv, self.dw = roundings(scene)
+        # (n,) s, (n, 2) m/s, (n,) rad/s: the last collision of each disk, its velocity after that
         self.collided_at, self.v = np.full(scene.n, -1.0), np.zeros((scene.n, 2))
         self.spin = np.zeros(scene.n)
         turns = ~scene.static & np.isfinite(scene.inertia)
         self.inverse_inertia = np.where(turns, 1 / scene.inertia, 0.0)
+        # s, the latest collision; (d,) s, its delay for each deviation
         self.instant, self.late = 0.0, np.zeros(self.dx.shape[1])
         self.starts_and_stops = {
             edge for thrust in scenario.thrusts for edge in (thrust.start, thrust.stop)
         }
-        self.diverged = np.inf
+        self.diverged = np.inf  # s, when the first disk diverges
 
     def carry(self, i: int, until: float) -> None:
         legs = self.path.legs[i]

@@ -70,20 +70,12 @@ class Near(NamedTuple):
 
 
 class CollisionOrder:
-    """Whether rounding decides the order of the collisions of a path, from its `tangents`.
-
-    Attributes:
-        end: s, of the path.
-        legs: (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time.
-        begun: how many of the legs have begun.
-        now: (n, 8) the latest leg of each disk that has begun.
-        span: (w, 2) m, each wall from its start to its end.
-        way: (w, 2) 1/m, `span` over its length squared.
-    """
+    """Whether rounding decides the order of the collisions of a path, from its `tangents`."""
 
     def __init__(self, scenario: Scenario, path: Path, tangents: TangentVectors) -> None:
         self.scene, self.path, self.tangents = scenario.scene, path, tangents
         self.end = min(path.end, scenario.duration)
+        # (l, 8) t s, disk, x, y m, vx, vy m/s, ax, ay m/s2, sorted by time
         rows = [
             # A thrust that turns with its disk ends before the disk touches anything.
             [*map(float, (leg.t, i, *((np.nan,) * 6 if leg.jet else leg[1:7])))]
@@ -91,8 +83,10 @@ class CollisionOrder:
             for leg in legs
         ]
         self.legs = np.array(sorted(rows, key=lambda row: row[0]))
+        # how many of the legs have begun, and (n, 8) the latest of these of each disk
         self.begun, self.now = 0, np.zeros((self.scene.n, 8))
         self.span = self.scene.walls[:, 1] - self.scene.walls[:, 0]
+        # 1/m; the share of the wall at which the foot of a vector lies
         self.way = self.span / (self.span**2).sum(axis=1)[:, None]
 
     def cut(self, event: Event) -> Path | None:

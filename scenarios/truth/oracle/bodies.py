@@ -77,29 +77,8 @@ class Frame(NamedTuple):
 
 
 class Bodies:
-    """n disks and, as static disks of radius 0, the ends of the walls; b of them together.
-
-    Attributes:
-        legs: (b,) the leg each body is on.
-        count: (b,) events each has had.
-        table, radii: (b, 7) and (b,) the legs as float64, see `filter.py`, and the radii, m.
-        shape: (b,) whether each leg is a point, a straight line or a parabola.
-        asleep: (b,) whether the bounces of each die out without another contact: it is then left
-            out of all searches.
-        held: (b,) the contacts each rests on: gap 0, no speed and no acceleration along the normal.
-        group: (b,) the disks that move as one with each, because forces keep them in contact.
-        common: (b,) the kind of such a group and its acceleration, m/s2; else None.
-        separated: pair -> the event counts of both when they touched and did not approach.
-        in_step: the same for pairs that touched and had exactly the same velocity.
-        leaning: (b,) the walls that each touched without approach at the start of its leg.
-        law: masses, restitution and friction.
-        rates: (b,) rad/s2, angular acceleration by torques; used only with friction.
-        no_slip_on: (b,) the wall on which each has exactly no slip since the collision at the start
-            of its leg.
-        sliding: (b,) the sign of the slip of a disk that rests on a wall with friction.
-        snug: the bodies of a pair, or disk, wall and side -> m, the distance of their centres, or
-            of centre and wall, where they touch at the start but for a rounding.
-    """
+    """n disks and, as static disks of radius 0, the ends of the walls; each list has an entry for
+    each of them."""
 
     def __init__(self, scene: Scene, k: Numbers, turning: bool = False) -> None:
         self.k, self.scene, exact = k, scene, k.exact
@@ -128,11 +107,13 @@ class Bodies:
             self.kind = [STATIC] * len(self.legs)
         # The kind and the acceleration of each in free flight.
         self.free = [(kind, leg.ax, leg.ay) for kind, leg in zip(self.kind, self.legs)]
-        self.count = [0] * len(self.legs)
+        self.count = [0] * len(self.legs)  # events each has had
         self.radii = np.append(scene.radius, np.zeros(len(ends)))
         self.radius = [exact(r) for r in self.radii.tolist()]
+        # the legs as float64, see `filter.py`
         self.table = np.array([[float(x) for x in (*leg[1:7], leg.t)] for leg in self.legs])
         self.shape = [shape_of(row) for row in self.table.tolist()]
+        # whether the bounces of each die out without another contact: left out of all searches
         self.asleep = np.zeros(len(self.legs), bool)
         mass = [exact(m) if np.isfinite(m) else None for m in scene.mass.tolist()]
         inverse = [nought if m is None else exact(1.0) / m for m in mass] + [nought] * len(ends)
@@ -140,16 +121,26 @@ class Bodies:
             k, inverse, exact(scene.restitution), scene.restitution == 0, self._friction()
         )
         self.walls = [_frame(k, wall) for wall in scene.walls.tolist()]
+        # pair -> the event counts of both when they touched and did not approach; or when they had
+        # exactly the same velocity
         self.separated: dict[tuple[int, int], tuple[int, int]] = {}
         self.in_step: dict[tuple[int, int], tuple[int, int]] = {}
+        # the disks that move as one with each, because forces keep them in contact; and the kind of
+        # such a group and its acceleration, m/s2
         self.group: list[frozenset[int]] = [frozenset() for _ in self.legs]
         self.common: list[tuple[int, Number, Number] | None] = [None for _ in self.legs]
+        # the walls that each touched without approach at the start of its leg
         self.leaning: list[set[Contact]] = [set() for _ in self.legs]
+        # the contacts each rests on: gap 0, no speed and no acceleration along the normal
         self.held: list[tuple[Contact, ...]] = [() for _ in self.legs]
+        # rad/s2, angular acceleration by torques; used only with friction
         self.nought, self.rates = nought, [nought for _ in self.legs]
         self.jet: list[tuple[Number, Number] | None] = [None for _ in self.legs]
+        # the wall on which each has exactly no slip since the collision at the start of its leg
         self.no_slip_on: list[Contact | None] = [None for _ in self.legs]
-        self.sliding = [0 for _ in self.legs]
+        self.sliding = [0 for _ in self.legs]  # sign of the slip on a wall with friction
+        # the bodies of a pair, or disk, wall and side -> m, the distance of their centres, or of
+        # centre and wall, where they touch at the start but for a rounding
         self.snug: dict[tuple[int, ...], Number] = {}
 
     def _friction(self) -> Friction | None:

@@ -107,15 +107,14 @@ class ContactFinder:
 
     def time_to(self, contact: Contact, now: Number, limit: float) -> Number | None:
         """s from `now`; None if the contact does not come within `limit` s. Raises `Pressed`."""
-        if contact.kind == "edge":
-            return self._time_to_edge(contact, now)
-        if contact.kind == "end":
-            return self._time_to_end(contact, now)
-        if contact.kind == "slip end":
-            return self._time_to_grip(contact, now)
-        if contact.kind == "wall":
-            return self._time_to_wall(contact, now)
-        return self._time_to_body(contact, now, limit)
+        if contact.kind == "body":
+            return self._time_to_body(contact, now, limit)
+        return {
+            "edge": self._time_to_edge,
+            "end": self._time_to_end,
+            "slip end": self._time_to_grip,
+            "wall": self._time_to_wall,
+        }[contact.kind](contact, now)
 
     def _time_to_body(self, contact: Contact, now: Number, limit: float) -> Number | None:
         bodies, i, j = self.bodies, contact.i, contact.j
