@@ -131,7 +131,7 @@ def disk_between_static_disks() -> Scenario:
     centre, place, speed = 0.375, -0.00390625, 0.26953125  # in units of `along`, which has length 5
     scene = lay_out(
         [place * along, -centre * along, centre * along],
-        [speed * along, [0, 0], [0, 0]],
+        [speed * along, 0 * along, 0 * along],
         radius=[radius, static, static],
         mass=[1.0, np.inf, np.inf],
     )
