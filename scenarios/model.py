@@ -8,13 +8,14 @@ value and what it must be.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from crosscheck2d.scenarios.faults import check_scenario, check_scene, check_thrust
 
 Array = NDArray[np.float64]
 DEFAULT: Any = None  # stands for the default value in the comment of the field
@@ -57,8 +58,7 @@ class Scene:
         for name, value in (defaults | given).items():
             scalar = name in ("restitution", "friction")
             object.__setattr__(self, name, value if scalar else frozen(value))
-        if faults := _shape_faults(self) or [*_disk_faults(self), *_surrounding_faults(self)]:
-            raise ValueError("; ".join(faults))
+        check_scene(self)
 
     @property
     def n(self) -> int:
@@ -76,70 +76,6 @@ class Scene:
         return State(self.position, self.velocity, self.angle, self.angular_velocity)
 
 
-def _shape_faults(scene: Scene) -> list[str]:
-    n = len(np.atleast_1d(scene.radius))
-    shapes = {
-        **dict.fromkeys(("position", "velocity"), (n, 2)),
-        **dict.fromkeys(("radius", "mass", "angle", "angular_velocity", "inertia"), (n,)),
-        "gravity": (2,),
-        "wrap": (2, 2),
-    }
-    faults = [
-        f"{name} has shape {getattr(scene, name).shape}, must be {shape}"
-        for name, shape in shapes.items()
-        if getattr(scene, name) is not None and getattr(scene, name).shape != shape
-    ]
-    if scene.walls.ndim != 3 or scene.walls.shape[1:] != (2, 2):
-        faults.append(f"walls has shape {scene.walls.shape}, must be (w, 2, 2)")
-    return faults
-
-
-def _disk_faults(scene: Scene) -> list[str]:
-    faults = [] if scene.n else ["radius is empty, must have at least one disk"]
-    finite = ("position", "velocity", "angle", "angular_velocity", "walls", "gravity")
-    faults += [
-        f"{name} holds a value that is not finite"
-        for name in finite
-        if not np.isfinite(getattr(scene, name)).all()
-    ]
-    for i in range(scene.n):
-        if not (0 < scene.radius[i] < np.inf):
-            faults.append(f"radius[{i}] is {scene.radius[i]:g} m, must be positive and finite")
-        if not scene.mass[i] > 0:
-            faults.append(f"mass[{i}] is {scene.mass[i]:g} kg, must be positive (inf: static)")
-        if not scene.inertia[i] > 0:
-            faults.append(f"inertia[{i}] is {scene.inertia[i]:g} kg m2, must be positive")
-        if np.isinf(scene.mass[i]) and (scene.velocity[i].any() or scene.angular_velocity[i]):
-            faults.append(f"velocity[{i}] of a static disk (mass inf) must be zero")
-    return faults
-
-
-def _surrounding_faults(scene: Scene) -> list[str]:
-    faults = []
-    for name, most, must in (
-        ("restitution", 1.0, "from 0 to 1"),
-        ("friction", np.finfo(float).max, "at least 0 and finite"),
-    ):
-        value = getattr(scene, name)
-        if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
-            faults.append(f"{name} is {value!r}, must be a number {must}")
-        elif not 0 <= value <= most:
-            faults.append(f"{name} is {value:g}, must be {must}")
-    for w in np.flatnonzero((scene.walls[:, 0] == scene.walls[:, 1]).all(axis=1)):
-        faults.append(f"walls[{w}] has no length, must go from one point to another")
-    if scene.wrap is None:
-        return faults
-    low, high = scene.wrap
-    if not (low < high).all():
-        corners = [low.tolist(), high.tolist()]
-        return [*faults, f"wrap is {corners}, must be [low, high] with low below high"]
-    outside = ((scene.position < low) | (scene.position > high)).any(axis=1)
-    return faults + [
-        f"position[{i}] is {scene.position[i].tolist()} m, must be inside the wrap box"
-        for i in np.flatnonzero(outside)
-    ]
-
-
 @dataclass(frozen=True, eq=False)
 class Thrust:
     """A constant thrust on one disk for `start` <= t < `stop`."""
@@ -153,17 +89,7 @@ class Thrust:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "force", frozen(self.force))
-        force, torque = self.force, self.torque
-        if force.shape != (2,) or not np.isfinite([*force, torque]).all():
-            raise ValueError(
-                f"thrust: force {force} and torque {torque} must be finite (2,) and scalar"
-            )
-        if not 0 <= self.start < self.stop:
-            raise ValueError(
-                f"thrust: start {self.start:g} s must be at least 0 and before stop {self.stop:g} s"
-            )
-        if self.frame not in ("world", "body"):
-            raise ValueError(f"thrust: frame is {self.frame!r}, must be 'world' or 'body'")
+        check_thrust(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,25 +113,7 @@ class Scenario:
     def __post_init__(self) -> None:
         object.__setattr__(self, "substeps", tuple(self.substeps))
         object.__setattr__(self, "thrusts", tuple(self.thrusts))
-        if not re.fullmatch(r"[a-z0-9][a-z0-9_-]*", self.name):
-            raise ValueError(
-                f"name is {self.name!r}, must be lower-case letters, digits, '_' and '-'"
-            )
-        duration, interval, substeps = self.duration, self.sample_interval, list(self.substeps)
-        if not (0 < interval < np.inf and 0 < duration < np.inf):
-            raise ValueError("duration and sample_interval must be positive and finite")
-        if abs(duration / interval - self.intervals) > 1e-9 * self.intervals:
-            raise ValueError(
-                f"sample_interval {interval:g} s does not divide the duration {duration:g} s"
-            )
-        whole = all(k == int(k) and k >= 1 for k in substeps)
-        if not substeps or not whole or sorted(set(substeps)) != substeps:
-            raise ValueError(f"substeps is {substeps}, must be whole numbers from 1, increasing")
-        for thrust in self.thrusts:
-            if not 0 <= thrust.disk < self.scene.n:
-                raise ValueError(
-                    f"thrust: disk {thrust.disk} is not one of the {self.scene.n} disks"
-                )
+        check_scenario(self)
 
     @property
     def intervals(self) -> int:
