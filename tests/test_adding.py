@@ -113,14 +113,13 @@ ADDED: dict[str, list[Added]] = {
     "a metric": [
         Added(
             "reports/compare/metrics.py",
-            "def toy_metric(view: View) -> Value | None:\n"
-            '    """42, whatever was played."""\n    return Value(42.0)\n\n\n',
-            "METRICS: dict",
+            "def toy_metric(view: View) -> Value | None:\n    return Value(42.0)\n\n\n",
+            "BESIDE = ",
         ),
         Added(
             "reports/compare/metrics.py",
-            '    "toy_metric": Metric(toy_metric, "1", (ITSELF,)),\n',
-            '    "position_max_radii"',
+            '    Metric(toy_metric, "1", (ITSELF,), "", "42, whatever was played."),\n',
+            "    Metric(\n        position_max_radii,",
         ),
     ],
     "a lesson": [

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck2d.reports.compare import laws, scales, violations
-from crosscheck2d.reports.compare.delays import WINDOW, collision_free
-from crosscheck2d.reports.compare.faces import SAME, interval
+from crosscheck2d.reports.compare import laws, scales
+from crosscheck2d.reports.compare.collisions import SAME, WINDOW, interval
+from crosscheck2d.reports.compare.delays import collision_free
 from crosscheck2d.reports.compare.view import LEAST_SHARE, Value, View, not_judged
 from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
 
@@ -70,7 +70,7 @@ def slip_at_rest(view: View) -> Value | None:
 
 def has_friction(view: View) -> bool:
     """Whether disks collide with friction in the exact answer that the run is compared with."""
-    if not view.scenario.scene.friction or view.other is None or view.jumps is None:
+    if not view.scene.friction or view.other is None or view.jumps is None:
         return False
     return bool(view.other.collisions.impulse.any())
 
@@ -81,7 +81,7 @@ def over_collisions(value: Value, carried: int, view: View) -> Value:
     assert view.other is not None
     met = view.other.collisions
     sides = np.stack([met.i, met.j])[:, met.impulse > 0]
-    every = int((~view.scenario.scene.static[sides[sides >= 0]]).sum())
+    every = int((~view.scene.static[sides[sides >= 0]]).sum())
     share = f"{carried} of {every} times a disk collides are far enough from all other collisions"
     if carried < max(LEAST_SHARE * every, 1):
         return not_judged(f"only {share}")
@@ -145,7 +145,7 @@ def isolated_collisions(truth: Trajectory, scenario: Scenario, dt: float) -> lis
 def friction_impulse_error(view: View) -> Value | None:
     """Largest error of the impulse of friction in a collision: I dw / r of a disk, because only
     friction changes its spin."""
-    scene, truth = view.scenario.scene, view.other
+    scene, truth = view.scene, view.other
     if truth is None or not has_friction(view):
         return None
     worst, judged = Value(0.0), 0
@@ -183,7 +183,7 @@ def loss_error(view: View, of_friction: bool) -> Value | None:
     """One of the two losses, engine minus truth, over all collisions that can be read off two
     samples."""
     scenario, truth = view.scenario, view.other
-    if truth is None or not has_friction(view) or scenario.thrusts or violations.lifts(scenario):
+    if truth is None or not has_friction(view) or scenario.thrusts or scales.lifts(scenario):
         return None
     losses = np.array(
         [

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck2d.reports.compare import laws
-from crosscheck2d.reports.compare.faces import SAME, interval, on_faces
+from crosscheck2d.reports.compare.collisions import SAME, interval, on_faces
 from crosscheck2d.scenarios.model import Array, Scene, Trajectory
 
 

@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 
 from crosscheck2d.adapters.engine_row import FLOAT64
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.compare import laws, scales, violations
+from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.against import ITSELF
 from crosscheck2d.reports.compare.restitution import TINY
-from crosscheck2d.reports.compare.view import View, rounding_of
+from crosscheck2d.reports.compare.view import rounding_of
 from crosscheck2d.scenarios.model import Array, Scenario, Trajectory
 
 MOST_OVERLAP = 0.1  # radii, beyond what disks approach in two steps
@@ -136,13 +136,6 @@ def verdicts_on(run: Run, scenario: Scenario, truth: Trajectory | None) -> list[
 def first_failed(run: Run, scenario: Scenario, truth: Trajectory | None) -> Verdict | None:
     """The first verdict that the run fails."""
     return next((each for each in verdicts_on(run, scenario, truth) if each.failed), None)
-
-
-def failures(table: pd.DataFrame) -> dict[tuple[str, float], str]:
-    """(`engine:profile`, dt in s) -> the first verdict that fails in deviations.csv, in words."""
-    rows = fails(table)[::-1]  # of several the first stays
-    names = zip(rows.engine + ":" + rows.profile, rows.dt_s.astype(float))
-    return dict(zip(names, map(in_words, rows.metric, rows.value.astype(float))))
 
 
 def fails(table: pd.DataFrame) -> pd.DataFrame:
@@ -307,14 +300,14 @@ class Judge:
     def energy(self) -> Iterator[Verdict]:
         """`energy_gained`, `energy_lost` where energy is conserved, `bounce_gained`."""
         scenario, t = self.scenario, self.played.t
-        if scenario.thrusts or violations.lifts(scenario):
+        if scenario.thrusts or scales.lifts(scenario):
             return
         scale = scales.energy(scenario) or 1.0
         energy = laws.energy(self.played, scenario.scene)
         known = laws.half_step(self.played, scenario.scene, self.dt) / scale
         gained = (energy - energy[0]) / scale
         yield worst_of("energy_gained", t[2:], least_of_three(gained - known), MOST_RISE)
-        if violations.keeps_energy(scenario):
+        if scales.keeps_energy(scenario):
             # what never comes back: a soft contact holds energy while it lasts
             best = np.maximum.accumulate((gained + known)[::-1])[::-1][: len(t) - len(t) // 10]
             yield worst_of("energy_lost", t, -best, MOST_RISE)
@@ -344,7 +337,7 @@ class Judge:
     def flight(self) -> Iterator[Verdict]:
         """`momentum` where the outer forces are known, and `gravity` where disks touch nothing."""
         scenario, t = self.scenario, self.played.t
-        off = violations.momentum(View(scenario, self.dt, self.played))
+        off = scales.unexplained_momentum(scenario, self.played)
         if off is not None:
             # each step rounds each velocity once; free fall adds to the momentum at hand
             momenta = laws.lengths(laws.momenta(self.played, scenario.scene)).sum(axis=1).max()

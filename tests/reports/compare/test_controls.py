@@ -10,7 +10,7 @@ import pytest
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.metrics import METRICS
-from crosscheck2d.reports.compare.scales import top_speed
+from crosscheck2d.reports.compare.scales import top_speeds
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.adapters.broken_engines import DoublesSpeed, Exact, Freezes, GainsEnergy
@@ -54,7 +54,7 @@ def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> 
     """The largest of the metrics of velocity, momentum and energy, each relative."""
     beside = beside_truth(one, dt, played, truth)
     found = {name: METRICS[name].of(beside) for name in VELOCITIES}
-    fastest = top_speed(one).max() or 1.0
+    fastest = top_speeds(one)[0].max() or 1.0
     relative = [
         abs(one.value) / (fastest if "velocity" in name else 1)
         for name, one in found.items()

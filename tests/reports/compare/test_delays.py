@@ -9,9 +9,9 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare import delays, laws, scales, view
+from crosscheck2d.reports.compare.collisions import WINDOW
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.delays import (
-    WINDOW,
     distance_to_range,
     jumps_of,
     nearest,

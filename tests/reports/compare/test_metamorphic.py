@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.compare import collisions, delays, faces, view
+from crosscheck2d.reports.compare import collisions, delays, view
 from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.metrics import METRICS, Metric, _largest_of_disks
 from crosscheck2d.reports.compare.scales import momentum
@@ -330,7 +330,7 @@ def test_a_bound_on_the_grid_is_caught_in_the_metrics_themselves(monkeypatch: py
         monkeypatch.setattr(module, "WINDOW", 3.0)
     assert wrong_again("room", "ten times as fast")
     monkeypatch.undo()
-    for module in (delays, collisions, faces):
+    for module in (delays, collisions):
         monkeypatch.setattr(module, "SAME", 0.0)
     assert wrong_again("grid", "in ms")
 

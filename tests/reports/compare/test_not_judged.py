@@ -13,8 +13,8 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.compare.collisions import WINDOW
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.compare.delays import WINDOW
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, View, cut
 from crosscheck2d.reports.page.findings import findings, nearest
