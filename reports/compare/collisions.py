@@ -39,7 +39,6 @@ direction of a velocity to 1e-7; a collision as flat as this loses 1e-6 of the e
 
 
 def interval(trajectory: Trajectory) -> float:
-    """s between two samples."""
     return float(trajectory.t[1] - trajectory.t[0]) if len(trajectory) > 1 else 0.0
 
 
@@ -203,9 +202,6 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
 
 
 class ByPair(NamedTuple):
-    """Collisions sorted by pair and then by time: one number that stands for the pair, the time in
-    s, the pair."""
-
     key: np.ndarray
     t: Array
     i: np.ndarray
@@ -213,7 +209,6 @@ class ByPair(NamedTuple):
 
 
 def listed(collisions: ByPair, chosen: np.ndarray) -> list[tuple[float, int, int]]:
-    """(time s, i, j) of those chosen, in order of pairs."""
     return list(zip(*(column[chosen].tolist() for column in collisions[1:])))
 
 

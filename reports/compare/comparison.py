@@ -31,8 +31,6 @@ TableRow = tuple[str, str, str, float, str, int, float, str, str, float, str, fl
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """One scenario, its runs, and the table of their metrics."""
-
     scenario: Scenario
     truth: Trajectory | None  # the exact answer up to its horizon
     runs: Sequence[Run]  # also failed and refused ones, in the order of `ENGINES`, coarse dt first
@@ -45,7 +43,6 @@ class Comparison:
 
     @property
     def middle_runs(self) -> list[Run]:
-        """The runs at the middle dt, failed ones too."""
         return [run for run in self.runs if run.dt == self.middle_dt]
 
 

@@ -145,7 +145,6 @@ class Pairs(NamedTuple):
     when: Array
 
     def of(self, chosen: np.ndarray) -> Pairs:
-        """Those that a mask or indices choose."""
         return Pairs(*(column[chosen] for column in self))
 
     @property

@@ -92,17 +92,14 @@ class Verdict:
 
     @property
     def failed(self) -> bool:
-        """Whether the run fails."""
         return not self.value <= self.bound
 
     @property
     def unit(self) -> str:
-        """The unit of the value."""
         return VERDICTS[self.id].unit
 
     @property
     def text(self) -> str:
-        """What is said of a run that fails it."""
         return self.event or in_words(self.id, self.value)
 
 
@@ -128,18 +125,15 @@ def verdicts(
 
 
 def verdicts_on(run: Run, scenario: Scenario, truth: Trajectory | None) -> list[Verdict]:
-    """The verdicts on a run that was played to its end."""
     assert run.trajectory is not None
     return verdicts(scenario, run.trajectory, run.dt, rounding_of(run.name), truth)
 
 
 def first_failed(run: Run, scenario: Scenario, truth: Trajectory | None) -> Verdict | None:
-    """The first verdict that the run fails."""
     return next((each for each in verdicts_on(run, scenario, truth) if each.failed), None)
 
 
 def fails(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of deviations.csv of failed verdicts."""
     return table[
         (table.versus == ITSELF) & table.metric.isin(list(VERDICTS)) & ~(table.value <= table.bound)
     ]
@@ -164,8 +158,6 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """The arguments of `verdicts`, and what several of them need."""
-
     scenario: Scenario
     played: Trajectory
     dt: float
@@ -174,12 +166,10 @@ class Judge:
 
     @cached_property
     def interval(self) -> float:
-        """s between two samples."""
         return float(self.played.t[1] - self.played.t[0])
 
     @cached_property
     def g(self) -> float:
-        """m/s2."""
         return float(np.hypot(*self.scenario.scene.gravity))
 
     @cached_property
@@ -226,7 +216,6 @@ class Judge:
     # Contacts: through something, or in it.
 
     def contacts(self) -> Iterator[Verdict]:
-        """`tunnelled` and `overlap`."""
         if not self.pairs:
             return
         crossings = laws.wall_crossings(self.played, self.scenario.scene)
@@ -298,7 +287,6 @@ class Judge:
     # Energy and momentum.
 
     def energy(self) -> Iterator[Verdict]:
-        """`energy_gained`, `energy_lost` where energy is conserved, `bounce_gained`."""
         scenario, t = self.scenario, self.played.t
         if scenario.thrusts or scales.lifts(scenario):
             return

@@ -58,7 +58,6 @@ def tune(engines: Sequence[str], fresh: bool, out: Path) -> NoReturn:
 
 
 def searched(engine: str, store: Store, bar: Progress) -> bytes:
-    """The table of an engine, from its row or from a new search."""
     key = content_key(engine, source_hash(SOURCE))
     row = store.get("search", key)
     if row is None:
@@ -70,7 +69,6 @@ def searched(engine: str, store: Store, bar: Progress) -> bytes:
 
 
 def read_table(csv: bytes) -> pd.DataFrame:
-    """A table of a search, bit for bit as written."""
     empty = {column: [""] for column in NUMBERS}
     return pd.read_csv(
         BytesIO(csv),
@@ -82,7 +80,6 @@ def read_table(csv: bytes) -> pd.DataFrame:
 
 
 def show(table: pd.DataFrame) -> None:
-    """Print what is chosen, and why not the others."""
     rows = []
     for _, row in table[table.verdict.isin([CHOSEN, BETTER, NO_BETTER, BREAKS])].iterrows():
         numbers = [

@@ -89,7 +89,6 @@ class Against(NamedTuple):
 
     @property
     def mends(self) -> bool:
-        """Whether more runs get better than come and go."""
         return self.harmed < -MOST_OF_ALL * self.runs
 
 
@@ -104,7 +103,6 @@ def posed(families: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[Asked, ...
 
 
 def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
-    """Play every scene at every step size."""
     runs = [[of_run(make, scene, truth, k) for k in LADDER] for scene, truth in scenes]
     error = [[error for error, _ in row] for row in runs]
     return TrialScores(np.array(error), np.array([[harm for _, harm in row] for row in runs]))
@@ -113,7 +111,6 @@ def measured(make: Make, scenes: Sequence[Asked]) -> TrialScores:
 def of_run(
     make: Make, scenario: Scenario, truth: Trajectory | None, substeps: int
 ) -> tuple[float, list[float]]:
-    """Error, and harms; see `TrialScores`."""
     dt, scene = scenario.dt(substeps), scenario.scene
     run = play_once(make, "tuned:engine", scenario, dt)
     harm = dict.fromkeys(HARMS, 0.0)
@@ -199,7 +196,6 @@ def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) ->
 def worst(
     now: TrialScores, before: TrialScores, scenes: Sequence[Asked], its: NDArray[np.int64]
 ) -> str:
-    """Of the harms that increase in these scenes the one that does most: scene, dt, number."""
     more = np.where(increases(now.harm, before.harm)[its], now.harm[its] - before.harm[its], 0.0)
     s, k, h = np.unravel_index(int(np.argmax(more)), more.shape)
     scene, _ = scenes[its[s]]

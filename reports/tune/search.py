@@ -61,7 +61,6 @@ UNASKED = tuple(name for name in TUNED if f"{name}{MATCHED}" in ENGINES)
 
 
 def searched_of(engine: str) -> Searched:
-    """The settings of an engine of `TUNED` that are searched; imports its library."""
     searched = TUNED[engine].searched
     assert searched is not None
     return searched()
@@ -78,7 +77,6 @@ class SettingsTrial(NamedTuple):
 
     @property
     def faults(self) -> list[str]:
-        """What the change breaks."""
         return [*self.result.faults, *self.departs]
 
     @property
@@ -93,8 +91,6 @@ class SettingsTrial(NamedTuple):
 
 @dataclass
 class SettingsSearch:
-    """The search for one engine; `say` is called with every trial."""
-
     engine: str
     families: tuple[str, ...] = tuple(each.__name__ for each in FAMILIES)
     seeds: tuple[int, ...] = SEEDS
@@ -108,11 +104,9 @@ class SettingsSearch:
         self.kept = self.keeps(self.chosen)
 
     def make(self, settings: dict[str, Any]) -> Make:
-        """A function that makes the engine with these settings."""
         return partial(TUNED[self.engine].make, **settings)
 
     def keeps(self, settings: dict[str, Any]) -> set[str]:
-        """The probes of the conformance suite that the engine keeps with these settings."""
         row = replace(TUNED[self.engine], make=self.make(settings))
         return {
             finding.probe
@@ -171,8 +165,6 @@ class SettingsSearch:
         return trials, taken
 
     def run(self) -> pd.DataFrame:
-        """Sweep until nothing is taken; the table of the last sweep, against what is chosen
-        then."""
         for _ in range(SWEEPS):
             trials, taken = self.sweep()
             if not taken:
@@ -225,7 +217,6 @@ def with_reasons(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def row_of(trial: SettingsTrial) -> dict[str, Any]:
-    """A row of the table."""
     result = trial.result
     return {
         "setting": " + ".join(trial.change),
@@ -244,5 +235,4 @@ def row_of(trial: SettingsTrial) -> dict[str, Any]:
 
 
 def shown(value: Any) -> str:
-    """A value as the table has it."""
     return str(value) if isinstance(value, bool) else f"{value:.6g}"
