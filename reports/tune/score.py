@@ -182,26 +182,24 @@ def faults_of(now: TrialScores, before: TrialScores, scenes: Sequence[Asked]) ->
     """The families that get worse beyond the bounds; [] if no bound is broken."""
     family = np.array([scene.name.rsplit("-", 1)[0] for scene, _ in scenes])
     change, faults = changes(now, before), []
-    lost = increases(now.harm, before.harm)[:, :, HARMS.index(FAILED)]
+    increased = increases(now.harm, before.harm)
+    lost = increased[:, :, HARMS.index(FAILED)]
     many = change.sum() > MOST_OF_ALL * change.size
     for name in dict.fromkeys(family.tolist()):
         its = np.flatnonzero(family == name)
         worse, runs = int(change[its].sum()), change[its].size
         if lost[its].any() or worse >= MOST_OF_A_FAMILY * runs or (many and worse > 0):
-            text = worst(now, before, scenes, its)
-            faults.append(f"{name}: {worse} of {runs} runs worse, {text}")
+            # the harm that increases most: scene, dt, number
+            more = np.where(increased[its], now.harm[its] - before.harm[its], 0.0)
+            s, k, h = np.unravel_index(int(np.argmax(more)), more.shape)
+            scene, _ = scenes[its[s]]
+            unit = "times its bound" if HARMS[h] in VERDICTS else "in the run"
+            has, had = (f"{scores.harm[its[s], k, h]:.2g}" for scores in (now, before))
+            faults.append(
+                f"{name}: {worse} of {runs} runs worse, {scene.name} at"
+                f" {1e3 * scene.dt(LADDER[k]):.3g} ms: {HARMS[h]} {has} {unit}, not {had}"
+            )
     return faults
-
-
-def worst(
-    now: TrialScores, before: TrialScores, scenes: Sequence[Asked], its: NDArray[np.int64]
-) -> str:
-    more = np.where(increases(now.harm, before.harm)[its], now.harm[its] - before.harm[its], 0.0)
-    s, k, h = np.unravel_index(int(np.argmax(more)), more.shape)
-    scene, _ = scenes[its[s]]
-    unit = "times its bound" if HARMS[h] in VERDICTS else "in the run"
-    has, had = (f"{scores.harm[its[s], k, h]:.2g}" for scores in (now, before))
-    return f"{scene.name} at {1e3 * scene.dt(LADDER[k]):.3g} ms: {HARMS[h]} {has} {unit}, not {had}"
 
 
 def cost_of(make: Make, than: Make, scenes: Sequence[Asked]) -> float:

@@ -14,6 +14,17 @@ from crosscheck2d.adapters.matched import chosen, searched
 from crosscheck2d.adapters.npm_packages import missing
 from crosscheck2d.adapters.pymunk import MATCHED as PYMUNK
 from crosscheck2d.reports.compare.view import cut
+from crosscheck2d.reports.tune.command import (
+    BETTER,
+    CHOSEN,
+    COLUMNS,
+    NO_SEARCH,
+    SEEDS,
+    TUNED,
+    SettingsSearch,
+    format_value,
+    searched_of,
+)
 from crosscheck2d.reports.tune.score import (
     FLOOR,
     HARMS,
@@ -24,17 +35,6 @@ from crosscheck2d.reports.tune.score import (
     measured,
     of_run,
     posed,
-)
-from crosscheck2d.reports.tune.search import (
-    BETTER,
-    CHOSEN,
-    COLUMNS,
-    NO_SEARCH,
-    SEEDS,
-    TUNED,
-    SettingsSearch,
-    searched_of,
-    shown,
 )
 from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.families.tuning import (
@@ -65,7 +65,7 @@ def test_what_an_adapter_matches_is_what_the_table_chose(engine: str):
     """Setting by setting; what is in the adapter alone is not searched, and says why."""
     table, adapter = chosen(engine), searched_of(engine).chosen
 
-    assert table == {name: shown(adapter[name]) for name in table}
+    assert table == {name: format_value(adapter[name]) for name in table}
     assert set(table) == set(searched_of(engine).settings)
     assert {name for name in adapter if name not in table} <= {"skin", "restitution_threshold"}
 
@@ -79,7 +79,7 @@ def test_every_value_of_the_grid_is_in_the_table_and_every_reason_is_given():
     for engine in TUNED:
         what = searched_of(engine)
         for name, (values, _) in what.settings.items():
-            assert {(engine, name, shown(value)) for value in values} <= kept
+            assert {(engine, name, format_value(value)) for value in values} <= kept
         assert {(engine, name, "") for name in what.left_alone} <= kept
         assert all(set(names) <= set(what.settings) for names, *_ in what.pairs)
     assert all(row["why"] for row in rows if row["verdict"] in (CHOSEN, NO_SEARCH))
@@ -264,12 +264,12 @@ def test_a_search_finds_its_way_back_from_a_bad_setting(monkeypatch: pytest.Monk
     nothing."""
     whole = searched_of("pymunk")
     slop = replace(whole, settings={"slop": whole.settings["slop"]}, pairs=())
-    monkeypatch.setattr("crosscheck2d.reports.tune.search.searched_of", lambda _: slop)
+    monkeypatch.setattr("crosscheck2d.reports.tune.command.searched_of", lambda _: slop)
     search = SettingsSearch("pymunk", ("column", "landing"), say=lambda _: None)
     table = search.run()
 
     assert search.chosen == PYMUNK
-    assert table[table.verdict == CHOSEN].value.tolist() == [shown(PYMUNK["slop"])]
+    assert table[table.verdict == CHOSEN].value.tolist() == [format_value(PYMUNK["slop"])]
     search.chosen["slop"] = 0.01
     trials, taken = search.sweep()
     assert taken
