@@ -80,13 +80,11 @@ def crosscheck_in(
 
 
 def start_worker(connection: Connection, folder: str, memory: int) -> BaseProcess:
-    """A worker in a fork, in place of `pool.start_process`."""
     line = Connection(os.dup(connection.fileno()))
     return start(serve, line, folder, memory, dict(os.environ))
 
 
 def serve(connection: Connection, folder: str, memory: int, environment: Mapping[str, str]) -> None:
-    """In the fork: the worker, with the variables of the test."""
     os.environ.clear()
     os.environ |= environment
     pool.serve(connection, folder, memory, False)

@@ -22,7 +22,6 @@ def call_of(script: str) -> str:
 
 
 def selected(words: str) -> str:
-    """The expression behind `-m`."""
     options = shlex.split(words)
     return options[options.index("-m") + 1]
 
@@ -37,7 +36,6 @@ SUITES = {
 
 
 def suites_of(marks: Collection[str]) -> list[str]:
-    """Those that play a test with these marks."""
     known = defaultdict(bool, dict.fromkeys(marks, True))
     return [name for name, words in SUITES.items() if eval(words, {"__builtins__": {}}, known)]
 
@@ -52,7 +50,6 @@ def only_long(tests: Iterable[tuple[str, list[str]]]) -> set[str]:
 def test_every_test_is_played_by_one_suite_and_none_is_the_gate_blind_to(
     collected: list[pytest.Item],
 ):
-    """Each file has a test that is no long one."""
     tests = [
         (item.nodeid, suites_of({mark.name for mark in item.iter_markers()})) for item in collected
     ]
@@ -62,7 +59,6 @@ def test_every_test_is_played_by_one_suite_and_none_is_the_gate_blind_to(
 
 
 def test_the_marks_say_which_suite():
-    """`long` outranks `slow`, of which it is a variant; a file of long ones is noticed."""
     assert suites_of([]) == suites_of(["hypothesis", "parametrize"]) == ["fast"]
     assert suites_of(["slow"]) == suites_of(["independent"]) == ["gate"]
     assert suites_of(["long"]) == suites_of(["slow", "long"]) == ["long"]

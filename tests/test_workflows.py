@@ -15,7 +15,6 @@ CI = ROOT / ".github" / "workflows" / "ci.yml"
 
 
 def faults_of(workflow: Path) -> str:
-    """What check-jsonschema finds, by the schema that it ships; "" if nothing."""
     words = ["check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(workflow)]
     done = subprocess.run([sys.executable, "-m", *words], capture_output=True)
     return (done.stdout + done.stderr).decode() if done.returncode else ""
@@ -23,7 +22,6 @@ def faults_of(workflow: Path) -> str:
 
 @pytest.mark.slow
 def test_the_workflows_are_what_github_takes(tmp_path: Path):
-    """By the schema of workflows; the control has a key that no job has."""
     assert [workflow.name for workflow in WORKFLOWS] == ["ci.yml"]
     assert faults_of(CI) == ""
     wrong = tmp_path / "ci.yml"
@@ -32,7 +30,6 @@ def test_the_workflows_are_what_github_takes(tmp_path: Path):
 
 
 def test_they_run_the_gate_and_the_commands_of_the_readme():
-    """The first block of README.md, on the two systems that the gate does not see."""
     jobs = YAML(typ="safe").load(CI.read_text(encoding="utf-8"))["jobs"]
     runs = {
         name: [step["run"] for step in job["steps"] if "run" in step] for name, job in jobs.items()

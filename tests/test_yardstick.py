@@ -20,7 +20,6 @@ BASE = {"deviation/a/rms": ONE, "deviation/b/rms": ONE, "status/a": "ok", "traje
 
 
 def entry(pattern: str, count: object, direction: str, **more: object) -> str:
-    """An entry of changed.toml."""
     fields = {"pattern": pattern, "count": count, "direction": direction, "issue": 36}
     fields |= {"point": "2", "reason": "a reason"} | more
     return "[[change]]\n" + "".join(f"{key} = {value!r}\n" for key, value in fields.items())
@@ -32,7 +31,6 @@ def kinds(new: dict[str, str], changes: str = "") -> list[str]:
 
 
 def test_equal_measurements_and_new_ids_pass():
-    """Without any entry."""
     assert kinds(BASE) == []
     assert kinds(BASE | {"deviation/c/rms": ONE}) == []
 
@@ -48,12 +46,10 @@ def test_equal_measurements_and_new_ids_pass():
     ],
 )
 def test_a_change_without_an_entry_fails(changed: dict[str, str], fault: str):
-    """However small it is, and in whichever direction."""
     assert kinds(BASE | changed) == [fault]
 
 
 def test_a_missing_id_fails_and_only_gone_allows_it():
-    """ "any" is a change of a value."""
     new = {key: value for key, value in BASE.items() if key != "status/a"}
     assert kinds(new) == ["gone"]
     assert kinds(new, entry("status/*", 1, "any")) == ["gone", "count"]
@@ -61,7 +57,6 @@ def test_a_missing_id_fails_and_only_gone_allows_it():
 
 
 def test_an_entry_takes_exactly_its_count():
-    """It cannot hide more than it states, nor stay when its change is gone."""
     new = BASE | {"deviation/a/rms": TWO, "deviation/b/rms": TWO}
     assert kinds(new, entry("deviation/*/rms", 2, "higher")) == []
     assert kinds(new, entry("deviation/*/rms", 1, "higher")) == ["count"]
@@ -70,14 +65,12 @@ def test_an_entry_takes_exactly_its_count():
 
 
 def test_another_direction_or_pattern_fails():
-    """And the entry, which takes nothing then, too."""
     new = BASE | {"deviation/a/rms": TWO}
     assert kinds(new, entry("deviation/*", 1, "lower")) == ["higher", "count"]
     assert kinds(new, entry("deviation/b/*", 1, "higher")) == ["higher", "count"]
 
 
 def test_a_renamed_id_is_compared_with_its_base():
-    """A new name is no way out."""
     renamed = '[renamed]\nrms = "root_mean_square"\n'
     new = {key.replace("rms", "root_mean_square"): value for key, value in BASE.items()}
     assert kinds(new) == ["gone", "gone"]
@@ -90,13 +83,11 @@ def test_a_renamed_id_is_compared_with_its_base():
     [entry("*", "all", "any"), entry("*", 1, "up"), entry("*", 1, "any", why="so"), "[[change]]"],
 )
 def test_an_entry_that_is_no_entry_is_refused(wrong: str):
-    """A wrong type, a wrong word, a field too many, a field too few."""
     with pytest.raises(ValueError, match=r"changed\.toml, entry 1"):
         yardstick.compare(BASE, BASE, wrong)
 
 
 def test_the_kept_changes_can_be_read_and_the_base_has_every_kind():
-    """The committed files."""
     yardstick.read_changes((yardstick.KEPT / "changed.toml").read_text())
     kept = tomllib.loads((yardstick.KEPT / "base.toml").read_text())
     expected = {"deviation", "status", "trajectory", "truth", "limit", "probe", "check", "lesson"}
@@ -104,7 +95,6 @@ def test_the_kept_changes_can_be_read_and_the_base_has_every_kind():
 
 
 def test_random_scenes_are_the_same_everywhere_and_have_what_they_should():
-    """At least ten scenes of each."""
     scenes = [tomllib.loads(yardstick.random_scene(k)) for k in range(yardstick.RANDOM_SCENES)]
     assert yardstick.random_scene(7) == yardstick.random_scene(7)
     for has in (

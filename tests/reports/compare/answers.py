@@ -10,12 +10,10 @@ from crosscheck2d.scenarios.no_truth import answered
 
 
 def truth_of(name: str) -> tuple[Scenario, Trajectory]:
-    """A scenario and its exact answer."""
     one, truth = answered(scenario(name))
     assert truth is not None
     return one, truth
 
 
 def beside_truth(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> View:
-    """What was played, cut to the samples of the truth, beside it."""
     return View(one, dt, cut(played, len(truth)), truth, jumps_of(truth, one))

@@ -17,8 +17,6 @@ SPINNING = ("spin_under_torque", "body_frame_thrust", "ship_thrust")
 def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(
     name: str, factor: float
 ):
-    """An engine that reports no spin, a hundredth too much, or twice; the truth itself, the
-    control, reads 0."""
     one, truth = truth_of(name)
     spin = truth.angular_velocity
     for dt in map(one.dt, one.substeps):
@@ -39,7 +37,6 @@ def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(
 
 
 def test_it_is_judged_as_the_velocity_is():
-    """In the same samples, by the same note, in every scene; where nothing turns it reads 0."""
     for name in ("falling_box", "head_on_equal_e05", "spin_under_torque"):
         assert name in SCENARIOS
         one, truth = truth_of(name)

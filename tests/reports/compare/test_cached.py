@@ -14,12 +14,10 @@ from crosscheck2d.scenarios.model import Scene
 
 @pytest.fixture
 def asked() -> list[tuple[Scene, Scene]]:
-    """What the law below was worked out for."""
     return []
 
 
 def test_the_same_objects_are_asked_once_and_others_that_look_alike_again(asked: list):
-    """Scenes are equal only to themselves: a copy is another scene."""
     law = cached(lambda one, other: asked.append((one, other)) or one.position + other.position)
     one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
     again = replace(other)
@@ -31,7 +29,6 @@ def test_the_same_objects_are_asked_once_and_others_that_look_alike_again(asked:
 
 
 def test_what_was_found_cannot_be_edited():
-    """It is handed to everybody who asks."""
     found = cached(lambda scene: scene.position * 2)(scenario("near_miss").scene)
 
     with pytest.raises(ValueError, match="read-only"):
@@ -39,7 +36,6 @@ def test_what_was_found_cannot_be_edited():
 
 
 def test_what_was_found_is_forgotten_with_the_first_object():
-    """And lets go of the others it was found for."""
     law = cached(lambda one, other: one.position + other.position)
     one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
     law(one, other)

@@ -30,13 +30,11 @@ PLAYED = [name for name, row in ENGINES.items() if not row.package and "coulomb"
 
 @cache
 def case(name: str) -> Scenario:
-    """A scene file."""
     return answered(read_scene_file(CASES / f"{name}.toml"))[0]
 
 
 @cache
 def played(name: str, engine: str, rung: int = 0) -> Run:
-    """The run at a step size of the ladder, the coarsest first."""
     scenario = case(name)
     run = play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[rung]))
     assert run.trajectory is not None
@@ -56,7 +54,7 @@ def read(metric: str, name: str, engine: str, rung: int = 0) -> Value:
 @pytest.mark.parametrize("metric", ["position_rms", "position_rms_radii", "angle_rms"])
 @pytest.mark.parametrize("engine", ["reference:exercise", "box2d:shipped", "pymunk:matched"])
 def test_disks_that_cannot_move_count_in_no_mean(metric: str, engine: str):
-    """Eight static disks far away divided the error by three."""
+    # Eight static disks far away divided the error by three.
     alone, among = (read(metric, name, engine) for name in ("rms-alone", "rms-with-static"))
 
     assert among.value == alone.value
@@ -66,14 +64,13 @@ def test_disks_that_cannot_move_count_in_no_mean(metric: str, engine: str):
 @pytest.mark.parametrize("rung", [0, 1, 2])
 @pytest.mark.parametrize("engine", ["event_driven:float64", "reference:ordered", "pymunk:matched"])
 def test_a_disk_that_lands_and_lies_has_no_restitution(engine: str, rung: int):
-    """Gravity does not act on it between its landing and the next sample."""
     assert read("restitution", "sinks_in", engine, rung).value == pytest.approx(0, abs=1e-15)
     assert read("restitution_error", "sinks_in", engine, rung).value < 1e-15
 
 
 @pytest.mark.parametrize("engine", ["event_driven:float64", "reference:ordered", "pymunk:matched"])
 def test_a_disk_that_lands_just_before_the_end_has_no_restitution(engine: str):
-    """It lands at 1.01 of 1.05 s; nothing after the last sample tells that it lies."""
+    # It lands at 1.01 of 1.05 s; nothing after the last sample tells that it lies.
     higher = replace(case("sinks_in").scene, position=[[0.0, 0.5 + 5.1005]])
     early = replace(case("sinks_in"), scene=higher, truth=None, duration=1.05, substeps=(4,))
     run = play(ENGINES[engine].make(), engine, early, early.dt(4))
@@ -83,7 +80,6 @@ def test_a_disk_that_lands_just_before_the_end_has_no_restitution(engine: str):
 
 
 def test_a_disk_that_bounces_as_low_is_told_from_one_that_lies():
-    """The control: e = 0.15 where 0 is stated, in the same scene."""
     scenario = case("sinks_in")
     bouncing = replace(scenario, scene=replace(scenario.scene, restitution=0.15))
     run = play(ENGINES["reference:ordered"].make(), "reference:ordered", bouncing, 0.05 / 6)
@@ -95,7 +91,6 @@ def test_a_disk_that_bounces_as_low_is_told_from_one_that_lies():
 
 @pytest.mark.parametrize("engine", PLAYED)
 def test_every_engine_has_a_restitution(engine: str):
-    """Also one with friction, and one that does not bounce at all: e = 0."""
     for rung in range(3):
         slow, pong = (
             read("restitution", name, engine, rung).value
@@ -107,7 +102,6 @@ def test_every_engine_has_a_restitution(engine: str):
 
 
 def test_no_median_stands_for_collisions_of_which_some_bounce():
-    """Box2D stops the disk at a slow wall only: the share and the range are in the note."""
     value = read("restitution", "shallow_pong", "box2d:shipped")
 
     assert value.note.startswith("3 of 4 bounce, e from 0 to 1, ")
@@ -127,7 +121,6 @@ def test_no_median_stands_for_collisions_of_which_some_bounce():
 def test_the_group_that_departs_more_is_the_value(
     values: list[float], stated: float, right: float, note: str
 ):
-    """Never the middle of the two."""
     scenario = case("shallow_pong")
     scenario = replace(scenario, scene=replace(scenario.scene, restitution=stated))
     trajectory = played("shallow_pong", "reference:ordered").trajectory
@@ -143,8 +136,8 @@ def test_the_group_that_departs_more_is_the_value(
 
 
 def test_apex_heights_say_who_bounces_higher():
-    """Percent a bounce: as shipped pymunk keeps its apex, matched it comes higher by what it is
-    moved out of the floor; Box2D 3.1 loses 1.2 % in all."""
+    # Percent a bounce: as shipped pymunk keeps its apex, matched it comes higher by what it is
+    # moved out of the floor; Box2D 3.1 loses 1.2 % in all.
     assert read("apex_change", "higher", "pymunk:shipped", 1).value == pytest.approx(0, abs=1e-9)
     assert read("apex_change", "higher", "pymunk:matched").value == pytest.approx(0.18, abs=0.01)
     assert read("apex_change", "higher", "event_driven:float64").value == pytest.approx(0, abs=1e-9)
@@ -178,7 +171,7 @@ def dropped(e: float, stated: float, gravity: tuple[float, float] = (0.0, -10.0)
 
 @pytest.mark.parametrize("gravity", [(0.0, -10.0), (3.0, -4.0), (9.81, 0.0)])
 def test_a_disk_that_does_not_bounce_loses_all_its_height(gravity: tuple[float, float]):
-    """-100 %; one with the e that is stated 0, one with another (e / stated)2 - 1."""
+    # -100 %; one with the e that is stated 0, one with another (e / stated)2 - 1.
     for e, stated, change in ((0, 1, -100), (0.7, 0.7, 0), (0.8, 1, -36), (1, 0.8, 56.25)):
         value = dropped(e, stated, gravity)
 
@@ -187,7 +180,6 @@ def test_a_disk_that_does_not_bounce_loses_all_its_height(gravity: tuple[float, 
 
 
 def test_no_apex_is_read_off_a_tilted_floor():
-    """There a bounce turns height into way."""
     level = Scene(
         position=[[0, 3]],
         velocity=[[0, 0]],
@@ -205,20 +197,17 @@ def test_no_apex_is_read_off_a_tilted_floor():
 
 @pytest.mark.parametrize("rung", [1, 2])
 def test_velocities_half_a_step_off_create_no_energy(rung: int):
-    """Of pymunk, whose apex stays; the lesson's solver, which comes higher, is the control."""
     assert read("energy_created", "higher", "pymunk:shipped", rung).value < 1e-13
     assert read("energy_created", "higher", "reference:lesson", rung).value > 0.02
 
 
 def test_an_error_of_energy_has_a_sign_in_its_note():
-    """Box2D 3.1 loses, the lesson's solver gains."""
     assert read("energy_error", "higher", "box2d_v3:matched").note == "lost"
     assert read("energy_error", "higher", "reference:lesson").note == "gained"
 
 
 @pytest.mark.parametrize("engine", PLAYED)
 def test_a_disk_that_wraps_does_not_cross_the_box(engine: str):
-    """The wall stands in the middle of the torus, and the disk turns back at it."""
     for rung in range(3):
         assert read("disks_tunnelled", "wrap_wall", engine, rung).value == 0
 
@@ -235,7 +224,6 @@ def test_a_disk_that_wraps_does_not_cross_the_box(engine: str):
 def test_a_wall_of_a_torus_is_crossed_on_the_way_that_a_disk_takes(
     path: list[float], through: bool
 ):
-    """Before an edge and behind it."""
     scene = replace(
         case("wrap_wall").scene, walls=np.array([[[0, -1], [0, 1]], [[-1.5, -1], [-1.5, 1]]])
     )
@@ -247,7 +235,7 @@ def test_a_wall_of_a_torus_is_crossed_on_the_way_that_a_disk_takes(
 
 
 def test_a_spin_is_judged_only_where_it_is_compared():
-    """Every sample of the coarsest run is near a collision: 0 of all of them said nothing."""
+    # Every sample of the coarsest run is near a collision: 0 of all of them said nothing.
     for engine in ("box2d:shipped", "pymunk:matched", "event_driven:float64"):
         coarse = read("angular_velocity_max", "spin_channel", engine)
         assert np.isnan(coarse.value)
@@ -261,13 +249,12 @@ def test_a_spin_is_judged_only_where_it_is_compared():
     "scale", [scales.momentum, scales.angular_momentum, scales.energy], ids=lambda of: of.__name__
 )
 def test_no_scale_grows_with_the_duration(scale: object):
-    """Of a collision without gravity."""
     assert callable(scale)
     assert scale(case("oblique_2s")) == scale(case("oblique_20s"))
 
 
 def test_an_error_of_angular_momentum_is_the_same_however_long_the_scene():
-    """Of an engine that makes it in the collision; rounding, times a longer lever, is below 1 %."""
+    # Of an engine that makes it in the collision; rounding, times a longer lever, is below 1 %.
     short, long = (
         read("angular_momentum_error", name, "box2d_v3:matched").value
         for name in ("oblique_2s", "oblique_20s")
@@ -277,7 +264,6 @@ def test_an_error_of_angular_momentum_is_the_same_however_long_the_scene():
 
 
 def test_the_energy_at_hand_is_what_a_disk_can_lose():
-    """m g h of a drop, with one value in every metric; under a torque what it adds."""
     ball = catalogue.scenario("bouncing_ball_e09")
     assert scales.energy(ball) == pytest.approx(1.0 * 9.81 * (1.36 - 0.25))
     assert scales.energy(replace(ball, duration=1.0)) == scales.energy(ball)
@@ -289,7 +275,6 @@ def test_the_energy_at_hand_is_what_a_disk_can_lose():
 
 
 def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
-    """3 radii a step along it; towards it, the control."""
     for velocity, passes in (([30.0, 0.0], False), ([0.0, -30.0], True)):
         scene = Scene(
             position=[[0, 2]],
@@ -306,7 +291,6 @@ def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
 
 
 def test_a_disk_that_slips_to_the_end_has_a_lower_bound():
-    """The time at which it begins to roll is not known."""
     one, truth = truth_of("slip_to_roll")
     slips = replace(
         truth,
@@ -321,7 +305,6 @@ def test_a_disk_that_slips_to_the_end_has_a_lower_bound():
 
 
 def test_a_collision_found_forty_steps_late_is_counted_in_the_note():
-    """It is not missed; its delay is a number of its own."""
     one, truth = truth_of("head_on_equal_e05")
     met, dt = truth.collisions, one.dt(8)
     late = replace(truth, collisions=Collisions(met.t + 40 * dt, met.i, met.j, met.impulse))

@@ -16,7 +16,6 @@ def collisions(*times: float) -> Collisions:
 
 
 def test_a_missing_collision_is_missed_and_an_extra_collision_is_spurious():
-    """The collision that is left over is the one whose absence makes the others match."""
     missed = match(collisions(1.01, 3.01), collisions(1, 2, 3), 10, 0.01)
     spurious = match(collisions(1.01, 2.5, 3.01), collisions(1, 3), 10, 0.01)
 
@@ -28,8 +27,6 @@ def test_a_missing_collision_is_missed_and_an_extra_collision_is_spurious():
 
 
 def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_late():
-    """Collisions that come later and later are delays; beyond half the time between true collisions
-    nobody knows which is which."""
     true = np.arange(1.0, 9.0)
     late = match(collisions(*(true + 0.06 * true)), collisions(*true), 100, 0.01)
     too_late = match(collisions(9.0), collisions(1.0), 100, 0.01)
@@ -40,15 +37,13 @@ def test_an_engine_that_drifts_late_keeps_its_collisions_until_it_is_half_a_gap_
 
 
 def test_a_collision_that_the_end_cuts_off_is_not_blamed():
-    """A true collision less than `WINDOW` dt before the end may fall behind it for a late
-    engine."""
     assert match(collisions(1.0), collisions(1.0, 9.98), 10.0, 0.01).missed == []
     assert match(collisions(1.0), collisions(1.0, 9.96), 10.0, 0.01).missed == [(9.96, 0, 1)]
 
 
 def test_collisions_that_no_step_can_tell_apart_are_not_blamed():
-    """Of ever faster bounces those closer together than 2 dt are left out, with what the engine
-    makes of them."""
+    # Of ever faster bounces those closer together than 2 dt are left out, with what the engine
+    # makes of them.
     true = 2.0 - 0.5 ** np.arange(12.0)
     played = [t for t in true if t < 1.97]
     found = match(collisions(*played, 1.99, 2.01), collisions(*true), 10.0, 0.01)
@@ -60,7 +55,6 @@ def test_collisions_that_no_step_can_tell_apart_are_not_blamed():
 
 
 def test_weight_on_a_contact_at_rest_is_no_collision():
-    """A pair that rests from the start (a true collision without impulse) is not counted."""
     resting = Collisions.of([(0.0, 0, -1, 0.0)])
     weight = Collisions.of([(0.1, 0, -1, 0.3), (0.5, 0, -1, 0.3)])
 
@@ -69,7 +63,6 @@ def test_weight_on_a_contact_at_rest_is_no_collision():
 
 
 def test_matching_in_order_is_the_closest_there_is():
-    """Dynamic programming finds what trying all choices finds."""
     rng = np.random.default_rng(1)
     for _ in range(100):
         many = np.sort(rng.uniform(size=rng.integers(0, 7)))

@@ -32,9 +32,6 @@ VELOCITIES = (
 
 
 def scaled(factor: float) -> Callable[[Trajectory], Trajectory]:
-    """The truth, all of whose velocities are `factor` times as large after the start; the positions
-    know nothing."""
-
     def corrupt(truth: Trajectory) -> Trajectory:
         size = np.append(1.0, np.full(len(truth) - 1, factor))
         spin = truth.angular_velocity * size[:, None]
@@ -51,7 +48,6 @@ CONTROLS = {
 
 
 def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> float:
-    """The largest of the metrics of velocity, momentum and energy, each relative."""
     beside = beside_truth(one, dt, played, truth)
     found = {name: METRICS[name].of(beside) for name in VELOCITIES}
     fastest = top_speeds(one)[0].max() or 1.0
@@ -68,8 +64,6 @@ def largest(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> 
 def test_a_wrong_velocity_is_caught_at_every_step_size_even_where_all_positions_are_right(
     name: str, control: str
 ):
-    """Of velocity, momentum or energy, in a crowd and at the coarsest step too; the truth itself
-    reads 0."""
     one, truth = truth_of(name)
     assert truth.velocity.any() or truth.angular_velocity.any()
     for substeps in one.substeps:
@@ -83,7 +77,6 @@ def test_a_wrong_velocity_is_caught_at_every_step_size_even_where_all_positions_
 
 @pytest.mark.parametrize("name", sorted(STILL))
 def test_what_stands_still_is_not_to_be_caught(name: str):
-    """That these scenes are left out is the scenes' doing: nothing moves in their truth."""
     _, truth = truth_of(name)
 
     assert not truth.velocity.any()
@@ -95,8 +88,6 @@ def test_what_stands_still_is_not_to_be_caught(name: str):
     "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.long) for name in MOVING]
 )
 def test_an_engine_that_does_so_is_caught_in_the_tables(name: str, make: type[Exact]):
-    """Played and compared as any engine: by energy or momentum, wherever the disks are; the sound
-    one reads less."""
     one = replace(scenario(name), substeps=(scenario(name).substeps[0],))
     dt = one.dt(one.substeps[0])
     tables = [

@@ -36,11 +36,6 @@ def counts(note: str) -> tuple[int, int]:
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_an_engine_that_reports_no_collision_is_caught_wherever_one_is_judged(name: str):
-    """By every collision that is judged, at every step size; where none or few are, it reads no
-    number at all.
-
-    The control is the truth itself, which misses none of as many.
-    """
     one, truth = truth_of(name)
     for dt in map(one.dt, one.substeps):
         silent, right = (
@@ -88,7 +83,7 @@ def test_an_engine_that_reports_no_collision_is_caught_wherever_one_is_judged(na
 def test_contacts_at_rest_and_collisions_too_close_for_a_step_are_not_counted_as_judged(
     name: str, judged: int, total: int
 ):
-    """At the coarsest step; as they were counted by hand."""
+    # At the coarsest step; as they were counted by hand.
     one, truth = truth_of(name)
     found = read(one, one.dt(one.substeps[0]), truth, truth)["collisions_missed"]
 
@@ -97,7 +92,6 @@ def test_contacts_at_rest_and_collisions_too_close_for_a_step_are_not_counted_as
 
 
 def test_a_finer_step_judges_more_collisions():
-    """So that a count of missed ones is compared over step sizes with the note beside it only."""
     one, truth = truth_of("galperin_314")
     notes = [read(one, one.dt(k), truth, truth)["collisions_missed"].note for k in one.substeps]
     judged = [counts(note)[0] for note in notes]
@@ -107,14 +101,11 @@ def test_a_finer_step_judges_more_collisions():
 
 
 def wrong_collisions(comparison: Comparison) -> str | None:
-    """The number in the summary; None if it has no such column."""
     headings, [row], _ = medians(scenes_of([comparison]), ["pymunk:matched"], set())
     return dict(zip(headings, row)).get("Wrong\ncolli-\nsions\nnumber")
 
 
 def test_where_there_is_no_collision_none_is_missed_but_one_may_be_spurious():
-    """An engine that reports one in a near miss; the page counts it, and does not count what cannot
-    be missed."""
     one, truth = truth_of("near_miss")
     invents = replace(truth, collisions=Collisions.of([(one.duration / 2, 0, 1, 1.0)]))
     found = read(one, one.dt(1), invents, truth)
@@ -129,7 +120,6 @@ def test_where_there_is_no_collision_none_is_missed_but_one_may_be_spurious():
 
 
 def test_a_scene_in_which_too_few_collisions_are_judged_is_left_out_of_the_sum():
-    """Of wrong collisions in the summary, which then has no such column."""
     one, truth = truth_of("column_of_ten")
     runs = [Run("pymunk", "matched", one.name, one.dt(k), trajectory=truth) for k in one.substeps]
 

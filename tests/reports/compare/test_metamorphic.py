@@ -43,12 +43,10 @@ ROOM = box([-2.5, -2.5], [2.5, 2.5])
 def asked(
     name: str, scene: Scene, duration: float, interval: float, thrusts: tuple[Thrust, ...] = ()
 ) -> Scenario:
-    """The scene at two steps, with the oracle for its answer."""
     return with_oracle(Scenario(name, "?", "", scene, duration, interval, (1, 2), thrusts))
 
 
 def crowd(**more: object) -> Scene:
-    """Five disks of five sizes that meet soon."""
     return lay_out(
         position=[[-1.5, 1.7], [-2.2, -0.4], [-0.6, 0.1], [0.5, 1.3], [1.2, -1.1]],
         velocity=[[2.35, -1.51], [1.17, 0.64], [-0.75, -2.45], [-0.96, -2.59], [-1.76, 1.78]],
@@ -142,7 +140,6 @@ changes of velocity."""
 
 @cache
 def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
-    """A scene, every run of it that came to its end, and their table."""
     one = SCENES[name]()
     every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYED for k in one.substeps]
     runs = tuple(run for run in every if run.status == "ok")
@@ -150,7 +147,6 @@ def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
 
 
 def wrong(name: str, change: Change) -> list[str]:
-    """The rows that do not change as their unit says."""
     one, runs, before = played(name)
     new = change.scenario(one)
     after = compare(new, [change.run(run, one) for run in runs]).table
@@ -185,12 +181,10 @@ PAIRS = [
 
 @pytest.mark.parametrize(("name", "change"), PAIRS)
 def test_every_metric_changes_as_its_unit_says(name: str, change: str):
-    """Against the laws, the exact answer and every other engine, at two steps."""
     assert not wrong(name, CHANGES[change])
 
 
 def test_every_metric_is_under_test():
-    """Each has a number in some of these scenes, that is not zero."""
     tables = [played(name)[2] for name in SCENES]
     assert {*pd.concat(tables).metric} - {*VERDICTS} == {*METRICS}
     for metric in METRICS:
@@ -210,70 +204,57 @@ def test_every_metric_is_under_test():
 def test_any_units_and_any_axes_will_do(
     length: float, time: float, mass: float, turn: float, flip: int, name: str
 ):
-    """All at once."""
     assert not wrong(name, Change(length=length, time=time, mass=mass, turn=turn, flip=flip))
 
 
 def three_steps_away(view: View) -> Value:
-    """How many samples are further than 3 dt from each collision: a threshold on the grid."""
     near = np.abs(view.played.t[:, None] - view.played.collisions.t).min(axis=1, initial=np.inf)
     return Value(float((near > 3 * view.dt).sum()))
 
 
 def by_a_millimetre(view: View) -> Value:
-    """How many disks are off by more than 1 mm in some sample."""
     return Value(float((view.deviation > 1e-3).any(axis=0).sum()))
 
 
 def of_the_first_disk(view: View) -> Value:
-    """How far the first disk is off."""
     return _largest_of_disks(view.deviation[:, :1], view)
 
 
 def along_x(view: View) -> Value:
-    """How far a disk is off along x."""
     assert view.other is not None
     return Value(float(np.abs(view.played.position[..., 0] - view.other.position[..., 0]).max()))
 
 
 def to_the_right(view: View) -> Value:
-    """How far a disk is off to the top, at most."""
     assert view.other is not None
     return Value(float((view.played.position[..., 1] - view.other.position[..., 1]).max()))
 
 
 def from_the_origin(view: View) -> Value:
-    """How far away a disk is, at most."""
     return Value(float(np.hypot(*np.moveaxis(view.played.position, -1, 0)).max()))
 
 
 def per_second(view: View) -> Value:
-    """How many collisions there are in a second."""
     return Value(len(view.played.collisions) / float(view.played.t[-1]))
 
 
 def of_walls(view: View) -> Value:
-    """How many walls there are."""
     return Value(float(len(view.scenario.scene.walls)))
 
 
 def heavy(view: View) -> Value:
-    """How many disks are of more than 2 kg."""
     return Value(float((view.scenario.scene.mass > 2).sum()))
 
 
 def largest(view: View) -> Value:
-    """The largest radius."""
     return Value(float(view.scenario.scene.radius.max()))
 
 
 def of_thrusts(view: View) -> Value:
-    """How many thrusts there are."""
     return Value(float(len(view.scenario.thrusts)))
 
 
 def fastest(view: View) -> Value:
-    """Of any disk, at any time."""
     return Value(float(np.abs(view.played.velocity).max()))
 
 
@@ -305,7 +286,6 @@ WRONG = [
 def test_a_metric_that_should_not_be_one_is_caught(
     of: Callable[[View], Value], unit: str, name: str, change: str, monkeypatch: pytest.MonkeyPatch
 ):
-    """The control, one for each change: it is there to catch something."""
     monkeypatch.setitem(METRICS, "wrong", Metric(of, unit, ("truth",)))
     played.cache_clear()
     try:
@@ -317,13 +297,10 @@ def test_a_metric_that_should_not_be_one_is_caught(
 
 
 def test_there_is_a_control_for_every_change():
-    """Else a change might change nothing."""
     assert {change for *_, change in WRONG} == {*CHANGES}
 
 
 def test_a_bound_on_the_grid_is_caught_in_the_metrics_themselves(monkeypatch: pytest.MonkeyPatch):
-    """With windows of three steps, or times compared without their rounding, the last bit
-    decides."""
     # what is compiled keeps its bounds
     monkeypatch.setattr(collisions, "judge", collisions.judge.py_func)
     for module in (delays, view, collisions):
@@ -336,7 +313,6 @@ def test_a_bound_on_the_grid_is_caught_in_the_metrics_themselves(monkeypatch: py
 
 
 def wrong_again(name: str, change: str) -> list[str]:
-    """The rows, with all worked out anew."""
     played.cache_clear()
     try:
         return wrong(name, CHANGES[change])
@@ -348,11 +324,8 @@ CASES = Path(__file__).parents[3] / "tests" / "data" / "scenes"
 
 
 def test_a_scene_ten_times_as_fast_gives_the_same_numbers_in_its_own_file():
-    """Two files that are one scene, played each: here engines are asked as well.
-
-    Those without a unit of time: pymunk takes as much of an overlap away in a second, whatever a
-    second is.
-    """
+    # Two files that are one scene, played each: here engines are asked as well. Those without a
+    # unit of time: pymunk takes as much of an overlap away in a second, whatever a second is.
     tables = []
     for name in ("pace_1", "pace_10"):
         one = read_scene_file(CASES / f"{name}.toml")

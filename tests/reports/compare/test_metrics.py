@@ -25,7 +25,6 @@ WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
 
 def value(metric: str, view: View) -> float:
-    """The value of a metric that applies."""
     found = METRICS[metric].of(view)
     assert found is not None
     return found.value
@@ -33,11 +32,6 @@ def value(metric: str, view: View) -> float:
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_against_itself_is_zero(name: str):
-    """Every error of the truth measured against the truth is 0, it never leaves the 1 % band, it
-    misses no collision.
-
-    What is not judged at this step is no number (test_judged_collisions.py).
-    """
     one, truth = truth_of(name)
     view = beside_truth(one, one.dt(1), truth, truth)
 
@@ -50,8 +44,6 @@ def test_the_truth_against_itself_is_zero(name: str):
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
 def test_the_truth_keeps_the_laws(name: str):
-    """Momentum, energy and non-penetration hold in the truth to the rounding of a sum over its
-    disks."""
     one, truth = truth_of(name)
     view = View(one, one.dt(1), truth)
 
@@ -70,8 +62,6 @@ def test_the_truth_keeps_the_laws(name: str):
 
 @pytest.mark.parametrize("name", ["head_on_equal_e09", "line_gas", "ping_pong"])
 def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
-    """One sample of one disk moved by 1 mm: the largest deviation is 1 mm, at that disk and that
-    instant."""
     one, truth = truth_of(name)
     position = truth.position.copy()
     k, disk = len(truth) // 2, one.scene.n - 1
@@ -87,7 +77,6 @@ def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
 
 
 def test_momentum_that_leaks_is_seen():
-    """A velocity off by 1 % on one of two equal disks is a momentum error of half a percent."""
     one, truth = truth_of("head_on_equal_e1")
     velocity = truth.velocity.copy()
     velocity[-1, 0] *= 1.01
@@ -98,7 +87,6 @@ def test_momentum_that_leaks_is_seen():
 
 
 def test_energy_that_is_created_is_seen():
-    """A speed that rises by 1 % raises the energy by 2 % of that disk's share."""
     one, truth = truth_of("box_billiard")
     spin = (truth.angular_velocity[0] ** 2 @ one.scene.inertia) / 2
     velocity = truth.velocity.copy()
@@ -111,7 +99,6 @@ def test_energy_that_is_created_is_seen():
 
 
 def test_weight_and_thrust_are_accounted_for():
-    """Free flight under gravity and a world-frame thrust has no momentum error."""
     scene = Scene(
         position=[[0, 0]],
         velocity=[[1, 2]],
@@ -137,7 +124,6 @@ def test_weight_and_thrust_are_accounted_for():
 
 
 def test_deviation_is_measured_across_the_seam():
-    """Where the scene wraps, two disks on both sides of the same edge are close."""
     one = scenario("asteroids")
     run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(4))
     assert run.trajectory is not None
@@ -150,7 +136,6 @@ def test_deviation_is_measured_across_the_seam():
 
 @pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])
 def test_restitution_is_read_off_the_velocities(e: str):
-    """The exact answer has the restitution it was made with."""
     one, truth = truth_of(f"oblique_{e}")
 
     # Sampled velocities are exact up to rounding; the quotient amplifies it by v / v_n, below 10
@@ -164,8 +149,8 @@ REFLECTED = [n for n in SCENARIOS if n != "heavy_on_light" and not scenario(n).s
 
 @pytest.mark.parametrize("name", REFLECTED)
 def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str):
-    """Its impulse is exact, so what is read off its samples is e, or the reading is wrong; it knows
-    no friction."""
+    # Its impulse is exact, so what is read off its samples is e, or the reading is wrong; it knows
+    # no friction.
     one = scenario(name)
     run = play(
         ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0])
@@ -180,8 +165,6 @@ def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str
 
 @pytest.mark.parametrize("metric", METRICS)
 def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
-    """Also for one that explodes, one that stands still, one sample, and a disk that does not
-    turn."""
     scene = replace(scenario("box_billiard").scene, inertia=np.array([np.inf]))
     one = replace(scenario("box_billiard"), scene=scene)
     assert one.truth is not None
@@ -201,8 +184,6 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
 
 
 def test_a_run_that_diverged_earns_a_status_and_no_score():
-    """An engine that gives NaN at step 7 was right before it, for a scene that nobody else played
-    so short."""
     one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
     good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
@@ -215,8 +196,6 @@ def test_a_run_that_diverged_earns_a_status_and_no_score():
 
 
 def test_to_refuse_a_scene_does_not_help_in_the_ranking():
-    """Who has no result in a scene is last in it, and who has none in half of them is not ranked
-    first."""
     one, two = scenario("slow_collision"), scenario("near_miss")
     runs = {
         name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
@@ -236,7 +215,6 @@ def test_to_refuse_a_scene_does_not_help_in_the_ranking():
 
 
 def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
-    """The centre crosses the segment; a disk that stays inside has not."""
     one, truth = truth_of("box_billiard")
     away = replace(truth, position=truth.position + np.linspace(0, 50, len(truth))[:, None, None])
 
@@ -259,7 +237,6 @@ def test_a_disk_that_leaves_its_box_has_gone_through_a_wall():
 def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
     heights: list[float], through: bool, x: float
 ):
-    """A wall in two pieces: rounding decides on which side such a sample is, and of which piece."""
     wall = [[[-1.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [3.0, 0.0]]]
     scene = Scene(
         position=[[x, heights[0]]],
@@ -277,7 +254,6 @@ def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
 
 
 def test_an_explosion_does_not_make_itself_small():
-    """Speeds a thousand times too high are an energy error of a million, not of one."""
     one, truth = truth_of("line_gas")
     velocity = truth.velocity.copy()
     velocity[len(truth) // 2 :] *= 1000
@@ -286,7 +262,6 @@ def test_an_explosion_does_not_make_itself_small():
 
 
 def test_falling_through_a_wrap_is_no_energy_error():
-    """A disk that is set from the bottom to the top has more height; that is the scene's doing."""
     scene = Scene(
         position=[[0, 0]],
         velocity=[[0, 0]],
@@ -306,7 +281,6 @@ def test_falling_through_a_wrap_is_no_energy_error():
 
 
 def test_comparison_stops_where_the_other_ends():
-    """Samples and collisions beyond the truth's horizon are cut off."""
     _, truth = truth_of("line_gas")
     short = cut(truth, 100)
 
@@ -316,8 +290,6 @@ def test_comparison_stops_where_the_other_ends():
 
 
 def test_the_table_has_failures_too_and_every_pair_once():
-    """A refused run is a row with its reason; engines are compared pairwise at the same dt, in one
-    direction."""
     one = scenario("head_on_equal_e1")
     names = ["reference:exercise", "reference:lesson", "pymunk:matched"]
     runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in (1, 2)]
@@ -340,7 +312,6 @@ def test_the_table_has_failures_too_and_every_pair_once():
 
 
 def test_without_a_truth_nothing_is_called_an_error_of_position():
-    """Where nobody knows the answer the table has laws and pairs only."""
     one = replace(scenario("gas_of_100"), duration=0.5, truth=None)
     runs = [
         play(ENGINES[name].make(), name, one, one.dt(4))
@@ -352,7 +323,6 @@ def test_without_a_truth_nothing_is_called_an_error_of_position():
 
 
 def test_where_the_oracle_refuses_the_comparison_says_why():
-    """Disks that overlap have no exact answer: no error is claimed, and the reason is at hand."""
     scene = Scene(
         position=[[0, 0], [0.3, 0]],
         velocity=[[0, 0], [0, 0]],

@@ -52,7 +52,6 @@ def known_until(name: str, samples: int) -> Scenario:
 
 
 def compared(one: Scenario, *, substeps: tuple[int, ...] = (1, 2, 4)) -> Comparison:
-    """By two engines."""
     runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in NAMES for k in substeps]
     return compare(one, runs)
 
@@ -66,7 +65,6 @@ def table_of(name: str, samples: int = 0) -> pd.DataFrame:
 
 
 def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
-    """Its rows at a step size."""
     return table[(table.metric == metric) & (table.versus == "truth") & (table.dt_s == dt)]
 
 
@@ -75,8 +73,6 @@ def against_truth(table: pd.DataFrame, metric: str, dt: float) -> pd.DataFrame:
 )
 @pytest.mark.parametrize("metric", CARRIED)
 def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
-    """From nearly all of its samples, and says from how many; a stepping engine has no perfect
-    score."""
     rows = table_of(name).query("metric == @metric and versus == 'truth'")
 
     for row in rows.to_dict("records"):
@@ -88,7 +84,6 @@ def test_a_crowded_scene_is_judged_at_every_step_size(name: str, metric: str):
 
 
 def test_nothing_is_judged_by_the_start_alone():
-    """A truth that is lost before its second sample leaves only what was given to all."""
     rows = compared(known_until("wall_to_wall", 1)).table.query("versus == 'truth'")
 
     assert set(CARRIED) | {"position_max_radii", "collisions_missed"} <= set(rows.metric)
@@ -98,8 +93,8 @@ def test_nothing_is_judged_by_the_start_alone():
 
 @pytest.mark.parametrize("metric", [name for name in CARRIED if name != "energy_loss_error"])
 def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
-    """Within three steps of its end a truth does not say which velocity may come early: of 3
-    samples 2 are left at dt / 4, none at dt."""
+    # Within three steps of its end a truth does not say which velocity may come early: of 3 samples
+    # 2 are left at dt / 4, none at dt.
     one, table = scenario("wall_to_wall"), table_of("wall_to_wall", 4)
     fine, coarse = (against_truth(table, metric, one.dt(k)) for k in (4, 1))
 
@@ -110,8 +105,6 @@ def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
 
 
 def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
-    """Of a pair that collides once, all samples but those within three steps of the collision of
-    either engine."""
     one = scenario("head_on_equal_e05")
     runs = [play(ENGINES[name].make(), name, one, one.dt(1)).trajectory for name in NAMES]
     assert runs[0] is not None
@@ -128,7 +121,6 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
-    """Each reports a collision every other step: less than a tenth of the samples is left."""
     one = scenario("slide_on_incline")
     found = play(
         ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)
@@ -152,7 +144,6 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
 
 
 def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
-    """The comparison, with a metric of an engine not judged."""
     table = comparison.table.copy()
     engine, profile = name.split(":")
     rows = (table.metric == metric) & (table.engine == engine) & (table.profile == profile)
@@ -162,7 +153,6 @@ def lost(comparison: Comparison, name: str, metric: str) -> Comparison:
 
 
 def test_what_is_not_judged_is_shown_and_counts_in_no_median():
-    """Of two scenes the other one makes the median; where none is left there is none."""
     good = [compared(scenario(name)) for name in ("wall_to_wall", "head_on_equal_e05")]
     half = [good[0], lost(good[1], NAMES[0], "energy_error")]
     none = [lost(one, NAMES[0], "energy_error") for one in good]
@@ -179,7 +169,6 @@ def test_what_is_not_judged_is_shown_and_counts_in_no_median():
 
 
 def test_a_scene_known_at_its_start_only_beats_nobody():
-    """It is left out of the findings, and has no error."""
     nothing = compared(known_until("wall_to_wall", 1))
     known = compared(scenario("head_on_equal_e05"))
 
@@ -190,7 +179,6 @@ def test_a_scene_known_at_its_start_only_beats_nobody():
 
 
 def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp_path: Path):
-    """Beside the control: the same with a number is worse."""
     whole = compared(scenario("wall_to_wall"))
     tables = []
     for each in (whole, lost(whole, NAMES[0], "velocity_rms")):
@@ -208,7 +196,6 @@ def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp
 
 
 def test_a_velocity_that_overflows_is_judged_and_bad():
-    """Too large for a float is not the same as not judged."""
     one, truth = truth_of("wall_to_wall")
     huge = replace(truth, velocity=truth.velocity * 1e200)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -220,8 +207,6 @@ def test_a_velocity_that_overflows_is_judged_and_bad():
 
 
 def test_a_number_of_the_table_is_nan_only_where_it_is_not_judged():
-    """An overflow is infinitely far off, so that no reader takes it for a number that is left
-    out."""
     one, truth = truth_of("wall_to_wall")
     huge = replace(truth, velocity=truth.velocity * 1e200)
     run = Run("pymunk", "matched", one.name, one.dt(1), trajectory=huge)
@@ -234,7 +219,6 @@ def test_a_number_of_the_table_is_nan_only_where_it_is_not_judged():
 
 
 def test_a_failed_run_is_no_number_that_is_not_judged():
-    """Its row is a status."""
     one = scenario("wall_to_wall")
     table = compare(
         one, [Run("pymunk", "matched", one.name, one.dt(1), "unsupported", "too hard")]
@@ -245,7 +229,6 @@ def test_a_failed_run_is_no_number_that_is_not_judged():
 
 
 def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
-    """The only engine broke the protocol: there is an exact answer, and nobody to be held to it."""
     comparisons = [compared(known_until("slow_collision", 50))]
     alone, without = nearest(summarize(comparisons, NAMES)), nearest(summarize([]))
 

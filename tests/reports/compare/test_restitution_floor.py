@@ -38,8 +38,6 @@ def sliding(change: float, speed: float = 0.5, e: float = 0.5) -> tuple[Trajecto
 @pytest.mark.parametrize("rounding", [FLOAT32, FLOAT64])
 @pytest.mark.parametrize("speed", [0.5, 500.0])
 def test_the_floor_is_the_rounding_of_the_velocities(rounding: float, speed: float):
-    """Ten times above it a collision is read, ten times below it is counted, as fast as the disk
-    is."""
     floor = FLOOR * rounding * 2 * speed  # before and after
     for factor, counts in ((10, (1, 0)), (0.1, (0, 1))):
         found = effective_restitution(*sliding(factor * floor, speed), 1.0, 0.0, rounding)
@@ -51,7 +49,7 @@ def test_the_floor_is_the_rounding_of_the_velocities(rounding: float, speed: flo
 
 
 def test_a_heavy_disk_that_hardly_notices_is_read():
-    """Its own speed is what its change stands above: a millionth of the light disk's."""
+    # Its own speed is what its change stands above: a millionth of the light disk's.
     scene = Scene(
         position=[[0, 0], [1, 0]],
         velocity=[[0, 0], [-1, 0]],
@@ -85,8 +83,8 @@ def read(name: str, engine: str, substeps: int) -> dict[str, Value | None]:
     ("name", "substeps"), [("gas_of_100", 1), ("box_billiard", 1), ("box_billiard", 2)]
 )
 def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
-    """Box2D 3.1 as shipped lets a slow disk stick to a wall (e = 0), and reports a collision
-    whenever it comes nearer again."""
+    # Box2D 3.1 as shipped lets a slow disk stick to a wall (e = 0), and reports a collision
+    # whenever it comes nearer again.
     found = read(name, "box2d_v3:shipped", substeps)["restitution_error"]
 
     assert found is not None
@@ -95,8 +93,8 @@ def test_a_contact_that_lasts_is_no_collision(name: str, substeps: int):
 
 
 def test_without_the_floor_it_would_be_read_as_minus_one(monkeypatch: pytest.MonkeyPatch):
-    """The control: of most of the collisions that are read nothing is left of the velocity but its
-    sign."""
+    # The control: of most of the collisions that are read nothing is left of the velocity but its
+    # sign.
     monkeypatch.setattr(restitution, "FLOOR", 0.0)
     found = read("gas_of_100", "box2d_v3:shipped", 1)["restitution_error"]
 
@@ -105,7 +103,6 @@ def test_without_the_floor_it_would_be_read_as_minus_one(monkeypatch: pytest.Mon
 
 
 def test_what_is_below_the_floor_is_counted_in_the_note():
-    """Of a run in which nothing is below it, no word."""
     found = read("gas_of_100", "box2d_v3:shipped", 1)
     matched = read("gas_of_100", "box2d_v3:matched", 1)["restitution"]
     galperin = read("galperin_31", "box2d_v3:shipped", 1)["restitution"]

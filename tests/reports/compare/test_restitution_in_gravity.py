@@ -55,7 +55,6 @@ LAW = {"speed": SPEEDS, "share": st.floats(0, 0.99), "substeps": st.integers(1, 
 def test_whoever_has_the_stated_e_reads_as_exact(
     e: float, speed: float, share: float, substeps: int
 ):
-    """At whatever instant of the step the disk meets the floor."""
     found = fallen(e, e, speed, share, substeps)
 
     assert found.values == pytest.approx([e], abs=ROUNDING)
@@ -65,7 +64,7 @@ def test_whoever_has_the_stated_e_reads_as_exact(
 def test_another_e_is_read_to_the_fall_of_a_step(
     e: float, stated: float, speed: float, share: float, substeps: int
 ):
-    """(1 + e) g dt / v, to second order; and never on the far side of what is stated."""
+    # (1 + e) g dt / v, to second order; and never on the far side of what is stated.
     found = fallen(e, stated, speed, share, substeps)
     fall = G * SAMPLE / substeps / speed
 
@@ -78,7 +77,6 @@ def test_another_e_is_read_to_the_fall_of_a_step(
 def test_an_e_that_a_step_of_falling_cannot_explain_is_seen(
     speed: float, share: float, substeps: int
 ):
-    """The control: 0.3 for 0.9 stays 0.3 to the spread, which is far smaller."""
     found = fallen(0.3, 0.9, speed, share, substeps)
 
     assert abs(found.values[0] - 0.9) > 0.4
@@ -94,7 +92,7 @@ def read(engine: str) -> dict[str, Value | None]:
 
 @pytest.mark.parametrize("engine", ["event_driven:float64", "reference:ordered"])
 def test_who_follows_a_ball_exactly_has_its_e(engine: str):
-    """They read 0.889 while the end of a step was taken for the time of the collision."""
+    # They read 0.889 while the end of a step was taken for the time of the collision.
     found = read(engine)
 
     assert found["restitution"] is not None

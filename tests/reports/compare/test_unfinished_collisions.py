@@ -58,8 +58,8 @@ def met(
 
 
 def test_a_soft_contact_is_read_when_the_two_part(monkeypatch: pytest.MonkeyPatch):
-    """Stopped and thrown back over three samples; without looking on, the control, e would be
-    negative."""
+    # Stopped and thrown back over three samples; without looking on, the control, e would be
+    # negative.
     found = met(-0.6, -0.1, 0.5, 0.8, 0.8)
     # It is over as soon as they no longer approach: at 0.5, of which the third sample after the
     # contact reports.
@@ -71,13 +71,11 @@ def test_a_soft_contact_is_read_when_the_two_part(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_collision_that_is_over_at_once_is_read_as_before():
-    """With any e, e = 0 too."""
     for e in (0.0, 0.3, 1.0):
         assert met(e, e, e).values == pytest.approx([e])
 
 
 def test_a_law_that_lets_two_pass_more_slowly_is_read_with_a_negative_e():
-    """They have half their speed left, and part on the other side."""
     found = met(*[-0.5] * 30)
 
     assert found.values == pytest.approx([-0.5])
@@ -85,7 +83,6 @@ def test_a_law_that_lets_two_pass_more_slowly_is_read_with_a_negative_e():
 
 
 def test_a_collision_that_is_cut_off_is_counted_and_not_read():
-    """By the end of the run, or by another collision of one of the two."""
     assert met(-0.6, -0.1)[3:5] == (0, 1)
     assert len(met(-0.6, -0.1).values) == 0
     other = met(-0.6, -0.1, 0.5, 0.8, others=((4 * STEP, 1, -1),))
@@ -93,8 +90,6 @@ def test_a_collision_that_is_cut_off_is_counted_and_not_read():
 
 
 def test_who_lets_disks_pass_as_if_nothing_were_there_is_caught():
-    """e = -1: nothing changes, so there is nothing to read; overlap and velocity tell. The truth is
-    the control."""
     one, truth = truth_of("head_on_equal_e1")
     ghost = replace(
         truth,
@@ -117,8 +112,7 @@ def test_who_lets_disks_pass_as_if_nothing_were_there_is_caught():
 
 @pytest.mark.parametrize("substeps", [1, 2])
 def test_box2d_is_not_read_while_two_still_approach(substeps: int, monkeypatch: pytest.MonkeyPatch):
-    """Its slow collisions have e = 0 as shipped, not e = -0.84, which is what the first sample
-    says."""
+    # Its slow collisions have e = 0 as shipped, not e = -0.84, which is what the first sample says.
     one = scenario("line_gas")
     row = ENGINES["box2d_v3:shipped"]
     run = play(row.make(), "box2d_v3:shipped", one, one.dt(substeps))
@@ -139,8 +133,8 @@ def test_box2d_is_not_read_while_two_still_approach(substeps: int, monkeypatch: 
 
 
 def test_a_disk_that_is_pressed_through_the_floor_has_no_restitution():
-    """In a column that the lesson's solver cannot carry gravity does more than the collision; the
-    overlap is seen. Only the one that jumps out and lands beside it is read."""
+    # In a column that the lesson's solver cannot carry gravity does more than the collision; the
+    # overlap is seen. Only the one that jumps out and lands beside it is read.
     one = scenario("column_of_ten")
     run = play(ENGINES["reference:lesson"].make(), "reference:lesson", one, one.dt(1))
     assert run.trajectory is not None

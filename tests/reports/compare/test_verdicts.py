@@ -90,7 +90,7 @@ def test_a_sample_on_the_edge_of_a_torus_is_no_way_across_the_box():
 
 @pytest.mark.parametrize("offset", [-0.5, 0.5])
 def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offset: float):
-    """A fall of a tenth of a second at 1/60 s: half a step is an eighth of its energy."""
+    # A fall of a tenth of a second at 1/60 s: half a step is an eighth of its energy.
     one, _ = truth_of("bouncing_ball_e1")
     dt = 1 / 60
     t = np.arange(9) * dt
@@ -105,7 +105,7 @@ def test_velocities_of_half_a_step_before_or_after_gain_and_lose_no_energy(offse
 
 
 def test_the_rounding_of_a_long_fall_is_no_momentum():
-    """At the end the momentum is twenty times that of the start, to which errors are relative."""
+    # At the end the momentum is twenty times that of the start, to which errors are relative.
     one, _ = truth_of("head_on_equal_e1")
     fall = replace(one.scene, gravity=[0.0, -10.0], velocity=[[-1.0, 0.0], [0.0, 1.0]])
     one = replace(one, scene=fall, truth=None, duration=3.0, sample_interval=0.02)
@@ -122,7 +122,7 @@ def test_a_disk_that_rolls_over_the_pieces_of_a_floor_does_not_tunnel():
 
 
 def test_a_disk_that_had_time_to_go_round_the_end_of_a_wall_did_not_tunnel():
-    """Round the end of a wall at (0, 0), from below to above and back, in one sample interval."""
+    # Round the end of a wall at (0, 0), from below to above and back, in one sample interval.
     one, _ = truth_of("box_billiard")
     wall = replace(one.scene, walls=[[[-5.0, 0.0], [0.0, 0.0]]], position=[[-0.1, -0.3]])
     one = replace(one, scene=wall, truth=None)
@@ -142,7 +142,7 @@ def test_a_disk_that_had_time_to_go_round_the_end_of_a_wall_did_not_tunnel():
 
 
 def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step():
-    """100 disks at e = 1: each sample has some overlap, each of another pair."""
+    # 100 disks at e = 1: each sample has some overlap, each of another pair.
     one = scenario("gas_of_100")
     played = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
     assert played.trajectory is not None
@@ -152,7 +152,7 @@ def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step
 
 
 def test_a_right_engine_may_overlap_at_each_sample_where_a_fast_disk_has_a_narrow_gap():
-    """25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due."""
+    # 25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due.
     one, truth = truth_of("galperin_314")
     played = play(ENGINES["reference:coulomb"].make(), "reference:coulomb", one, one.dt(1))
     assert played.trajectory is not None
@@ -273,7 +273,7 @@ def test_momentum_that_nothing_explains_fails():
 @pytest.mark.parametrize("name", ["heavy_on_light", "swapped"])
 @pytest.mark.parametrize("substeps", [1, 2, 4])
 def test_a_disk_that_falls_through_the_floor_has_tunnelled(name: str, substeps: int):
-    """The exact answer ends at 0.319 of 3 s, and the disk falls through the floor after it."""
+    # The exact answer ends at 0.319 of 3 s, and the disk falls through the floor after it.
     for engine in ("reference:exercise", "reference:coulomb"):
         found = failed_by(name, engine, substeps)["tunnelled"]
         assert found.at > 0.319, engine
