@@ -1,9 +1,11 @@
-"""A scenario, its exact answer, and a view of something played beside it, as `compare` makes it."""
+"""A scenario, its exact answer, and views of what was played, as `compare` makes them."""
 
 from __future__ import annotations
 
+from crosscheck2d.adapters.engines import ENGINES
+from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.delays import jumps_of
-from crosscheck2d.reports.compare.view import View, cut
+from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
@@ -17,3 +19,9 @@ def truth_of(name: str) -> tuple[Scenario, Trajectory]:
 
 def beside_truth(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> View:
     return View(one, dt, cut(played, len(truth)), truth, jumps_of(truth, one))
+
+
+def run_alone(one: Scenario, engine: str, substeps: int = 1) -> View:
+    """What an engine makes of a scenario, beside nothing but the laws."""
+    run = play(ENGINES[engine].make(), engine, one, one.dt(substeps))
+    return beside(one, run, None, None)

@@ -166,7 +166,6 @@ class Change:
         return Collisions.of(rows)
 
     def run(self, run: Run, one: Scenario) -> Run:
-        assert run.trajectory is not None
         times = np.arange(len(run.trajectory)) * (self.time * one.sample_interval)
         new = self.trajectory(run.trajectory, one, times, run.dt)
         return replace(run, dt=self.time * run.dt, trajectory=new)

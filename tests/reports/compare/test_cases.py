@@ -37,7 +37,6 @@ def case(name: str) -> Scenario:
 def played(name: str, engine: str, rung: int = 0) -> Run:
     scenario = case(name)
     run = play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[rung]))
-    assert run.trajectory is not None
     return run
 
 
@@ -47,7 +46,6 @@ def read(metric: str, name: str, engine: str, rung: int = 0) -> Value:
     truth = answered(scenario)[1] if "itself" not in METRICS[metric].against else None
     jumps = None if truth is None else jumps_of(truth, scenario)
     value = METRICS[metric].of(beside(scenario, run, truth, jumps))
-    assert value is not None
     return value
 
 
@@ -75,7 +73,6 @@ def test_a_disk_that_lands_just_before_the_end_has_no_restitution(engine: str):
     early = replace(case("sinks_in"), scene=higher, truth=None, duration=1.05, substeps=(4,))
     run = play(ENGINES[engine].make(), engine, early, early.dt(4))
     value = METRICS["restitution"].of(beside(early, run, None, None))
-    assert value is not None
     assert value.value == pytest.approx(0, abs=1e-15)
 
 
@@ -85,7 +82,6 @@ def test_a_disk_that_bounces_as_low_is_told_from_one_that_lies():
     run = play(ENGINES["reference:ordered"].make(), "reference:ordered", bouncing, 0.05 / 6)
     value = METRICS["restitution"].of(beside(scenario, run, None, None))
 
-    assert value is not None
     assert 0.14 < value.value < 0.16
 
 
@@ -124,13 +120,11 @@ def test_the_group_that_departs_more_is_the_value(
     scenario = case("shallow_pong")
     scenario = replace(scenario, scene=replace(scenario.scene, restitution=stated))
     trajectory = played("shallow_pong", "reference:ordered").trajectory
-    assert trajectory is not None
     view = View(scenario, 0.1, trajectory)
     none = np.zeros(len(values))
     view.__dict__["restitutions"] = Restitutions(np.array(values, float), none, none, 0, 0)
     value = METRICS["restitution"].of(view)
 
-    assert value is not None
     assert value.value == right
     assert value.note == f"{note}{len(values)} collisions read"
 
@@ -175,7 +169,6 @@ def test_a_disk_that_does_not_bounce_loses_all_its_height(gravity: tuple[float, 
     for e, stated, change in ((0, 1, -100), (0.7, 0.7, 0), (0.8, 1, -36), (1, 0.8, 56.25)):
         value = dropped(e, stated, gravity)
 
-        assert value is not None
         assert value.value == pytest.approx(change, abs=1e-6)
 
 
@@ -299,7 +292,6 @@ def test_a_disk_that_slips_to_the_end_has_a_lower_bound():
     )
     value = METRICS["time_to_roll_error_s"].of(beside_truth(one, one.dt(1), slips, truth))
 
-    assert value is not None
     assert value.value > 0
     assert value.note == "at least: it slips to the end"
 
@@ -313,7 +305,5 @@ def test_a_collision_found_forty_steps_late_is_counted_in_the_note():
         for played in (late, truth)
     )
 
-    assert found is not None
-    assert control is not None
     assert (found.value, control.value) == (0, 0)
     assert found.note == f"{control.note}, 1 found more than 20 steps late or early"

@@ -102,3 +102,36 @@ def test_an_engine_that_does_so_is_caught_in_the_tables(name: str, make: type[Ex
     # begun.
     assert excess[["energy_error", "energy_deviation", "momentum_deviation"]].max() > 1e-3
     assert np.isfinite(wrong["velocity_max"])
+
+
+# Spins.
+
+SPINNING = ("spin_under_torque", "body_frame_thrust", "ship_thrust")
+
+
+@pytest.mark.parametrize("name", SPINNING)
+@pytest.mark.parametrize("factor", [0.0, 1.01, 2.0])
+def test_a_wrong_angular_velocity_is_caught_even_where_all_angles_are_right(
+    name: str, factor: float
+):
+    one, truth = truth_of(name)
+    spin = truth.angular_velocity
+    for dt in map(one.dt, one.substeps):
+        read = [
+            beside_truth(one, dt, each, truth)
+            for each in (replace(truth, angular_velocity=spin * factor), truth)
+        ]
+        wrong, right = (METRICS["angular_velocity_max"].of(view) for view in read)
+        blind = METRICS["angle_max"].of(read[0])
+
+        # what is near the end is not judged
+        assert wrong.value > 0.9 * abs(factor - 1) * np.abs(spin[1:-4]).max()
+        assert wrong.note == right.note == read[0].carried(read[0].judged_spin)
+        assert (right.value, blind.value) == (0, 0)
+
+
+def test_a_spin_is_judged_as_the_velocity_is():
+    for name in ("falling_box", "head_on_equal_e05", "spin_under_torque"):
+        one, truth = truth_of(name)
+        view = beside_truth(one, one.dt(1), truth, truth)
+        assert METRICS["angular_velocity_max"].of(view) == METRICS["velocity_max"].of(view)

@@ -32,7 +32,6 @@ def values(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> l
 
 
 def late(one: Scenario, truth: Trajectory, delay: float) -> Trajectory:
-    assert one.truth is not None
     return replace(truth, velocity=one.truth(np.maximum(truth.t - delay, 0.0)).velocity)
 
 
@@ -91,7 +90,6 @@ def test_a_sample_at_the_instant_of_a_collision_may_have_the_velocity_before_it_
     name: str,
 ):
     one, truth = truth_of(name)
-    assert one.truth is not None
     jumps = jumps_of(truth, one)
     collisions = jumps.t[np.diff(jumps.t, prepend=-1) > 1e-6]
     if not len(collisions):

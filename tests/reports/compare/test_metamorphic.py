@@ -221,12 +221,10 @@ def of_the_first_disk(view: View) -> Value:
 
 
 def along_x(view: View) -> Value:
-    assert view.other is not None
     return Value(float(np.abs(view.played.position[..., 0] - view.other.position[..., 0]).max()))
 
 
 def to_the_right(view: View) -> Value:
-    assert view.other is not None
     return Value(float((view.played.position[..., 1] - view.other.position[..., 1]).max()))
 
 

@@ -1,5 +1,7 @@
 """The judge judged: metrics of trajectories whose faults were put in by hand."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,7 @@ from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.compare.comparison import COLUMNS, compare
 from crosscheck2d.reports.compare.delays import jumps_of
+from crosscheck2d.reports.compare.laws import cached
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.view import NOT_JUDGED, View, cut
 from crosscheck2d.reports.page.findings import nearest, refusals
@@ -19,15 +22,13 @@ from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust, Trajectory
 from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.adapters.broken_engines import NanAtStep7
-from tests.reports.compare.answers import beside_truth, truth_of
+from tests.reports.compare.answers import beside_truth, run_alone, truth_of
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
 
 def value(metric: str, view: View) -> float:
-    found = METRICS[metric].of(view)
-    assert found is not None
-    return found.value
+    return METRICS[metric].of(view).value
 
 
 @pytest.mark.parametrize("name", WITH_TRUTH)
@@ -70,7 +71,6 @@ def test_a_disk_moved_by_a_millimetre_reads_a_millimetre(name: str):
         View(one, one.dt(1), replace(truth, position=position), truth)
     )
 
-    assert found is not None
     # the rounding of x + 0.0008 at |x| < 20, over 1e-3
     assert found.value == pytest.approx(1e-3, rel=1e-9)
     assert (found.disk, found.at) == (disk, truth.t[k])
@@ -116,22 +116,19 @@ def test_weight_and_thrust_are_accounted_for():
         sample_interval=0.1,
         thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
     )
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
-    assert run.trajectory is not None
 
     # ten additions of float64
-    assert value("momentum_error", View(one, run.dt, run.trajectory)) < 1e-14
+    assert value("momentum_error", run_alone(one, "reference:exercise")) < 1e-14
 
 
 def test_deviation_is_measured_across_the_seam():
     one = scenario("asteroids")
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(4))
-    assert run.trajectory is not None
+    played = run_alone(one, "reference:exercise", 4).played
     # the box is 10 m wide
-    moved = replace(run.trajectory, position=run.trajectory.position + [10.0, 0.0])
+    moved = replace(played, position=played.position + [10.0, 0.0])
 
     # rounding of x + 10
-    assert value("position_max", View(one, run.dt, moved, run.trajectory)) < 1e-14
+    assert value("position_max", View(one, one.dt(4), moved, played)) < 1e-14
 
 
 @pytest.mark.parametrize("e", ["e0", "e05", "e09", "e1"])
@@ -152,11 +149,8 @@ def test_the_reference_has_the_restitution_of_the_scene_in_every_scene(name: str
     # Its impulse is exact, so what is read off its samples is e, or the reading is wrong; it knows
     # no friction.
     one = scenario(name)
-    run = play(
-        ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(one.substeps[0])
-    )
-    assert run.trajectory is not None
-    found = METRICS["restitution_error"].of(View(one, run.dt, run.trajectory))
+    view = run_alone(one, "reference:exercise", one.substeps[0])
+    found = METRICS["restitution_error"].of(view)
 
     # Rounding of v, twice over the closing speed: once in the normal, once in e. The slowest graze
     # here is 1e-3 v.
@@ -272,9 +266,7 @@ def test_falling_through_a_wrap_is_no_energy_error():
         wrap=[[-1, -1], [1, 1]],
     )
     one = Scenario(name="rain", asks="?", source="", scene=scene, duration=5.0, sample_interval=0.1)
-    run = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
-    assert run.trajectory is not None
-    view = View(one, run.dt, run.trajectory)
+    view = run_alone(one, "reference:exercise")
 
     assert METRICS["energy_error"].of(view) is None
     assert METRICS["energy_created"].of(view) is None
@@ -334,3 +326,39 @@ def test_where_the_oracle_refuses_the_comparison_says_why():
 
     assert refused.truth is None
     assert "disk 0 and disk 1 overlap by 0.1 m" in refused.scenario.without_truth
+
+
+# The cache of the laws.
+
+
+def test_a_law_is_computed_once_for_the_same_objects_and_again_for_a_copy():
+    computed = []
+    law = cached(lambda one, other: computed.append((one, other)) or one.position + other.position)
+    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    again = replace(other)
+
+    found = law(one, other)
+    assert law(one, other) is found
+    assert law(one, again) is not found
+    assert computed == [(one, other), (one, again)]
+
+
+def test_what_was_found_cannot_be_edited():
+    found = cached(lambda scene: scene.position * 2)(scenario("near_miss").scene)
+
+    with pytest.raises(ValueError, match="read-only"):
+        found[0] = 0.0
+
+
+def test_what_was_found_is_forgotten_with_the_first_object():
+    law = cached(lambda one, other: one.position + other.position)
+    one, other = (scenario(name).scene for name in ("near_miss", "oblique_e1"))
+    law(one, other)
+    kept = weakref.ref(other)
+
+    del other
+    gc.collect()
+    assert kept() is not None
+    del one
+    gc.collect()
+    assert kept() is None

@@ -41,7 +41,6 @@ NAMES = ("reference:exercise", "pymunk:matched")
 def known_until(name: str, samples: int) -> Scenario:
     """A scenario whose truth is known at so many samples, the start among them."""
     one = scenario(name)
-    assert one.truth is not None
     truth, until = one.truth, (samples - 0.5) * one.sample_interval
 
     def cut_off(t: np.ndarray) -> Trajectory:
@@ -107,8 +106,6 @@ def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
 def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
     one = scenario("head_on_equal_e05")
     runs = [play(ENGINES[name].make(), name, one, one.dt(1)).trajectory for name in NAMES]
-    assert runs[0] is not None
-    assert runs[1] is not None
     view = View(one, one.dt(1), runs[0], runs[1])
     collisions = np.append(runs[0].collisions.t, runs[1].collisions.t)
     near = np.abs(view.played.t[:, None] - collisions).min(axis=1) < WINDOW * one.dt(1)
@@ -125,7 +122,6 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
     found = play(
         ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)
     ).trajectory
-    assert found is not None
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
     collisions = replace(
         found.collisions,
@@ -138,7 +134,6 @@ def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisio
     value = METRICS["velocity_max"].of(view)
 
     assert view.share(view.judged) < LEAST_SHARE
-    assert value is not None
     assert np.isnan(value.value)
     assert value.note.startswith(f"{NOT_JUDGED}: only ")
 
@@ -201,7 +196,6 @@ def test_a_velocity_that_overflows_is_judged_and_bad():
     with np.errstate(over="ignore", invalid="ignore"):
         found = METRICS["energy_deviation"].of(beside_truth(one, one.dt(1), huge, truth))
 
-    assert found is not None
     assert not np.isfinite(found.value)
     assert NOT_JUDGED not in found.note
 

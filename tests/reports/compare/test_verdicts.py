@@ -83,7 +83,6 @@ def test_a_sample_on_the_edge_of_a_torus_is_no_way_across_the_box():
     one, _ = case("wrap_wall")
     fast = replace(one, scene=replace(one.scene, velocity=[[0.5 / one.sample_interval, 0.0]]))
     played = play(row_of("event_driven:float64").make(), "event_driven:float64", fast, fast.dt(1))
-    assert played.trajectory is not None
     assert -2.0 in played.trajectory.position[:, 0, 0].round(12)
     assert failed(fast, played.trajectory) == {}
 
@@ -145,7 +144,6 @@ def test_a_right_engine_that_detects_at_the_end_of_a_step_may_overlap_for_a_step
     # 100 disks at e = 1: each sample has some overlap, each of another pair.
     one = scenario("gas_of_100")
     played = play(ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1))
-    assert played.trajectory is not None
     found = {each.id: each for each in verdicts(one, played.trajectory, played.dt)}
     assert not found["overlap"].failed
     assert judging.laws.penetration(played.trajectory, one.scene).max() > judging.MOST_OVERLAP
@@ -155,7 +153,6 @@ def test_a_right_engine_may_overlap_at_each_sample_where_a_fast_disk_has_a_narro
     # 25 m/s between a wall and a heavy disk: in each step of 1/60 s a collision is due.
     one, truth = truth_of("galperin_314")
     played = play(ENGINES["reference:coulomb"].make(), "reference:coulomb", one, one.dt(1))
-    assert played.trajectory is not None
     assert not [v for v in verdicts(one, played.trajectory, played.dt, truth=truth) if v.failed]
 
 
