@@ -15,8 +15,7 @@ from playwright.sync_api import Browser
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import pool, timing_pass
-from tests.compiling import LOCKS, compiling_alone
-from tests.forks import start_worker
+from tests.forks import LOCKS, compiling_alone, start_worker
 from tests.reports.page.browsing import chromium
 
 # Images of containers forbid Python to keep what it has compiled. Each process of the tests would

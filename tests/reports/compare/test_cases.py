@@ -36,8 +36,7 @@ def case(name: str) -> Scenario:
 @cache
 def played(name: str, engine: str, rung: int = 0) -> Run:
     scenario = case(name)
-    run = play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[rung]))
-    return run
+    return play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[rung]))
 
 
 def read(metric: str, name: str, engine: str, rung: int = 0) -> Value:
@@ -45,8 +44,7 @@ def read(metric: str, name: str, engine: str, rung: int = 0) -> Value:
     scenario, run = case(name), played(name, engine, rung)
     truth = answered(scenario)[1] if "itself" not in METRICS[metric].against else None
     jumps = None if truth is None else jumps_of(truth, scenario)
-    value = METRICS[metric].of(beside(scenario, run, truth, jumps))
-    return value
+    return METRICS[metric].of(beside(scenario, run, truth, jumps))
 
 
 @pytest.mark.parametrize("metric", ["position_rms", "position_rms_radii", "angle_rms"])

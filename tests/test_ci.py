@@ -1,17 +1,113 @@
-"""The yardstick fails at every change that changed.toml does not state, and at no other."""
+"""What `.ci` runs: every test is played by one of the fast suite, the gate and the long run; GitHub
+runs what is run here; the yardstick fails at every change that changed.toml does not state."""
 
 from __future__ import annotations
 
 import importlib.util
+import re
+import shlex
+import subprocess
+import sys
 import tomllib
+from collections import defaultdict
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
-SCRIPT = Path(__file__).parents[1] / ".ci" / "yardstick.py"
+ROOT = Path(__file__).parent.parent
+
+
+def call_of(script: str) -> str:
+    """The one command in a script of `.ci` that selects tests by their marks."""
+    text = (ROOT / ".ci" / script).read_text("utf-8")
+    (call,) = re.findall(r"^(?:exec )?uv run (pytest -m .+)$", text, re.MULTILINE)
+    return call
+
+
+def selected(words: str) -> str:
+    options = shlex.split(words)
+    return options[options.index("-m") + 1]
+
+
+OPTIONS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["pytest"]
+SUITES = {
+    "fast": selected(OPTIONS["ini_options"]["addopts"]),
+    "gate": selected(call_of("run")),
+    # it also plays every property again, with more examples
+    "long": selected(call_of("long")).removesuffix(" or hypothesis"),
+}
+
+
+def suites_of(marks: Collection[str]) -> list[str]:
+    known = defaultdict(bool, dict.fromkeys(marks, True))
+    return [name for name, words in SUITES.items() if eval(words, {"__builtins__": {}}, known)]
+
+
+def only_long(tests: Iterable[tuple[str, list[str]]]) -> set[str]:
+    """The files of which fast suite and gate play nothing; of each test its name and suites."""
+    tests = list(tests)
+    seen = {name.split("::")[0] for name, suites in tests if suites != ["long"]}
+    return {name.split("::")[0] for name, _ in tests} - seen
+
+
+def test_every_test_is_played_by_one_suite_and_none_is_the_gate_blind_to(
+    collected: list[pytest.Item],
+):
+    tests = [
+        (item.nodeid, suites_of({mark.name for mark in item.iter_markers()})) for item in collected
+    ]
+
+    assert [name for name, suites in tests if len(suites) != 1] == []
+    assert only_long(tests) == set()
+
+
+def test_the_marks_say_which_suite():
+    assert suites_of([]) == suites_of(["hypothesis", "parametrize"]) == ["fast"]
+    assert suites_of(["slow"]) == suites_of(["independent"]) == ["gate"]
+    assert suites_of(["long"]) == suites_of(["slow", "long"]) == ["long"]
+    assert suites_of(["independent", "long"]) == ["long"]
+    tests = [("a.py::one", ["fast"]), ("a.py::two", ["long"]), ("b.py::three", ["long"])]
+    assert only_long(tests) == {"b.py"}
+
+
+# The workflows.
+
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*"))
+CI = ROOT / ".github" / "workflows" / "ci.yml"
+
+
+def faults_of(workflow: Path) -> str:
+    words = ["check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(workflow)]
+    done = subprocess.run([sys.executable, "-m", *words], capture_output=True)
+    return (done.stdout + done.stderr).decode() if done.returncode else ""
+
+
+@pytest.mark.slow
+def test_the_workflows_are_what_github_takes(tmp_path: Path):
+    assert [workflow.name for workflow in WORKFLOWS] == ["ci.yml"]
+    assert faults_of(CI) == ""
+    wrong = tmp_path / "ci.yml"
+    wrong.write_text(CI.read_text(encoding="utf-8").replace("runs-on:", "runs_on:"), "utf-8")
+    assert "runs-on" in faults_of(wrong)
+
+
+def test_they_run_the_gate_and_the_commands_of_the_readme():
+    jobs = YAML(typ="safe").load(CI.read_text(encoding="utf-8"))["jobs"]
+    runs = {
+        name: [step["run"] for step in job["steps"] if "run" in step] for name, job in jobs.items()
+    }
+    block = (ROOT / "README.md").read_text(encoding="utf-8").split("```sh\n")[1].split("```")[0]
+
+    assert runs == {"gate": ["bash .ci/run"], "readme": block.splitlines()}
+    assert jobs["readme"]["strategy"]["matrix"]["os"] == ["macos-latest", "windows-latest"]
+
+
+# The yardstick.
+
+SCRIPT = ROOT / ".ci" / "yardstick.py"
 SPEC = importlib.util.spec_from_file_location("yardstick", SCRIPT)
-assert SPEC is not None
-assert SPEC.loader is not None
 yardstick = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(yardstick)
 
