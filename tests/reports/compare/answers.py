@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.scenarios.catalogue import scenario
@@ -21,7 +22,15 @@ def beside_truth(one: Scenario, dt: float, played: Trajectory, truth: Trajectory
     return View(one, dt, cut(played, len(truth)), truth, jumps_of(truth, one))
 
 
+def run_engine(one: Scenario, engine: str, substeps: int = 1) -> Run:
+    return play(ENGINES[engine].make(), engine, one, one.dt(substeps))
+
+
+def run_engines(one: Scenario, *engines: str) -> list[Run]:
+    """At every step size of the scenario."""
+    return [run_engine(one, engine, k) for engine in engines for k in one.substeps]
+
+
 def run_alone(one: Scenario, engine: str, substeps: int = 1) -> View:
     """What an engine makes of a scenario, beside nothing but the laws."""
-    run = play(ENGINES[engine].make(), engine, one, one.dt(substeps))
-    return beside(one, run, None, None)
+    return beside(one, run_engine(one, engine, substeps), None, None)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.comparison import Comparison
@@ -21,7 +20,7 @@ from crosscheck2d.scenarios import catalogue
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
-from tests.reports.compare.answers import beside_truth, truth_of
+from tests.reports.compare.answers import beside_truth, run_alone, run_engine, truth_of
 
 CASES = Path(__file__).parents[2] / "data" / "cases"
 STOPPED = 1e-6  # e of a float32 engine that stops a disk: its rounding of a velocity
@@ -36,7 +35,7 @@ def case(name: str) -> Scenario:
 @cache
 def played(name: str, engine: str, rung: int = 0) -> Run:
     scenario = case(name)
-    return play(ENGINES[engine].make(), engine, scenario, scenario.dt(scenario.substeps[rung]))
+    return run_engine(scenario, engine, scenario.substeps[rung])
 
 
 def read(metric: str, name: str, engine: str, rung: int = 0) -> Value:
@@ -69,15 +68,14 @@ def test_a_disk_that_lands_just_before_the_end_has_no_restitution(engine: str):
     # It lands at 1.01 of 1.05 s; nothing after the last sample tells that it lies.
     higher = replace(case("sinks_in").scene, position=[[0.0, 0.5 + 5.1005]])
     early = replace(case("sinks_in"), scene=higher, truth=None, duration=1.05, substeps=(4,))
-    run = play(ENGINES[engine].make(), engine, early, early.dt(4))
-    value = METRICS["restitution"].of(beside(early, run, None, None))
+    value = METRICS["restitution"].of(run_alone(early, engine, 4))
     assert value.value == pytest.approx(0, abs=1e-15)
 
 
 def test_a_disk_that_bounces_as_low_is_told_from_one_that_lies():
     scenario = case("sinks_in")
     bouncing = replace(scenario, scene=replace(scenario.scene, restitution=0.15))
-    run = play(ENGINES["reference:ordered"].make(), "reference:ordered", bouncing, 0.05 / 6)
+    run = run_engine(bouncing, "reference:ordered", 6)
     value = METRICS["restitution"].of(beside(scenario, run, None, None))
 
     assert 0.14 < value.value < 0.16
@@ -155,7 +153,7 @@ def dropped(e: float, stated: float, gravity: tuple[float, float] = (0.0, -10.0)
         walls=[[-20 * along, 20 * along]],
     )
     scenario = Scenario("drop", "?", "here", scene, 4.0, 1 / 60)
-    run = play(ENGINES["reference:ordered"].make(), "reference:ordered", scenario, 1 / 60)
+    run = run_engine(scenario, "reference:ordered")
     return METRICS["apex_change"].of(
         beside(replace(scenario, scene=replace(scene, restitution=stated)), run, None, None)
     )
@@ -181,9 +179,8 @@ def test_no_apex_is_read_off_a_tilted_floor():
         walls=[[[-20, -2], [20, 2]]],
     )
     scenario = Scenario("tilted", "?", "here", level, 2.0, 1 / 60)
-    run = play(ENGINES["reference:ordered"].make(), "reference:ordered", scenario, 1 / 60)
 
-    assert METRICS["apex_change"].of(beside(scenario, run, None, None)) is None
+    assert METRICS["apex_change"].of(run_alone(scenario, "reference:ordered")) is None
 
 
 @pytest.mark.parametrize("rung", [1, 2])
@@ -279,19 +276,6 @@ def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
         table = Comparison(fast, None, (), None)  # type: ignore[arg-type]
 
         assert bool(passing(table)) is passes
-
-
-def test_a_disk_that_slips_to_the_end_has_a_lower_bound():
-    one, truth = truth_of("slip_to_roll")
-    slips = replace(
-        truth,
-        velocity=np.broadcast_to(truth.velocity[0], truth.velocity.shape),
-        angular_velocity=np.broadcast_to(truth.angular_velocity[0], truth.angular_velocity.shape),
-    )
-    value = METRICS["time_to_roll_error_s"].of(beside_truth(one, one.dt(1), slips, truth))
-
-    assert value.value > 0
-    assert value.note == "at least: it slips to the end"
 
 
 def test_a_collision_found_forty_steps_late_is_counted_in_the_note():

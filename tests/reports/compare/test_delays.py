@@ -6,11 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.compare import delays, laws, scales, view
+from crosscheck2d.reports.compare import laws, scales
 from crosscheck2d.reports.compare.collisions import WINDOW
-from crosscheck2d.reports.compare.comparison import compare
 from crosscheck2d.reports.compare.delays import (
     distance_to_range,
     jumps_of,
@@ -19,8 +16,7 @@ from crosscheck2d.reports.compare.delays import (
 )
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.scenarios.catalogue import SCENARIOS
-from crosscheck2d.scenarios.model import Array, Scenario, Scene, Trajectory
-from crosscheck2d.scenarios.truth.exact import with_oracle
+from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of
 
 HELD = ("velocity_max", "velocity_rms", "momentum_deviation", "energy_deviation")
@@ -177,68 +173,3 @@ def test_a_point_within_a_range_of_many_impulses_has_no_distance():
         # The shares are found one after the other, in at most `SWEEPS` rounds: to 1e-6 of the
         # impulses at hand.
         assert distance_to_range(rng.uniform(size=20) @ parts, parts) < 1e-6
-
-
-def box(pace: float) -> Scenario:
-    velocity: Array = np.array(
-        [
-            [2.35, 0.51],
-            [-0.17, 1.64],
-            [-2.82, 1.24],
-            [-0.75, -2.45],
-            [0.96, 2.59],
-            [-1.76, 0.78],
-            [-1.21, 1.45],
-            [1.33, -1.69],
-        ]
-    )
-    scene = Scene(
-        position=[
-            [-1.5, 1.7],
-            [-2.2, -0.4],
-            [-1.9, 1.1],
-            [-0.6, 0.1],
-            [0.5, 1.3],
-            [-1.1, 0.5],
-            [-1.1, -2.7],
-            [-1.1, -1.0],
-        ],
-        velocity=pace * velocity,
-        radius=[0.17, 0.27, 0.25, 0.17, 0.24, 0.3, 0.29, 0.34],
-        mass=[2.6, 2.1, 2.2, 2.6, 1.6, 2.4, 2.7, 0.8],
-        restitution=0.9,
-        walls=[[[-3, -3], [3, -3]], [[3, -3], [3, 3]], [[3, 3], [-3, 3]], [[-3, 3], [-3, -3]]],
-    )
-    return with_oracle(Scenario("box", "?", "", scene, 1.0 / pace, 0.02 / pace, (1, 2)))
-
-
-def largest_change(metric: str) -> float:
-    names = ("reference:exercise", "reference:lesson", "pymunk:matched", "event_driven:float64")
-    found = []
-    for pace in (1, 10):
-        one = box(pace)
-        runs = [
-            play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in one.substeps
-        ]
-        table = compare(one, runs).table
-        found.append(
-            table[table.metric == metric].value.to_numpy() / (pace if "velocity" in metric else 1)
-        )
-    assert len(found[0]) > 8
-    return float(np.abs(found[0] - found[1]).max())
-
-
-@pytest.mark.parametrize("metric", HELD)
-def test_the_same_scene_ten_times_as_fast_reads_the_same(metric: str):
-    # Rounding of the speeds, 3 m/s, that a few collisions have spread; momenta and energies are
-    # relative.
-    assert largest_change(metric) < 1e-9
-
-
-def test_a_threshold_on_the_grid_is_seen(monkeypatch: pytest.MonkeyPatch):
-    # The control: with a window of three steps the rounding of the grid decides which samples are
-    # compared.
-    for module in (delays, view):
-        monkeypatch.setattr(module, "WINDOW", 3.0)
-
-    assert largest_change("momentum_deviation") > 1e-6

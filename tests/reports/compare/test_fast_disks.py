@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.fast_disks import fast_note, plain, rounded_down
 from crosscheck2d.scenarios.model import Scenario, Scene
 from crosscheck2d.scenarios.truth.exact import with_oracle
+from tests.reports.compare.answers import run_engine, run_engines
 
 INTERVAL = 0.1  # s
 PHASES = np.linspace(0.0, 1.0, 41)  # of a step, at which the disk would touch
@@ -35,22 +34,13 @@ def shot(ratio: float, phase: float = 0.5, wall: bool = False) -> Scenario:
 
 
 def played(scenario: Scenario, *engines: str) -> Comparison:
-    return compare(
-        scenario,
-        [
-            play_once(ENGINES[name].make, name, scenario, scenario.dt(substeps))
-            for name in engines
-            for substeps in scenario.substeps
-        ],
-    )
+    return compare(scenario, run_engines(scenario, *engines))
 
 
 def passes_through(scenario: Scenario) -> bool:
     """Whether the disk is beyond the other, or the wall, at the end, in `reference:exercise` at the
     coarsest step."""
-    name = "reference:exercise"
-    run = play_once(ENGINES[name].make, name, scenario, INTERVAL)
-    x = run.trajectory.position[-1, :, 0]
+    x = run_engine(scenario, "reference:exercise").trajectory.position[-1, :, 0]
     return bool(x[0] > (x[1] if len(x) > 1 else 0.0))
 
 

@@ -119,11 +119,12 @@ def test_a_slide_with_a_tenth_less_friction_is_late_by_a_ninth_of_its_time():
 
 
 def test_a_slide_that_never_ends_is_late_up_to_the_end_of_the_run():
-    _, truth = truth_of("slip_to_roll")
-    still = np.zeros_like(truth.angular_velocity)
-    error = measured("slip_to_roll", "time_to_roll_error_s", angular_velocity=still)
+    one, truth = truth_of("slip_to_roll")
+    still = replace(truth, angular_velocity=np.zeros_like(truth.angular_velocity))
+    error = METRICS["time_to_roll_error_s"].of(beside_truth(one, one.dt(2), still, truth))
 
-    assert error == pytest.approx(truth.t[-1] - 3.0 / (3 * 0.2 * 9.81))
+    assert error.value == pytest.approx(truth.t[-1] - 3.0 / (3 * 0.2 * 9.81))
+    assert error.note == "at least: it slips to the end"
 
 
 def test_the_end_of_a_slip_is_found_between_two_samples():

@@ -15,8 +15,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import collisions, delays, laws, view
 from crosscheck2d.reports.compare.comparison import compare
@@ -28,6 +26,7 @@ from crosscheck2d.scenarios.families.placing import box, lay_out
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust
 from crosscheck2d.scenarios.truth.exact import with_oracle
+from tests.reports.compare.answers import run_engines
 from tests.reports.compare.metamorphic import CHANGES, Change
 
 PLAYED = (
@@ -141,8 +140,7 @@ changes of velocity."""
 @cache
 def played(name: str) -> tuple[Scenario, tuple[Run, ...], pd.DataFrame]:
     one = SCENES[name]()
-    every = [play(ENGINES[who].make(), who, one, one.dt(k)) for who in PLAYED for k in one.substeps]
-    runs = tuple(run for run in every if run.status == "ok")
+    runs = tuple(run for run in run_engines(one, *PLAYED) if run.status == "ok")
     return one, runs, compare(one, runs).table
 
 
@@ -301,17 +299,8 @@ def test_a_scene_ten_times_as_fast_gives_the_same_numbers_in_its_own_file():
     tables = []
     for name in ("pace_1", "pace_10"):
         one = read_scene_file(CASES / f"{name}.toml")
-        runs = [
-            play(ENGINES[who].make(), who, one, one.dt(k))
-            for who in (
-                "reference:exercise",
-                "reference:lesson",
-                "reference:ordered",
-                "event_driven:float64",
-            )
-            for k in one.substeps
-        ]
-        tables.append(compare(one, runs).table)
+        solvers = ("reference:exercise", "reference:lesson", "reference:ordered")
+        tables.append(compare(one, run_engines(one, *solvers, "event_driven:float64")).table)
     slow, fast = tables
     assert slow.metric.tolist() == fast.metric.tolist()
     factor = slow.unit.map({"m/s": 10.0, "rad/s": 10.0, "s": 0.1}).fillna(1.0)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare import laws
@@ -22,7 +21,7 @@ from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust, Trajectory
 from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.adapters.broken_engines import NanAtStep7
-from tests.reports.compare.answers import beside_truth, run_alone, truth_of
+from tests.reports.compare.answers import beside_truth, run_alone, run_engine, truth_of
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
@@ -180,8 +179,7 @@ def test_every_metric_is_a_number_or_silent_for_any_trajectory(metric: str):
 def test_a_run_that_diverged_earns_a_status_and_no_score():
     one = scenario("slow_collision")
     run = play(NanAtStep7(), "reference:exercise", one, one.dt(1))
-    good = play(ENGINES["pymunk:matched"].make(), "pymunk:matched", one, one.dt(1))
-    table = compare(one, [run, good]).table
+    table = compare(one, [run, run_engine(one, "pymunk:matched")]).table
 
     assert run.trajectory is not None
     assert table[table.engine == "reference"].metric.tolist() == ["status"]
@@ -192,7 +190,7 @@ def test_a_run_that_diverged_earns_a_status_and_no_score():
 def test_to_refuse_a_scene_does_not_help_in_the_ranking():
     one, two = scenario("slow_collision"), scenario("near_miss")
     runs = {
-        name: [play(ENGINES[name].make(), name, each, each.dt(4)) for each in (one, two)]
+        name: [run_engine(scene, name, 4) for scene in (one, two)]
         for name in ("reference:exercise", "box2d:shipped")
     }
     refused = Run("pymunk", "matched", one.name, one.dt(4), "unsupported", "too hard")
@@ -284,7 +282,7 @@ def test_comparison_stops_where_the_other_ends():
 def test_the_table_has_failures_too_and_every_pair_once():
     one = scenario("head_on_equal_e1")
     names = ["reference:exercise", "reference:lesson", "pymunk:matched"]
-    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in names for k in (1, 2)]
+    runs = [run_engine(one, name, k) for name in names for k in (1, 2)]
     refused = Run(
         "box2d",
         "matched",
@@ -305,10 +303,7 @@ def test_the_table_has_failures_too_and_every_pair_once():
 
 def test_without_a_truth_nothing_is_called_an_error_of_position():
     one = replace(scenario("gas_of_100"), duration=0.5, truth=None)
-    runs = [
-        play(ENGINES[name].make(), name, one, one.dt(4))
-        for name in ("reference:exercise", "pymunk:matched")
-    ]
+    runs = [run_engine(one, name, 4) for name in ("reference:exercise", "pymunk:matched")]
     table = compare(one, runs).table
 
     assert set(table.versus) == {"itself", "pymunk:matched"}

@@ -9,8 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.compare.collisions import WINDOW
@@ -24,7 +22,7 @@ from crosscheck2d.reports.run.comparing import read_scene_table
 from crosscheck2d.reports.run.diff import changed_numbers
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
-from tests.reports.compare.answers import beside_truth, truth_of
+from tests.reports.compare.answers import beside_truth, run_engine, truth_of
 
 CARRIED = (
     "velocity_max",
@@ -51,7 +49,7 @@ def known_until(name: str, samples: int) -> Scenario:
 
 
 def compared(one: Scenario, *, substeps: tuple[int, ...] = (1, 2, 4)) -> Comparison:
-    runs = [play(ENGINES[name].make(), name, one, one.dt(k)) for name in NAMES for k in substeps]
+    runs = [run_engine(one, name, k) for name in NAMES for k in substeps]
     return compare(one, runs)
 
 
@@ -105,7 +103,7 @@ def test_what_is_carried_by_less_than_the_share_is_not_judged(metric: str):
 
 def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
     one = scenario("head_on_equal_e05")
-    runs = [play(ENGINES[name].make(), name, one, one.dt(1)).trajectory for name in NAMES]
+    runs = [run_engine(one, name).trajectory for name in NAMES]
     view = View(one, one.dt(1), runs[0], runs[1])
     collisions = np.append(runs[0].collisions.t, runs[1].collisions.t)
     near = np.abs(view.played.t[:, None] - collisions).min(axis=1) < WINDOW * one.dt(1)
@@ -119,9 +117,7 @@ def test_beside_an_engine_the_disks_away_from_collisions_are_judged():
 
 def test_two_engines_that_are_always_in_contact_are_not_judged_by_their_collisions():
     one = scenario("slide_on_incline")
-    found = play(
-        ENGINES["reference:exercise"].make(), "reference:exercise", one, one.dt(1)
-    ).trajectory
+    found = run_engine(one, "reference:exercise").trajectory
     times = np.arange(0.0, one.duration, 2 * one.dt(1))
     collisions = replace(
         found.collisions,
@@ -210,16 +206,6 @@ def test_a_number_of_the_table_is_nan_only_where_it_is_not_judged():
 
     assert np.isinf(table.value).any()
     assert (table.value.isna() == unjudged).all()
-
-
-def test_a_failed_run_is_no_number_that_is_not_judged():
-    one = scenario("wall_to_wall")
-    table = compare(
-        one, [Run("pymunk", "matched", one.name, one.dt(1), "unsupported", "too hard")]
-    ).table
-
-    assert table.metric.tolist() == ["status"]
-    assert not table.note.str.startswith(NOT_JUDGED).any()
 
 
 def test_where_nobody_was_played_it_is_not_said_that_there_is_no_answer():
