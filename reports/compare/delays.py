@@ -66,8 +66,7 @@ def jumps_of(truth: Trajectory, scenario: Scenario) -> Jumps:
     ):
         if not size:  # a contact at rest
             continue
-        other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
-        normal = (x[i] - other) / np.linalg.norm(x[i] - other)
+        normal = laws.contact_normal(x, scene, i, j)
         impulse = size * normal
         if scene.friction:
             rub, rubbed = friction_of(scenario, t, i, j, normal)

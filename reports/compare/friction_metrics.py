@@ -149,12 +149,11 @@ class Isolated(NamedTuple):
 def tangents(truth: Trajectory, scenario: Scenario) -> Array:
     """(m, 2) of length 1: the direction along the surfaces in each collision of the truth."""
     assert scenario.truth is not None
-    collisions, walls, tangents = truth.collisions, scenario.scene.walls, []
+    collisions, tangents = truth.collisions, []
     for t, i, j in zip(collisions.t, collisions.i, collisions.j):
-        x = scenario.truth(np.array([t])).position[0]
-        other = x[j] if j >= 0 else laws.nearest_on_segment(x[i : i + 1], *walls[-1 - j])[0]
-        nx, ny = (x[i] - other) / np.linalg.norm(x[i] - other)
-        tangents.append([-ny, nx])
+        contact = scenario.truth(np.array([t])).position[0]
+        x, y = laws.contact_normal(contact, scenario.scene, i, j)
+        tangents.append([-y, x])
     return np.array(tangents).reshape(-1, 2)
 
 

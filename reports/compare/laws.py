@@ -136,6 +136,13 @@ def nearest_on_segment(x: Array, start: Array, end: Array) -> Array:
     return start + along[:, None] * (end - start)
 
 
+def contact_normal(x: Array, scene: Scene, i: int, j: int) -> Array:
+    """(2,) of length 1: from disk j, or wall -1 - j, to disk i, with the disks at x (n, 2)."""
+    other = x[j] if j >= 0 else nearest_on_segment(x[i : i + 1], *scene.walls[-1 - j])[0]
+    normal: Array = (x[i] - other) / np.linalg.norm(x[i] - other)
+    return normal
+
+
 @cached
 def wall_crossings(trajectory: Trajectory, scene: Scene) -> list[tuple[float, int, int]]:
     """(s, disk, -1 - wall) where the centre of a disk crosses a wall between two samples, on a

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.delays import jumps_of
 from crosscheck2d.reports.compare.view import View, beside, cut
 from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.model import Scenario, Trajectory
+from crosscheck2d.scenarios.model import Scenario, Scene, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
 
 
@@ -20,6 +22,17 @@ def truth_of(name: str) -> tuple[Scenario, Trajectory]:
 
 def beside_truth(one: Scenario, dt: float, played: Trajectory, truth: Trajectory) -> View:
     return View(one, dt, cut(played, len(truth)), truth, jumps_of(truth, one))
+
+
+def one_disk(
+    position: Sequence[float],
+    velocity: Sequence[float] = (0.0, 0.0),
+    e: float = 1.0,
+    **more: object,
+) -> Scene:
+    """A disk of 1 kg and 0.1 m, unless `more` says otherwise."""
+    disk = {"position": [position], "velocity": [velocity], "radius": [0.1], "mass": [1.0]}
+    return Scene(**(disk | {"restitution": e} | more))
 
 
 def run_engine(one: Scenario, engine: str, substeps: int = 1) -> Run:

@@ -18,9 +18,9 @@ from crosscheck2d.reports.compare.restitution import Restitutions
 from crosscheck2d.reports.compare.view import NOT_JUDGED, Value, View, beside
 from crosscheck2d.scenarios import catalogue
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
-from crosscheck2d.scenarios.model import Collisions, Scenario, Scene, Thrust, Trajectory
+from crosscheck2d.scenarios.model import Collisions, Scenario, Thrust, Trajectory
 from crosscheck2d.scenarios.no_truth import answered
-from tests.reports.compare.answers import beside_truth, run_alone, run_engine, truth_of
+from tests.reports.compare.answers import beside_truth, one_disk, run_alone, run_engine, truth_of
 
 CASES = Path(__file__).parents[2] / "data" / "cases"
 STOPPED = 1e-6  # e of a float32 engine that stops a disk: its rounding of a velocity
@@ -143,14 +143,9 @@ def dropped(e: float, stated: float, gravity: tuple[float, float] = (0.0, -10.0)
     floor at right angles to gravity."""
     up = -np.array(gravity) / np.hypot(*gravity)
     along = np.array([-up[1], up[0]])
-    scene = Scene(
-        position=[3 * up],
-        velocity=[0.5 * along],
-        radius=[0.25],
-        mass=[2.0],
-        restitution=e,
-        gravity=gravity,
-        walls=[[-20 * along, 20 * along]],
+    floor = [[-20 * along, 20 * along]]
+    scene = one_disk(
+        3 * up, 0.5 * along, e, radius=[0.25], mass=[2.0], gravity=gravity, walls=floor
     )
     scenario = Scenario("drop", "?", "here", scene, 4.0, 1 / 60)
     run = run_engine(scenario, "reference:ordered")
@@ -169,16 +164,9 @@ def test_a_disk_that_does_not_bounce_loses_all_its_height(gravity: tuple[float, 
 
 
 def test_no_apex_is_read_off_a_tilted_floor():
-    level = Scene(
-        position=[[0, 3]],
-        velocity=[[0, 0]],
-        radius=[0.25],
-        mass=[1],
-        restitution=1.0,
-        gravity=[0, -10],
-        walls=[[[-20, -2], [20, 2]]],
-    )
-    scenario = Scenario("tilted", "?", "here", level, 2.0, 1 / 60)
+    slope = [[[-20, -2], [20, 2]]]
+    scene = one_disk([0, 3], radius=[0.25], gravity=[0, -10], walls=slope)
+    scenario = Scenario("tilted", "?", "here", scene, 2.0, 1 / 60)
 
     assert METRICS["apex_change"].of(run_alone(scenario, "reference:ordered")) is None
 
@@ -264,14 +252,7 @@ def test_the_energy_at_hand_is_what_a_disk_can_lose():
 
 def test_a_floor_along_which_a_disk_rolls_is_no_wall_that_it_can_pass():
     for velocity, passes in (([30.0, 0.0], False), ([0.0, -30.0], True)):
-        scene = Scene(
-            position=[[0, 2]],
-            velocity=[velocity],
-            radius=[1],
-            mass=[1],
-            restitution=1,
-            walls=[[[-90, 1], [90, 1]]],
-        )
+        scene = one_disk([0, 2], velocity, radius=[1], walls=[[[-90, 1], [90, 1]]])
         fast = Scenario("fast", "?", "here", scene, 1.0, 0.1, (1, 2), without_truth="not needed")
         table = Comparison(fast, None, (), None)  # type: ignore[arg-type]
 

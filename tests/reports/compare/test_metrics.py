@@ -21,7 +21,7 @@ from crosscheck2d.scenarios.catalogue import SCENARIOS, scenario
 from crosscheck2d.scenarios.model import Scenario, Scene, Thrust, Trajectory
 from crosscheck2d.scenarios.truth.exact import with_oracle
 from tests.adapters.broken_engines import NanAtStep7
-from tests.reports.compare.answers import beside_truth, run_alone, run_engine, truth_of
+from tests.reports.compare.answers import beside_truth, one_disk, run_alone, run_engine, truth_of
 
 WITH_TRUTH = [name for name in SCENARIOS if scenario(name).truth]
 
@@ -98,23 +98,9 @@ def test_energy_that_is_created_is_seen():
 
 
 def test_weight_and_thrust_are_accounted_for():
-    scene = Scene(
-        position=[[0, 0]],
-        velocity=[[1, 2]],
-        radius=[0.1],
-        mass=[2],
-        restitution=1,
-        gravity=[0, -9.81],
-    )
-    one = Scenario(
-        name="thrust",
-        asks="?",
-        source="",
-        scene=scene,
-        duration=1.0,
-        sample_interval=0.1,
-        thrusts=[Thrust(0, 0.25, 0.6, [3.0, 1.0])],
-    )
+    scene = one_disk([0, 0], [1, 2], mass=[2], gravity=[0, -9.81])
+    thrusts = [Thrust(0, 0.25, 0.6, [3.0, 1.0])]
+    one = Scenario("thrust", "?", "", scene, 1.0, 0.1, thrusts=thrusts)
 
     # ten additions of float64
     assert value("momentum_error", run_alone(one, "reference:exercise")) < 1e-14
@@ -230,14 +216,7 @@ def test_a_sample_on_the_wall_itself_hides_no_crossing_and_makes_none(
     heights: list[float], through: bool, x: float
 ):
     wall = [[[-1.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [3.0, 0.0]]]
-    scene = Scene(
-        position=[[x, heights[0]]],
-        velocity=[[0.0, 0.0]],
-        radius=[0.1],
-        mass=[1.0],
-        walls=wall,
-        restitution=1.0,
-    )
+    scene = one_disk([x, heights[0]], walls=wall)
     position = np.array([[[x, height]] for height in heights])
     still = np.zeros((len(heights), 1))
     moved = Trajectory(np.arange(len(heights)), position, 0 * position, still, still)
@@ -254,16 +233,8 @@ def test_an_explosion_does_not_make_itself_small():
 
 
 def test_falling_through_a_wrap_is_no_energy_error():
-    scene = Scene(
-        position=[[0, 0]],
-        velocity=[[0, 0]],
-        radius=[0.1],
-        mass=[1],
-        restitution=1,
-        gravity=[0, -1],
-        wrap=[[-1, -1], [1, 1]],
-    )
-    one = Scenario(name="rain", asks="?", source="", scene=scene, duration=5.0, sample_interval=0.1)
+    scene = one_disk([0, 0], gravity=[0, -1], wrap=[[-1, -1], [1, 1]])
+    one = Scenario("rain", "?", "", scene, 5.0, 0.1)
     view = run_alone(one, "reference:exercise")
 
     assert METRICS["energy_error"].of(view) is None

@@ -15,8 +15,8 @@ from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.restitution import FLOOR, Restitutions, effective_restitution
 from crosscheck2d.reports.compare.view import SLOWEST, Value
 from crosscheck2d.scenarios.catalogue import scenario
-from crosscheck2d.scenarios.model import Collisions, Scene, Trajectory
-from tests.reports.compare.answers import beside_truth, run_alone, truth_of
+from crosscheck2d.scenarios.model import Array, Collisions, Scene, Trajectory
+from tests.reports.compare.answers import beside_truth, one_disk, run_alone, truth_of
 
 G, SAMPLE = 9.81, 0.05  # m/s2, s
 ROUNDING = 1e-12  # of some ten operations in float64
@@ -28,25 +28,21 @@ def read(name: str, engine: str, substeps: int) -> tuple[Value, Value]:
     return METRICS["restitution"].of(view), METRICS["restitution_error"].of(view)
 
 
+def moving(t: Array, velocity: Array, collision: tuple[float, int, int, float]) -> Trajectory:
+    still = np.zeros(velocity.shape[:2])
+    return Trajectory(t, 0 * velocity, velocity, still, still, Collisions.of([collision]))
+
+
 # The floor.
 
 
 def sliding(change: float, speed: float = 0.5, e: float = 0.5) -> tuple[Trajectory, Scene]:
     """A disk that slides along a floor at `speed` m/s and has one collision with it, of a `change`
     in m/s."""
-    scene = Scene(
-        position=[[0, 0.1]],
-        velocity=[[speed, 0]],
-        radius=[0.1],
-        mass=[1],
-        restitution=e,
-        walls=[[[-10.0, 0.0], [10.0, 0.0]]],
-    )
     down, up = -change / (1 + e), change * e / (1 + e)
     velocity = np.array([[[speed, down]], [[speed, down]], [[speed, up]], [[speed, up]]])
-    still, collisions = np.zeros((4, 1)), Collisions.of([(1.5, 0, -1, np.nan)])
-    played = Trajectory(np.arange(4.0), np.zeros((4, 1, 2)), velocity, still, still, collisions)
-    return played, scene
+    scene = one_disk([0, 0.1], [speed, 0], e, walls=[[[-10.0, 0.0], [10.0, 0.0]]])
+    return moving(np.arange(4.0), velocity, (1.5, 0, -1, np.nan)), scene
 
 
 @pytest.mark.parametrize("rounding", [FLOAT32, FLOAT64])
@@ -71,11 +67,9 @@ def test_a_heavy_disk_that_hardly_notices_is_read():
         mass=[1e7, 1],
         restitution=1,
     )
-    t, still = np.arange(4.0), np.zeros((4, 2))
     light, heavy = [-1.0, -1.0, 1.0, 1.0], [0.0, 0.0, -2e-7, -2e-7]
-    velocity = np.stack([np.stack([heavy, still[:, 0]], 1), np.stack([light, still[:, 0]], 1)], 1)
-    collisions = Collisions.of([(1.5, 0, 1, 2.0)])
-    played = Trajectory(t, np.zeros((4, 2, 2)), velocity, still, still, collisions)
+    velocity = np.array([[[a, 0], [b, 0]] for a, b in zip(heavy, light)])
+    played = moving(np.arange(4.0), velocity, (1.5, 0, 1, 2.0))
     found = effective_restitution(played, scene, 1.0, 0.0, FLOAT32)
 
     assert found.below == 0
@@ -118,19 +112,9 @@ def fallen(e: float, stated: float, speed: float, share: float, substeps: int) -
     end = t[1] + dt
     at = end - share * dt
     v = np.where(t < at, -speed - G * (t - at), e * speed - G * (t - at))
-    still = np.zeros((4, 1))
-    scene = Scene(
-        position=[[0, 0.1]],
-        velocity=[[0, v[0]]],
-        radius=[0.1],
-        mass=[1],
-        gravity=[0, -G],
-        restitution=stated,
-        walls=[[[-9, 0], [9, 0]]],
-    )
-    velocity = np.stack([still, v[:, None]], axis=-1)
-    collisions = Collisions.of([(end, 0, -1, np.nan)])
-    played = Trajectory(t, np.zeros((4, 1, 2)), velocity, still, still, collisions)
+    scene = one_disk([0, 0.1], [0, v[0]], stated, gravity=[0, -G], walls=[[[-9, 0], [9, 0]]])
+    velocity = np.stack([0 * v, v], axis=-1)[:, None]
+    played = moving(t, velocity, (end, 0, -1, np.nan))
     return effective_restitution(played, scene, dt, SLOWEST * G * SAMPLE, FLOAT64)
 
 
