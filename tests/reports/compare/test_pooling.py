@@ -13,7 +13,6 @@ from crosscheck2d.reports.compare.pooling import middle_half, moved, pooled, sai
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.speed import ladder
 from crosscheck2d.reports.speed.effort import QUICK
-from crosscheck2d.reports.speed.scored_part import scored
 from crosscheck2d.scenarios.model import Array
 
 MOST = 2.0  # the factor by which leaving out one scene of the quick form may move a pooled error
@@ -72,19 +71,6 @@ def most_moved(errors: dict[tuple[str, int], Array]) -> float:
     return max(moved(each, FINEST).max() for each in errors.values())
 
 
-def median_moved(errors: dict[tuple[str, int], Array]) -> float:
-    """The same of the median that was the statistic before, which is always one of the values."""
-    factors = [1.0]
-    for each in errors.values():
-        whole = max(np.percentile(each, 50, method="nearest"), FINEST)
-        others = [
-            max(np.percentile(np.delete(each, k), 50, method="nearest"), FINEST)
-            for k in range(len(each))
-        ]
-        factors += [max(other / whole, whole / other) for other in others]
-    return max(factors)
-
-
 STEPPING = ("reference:exercise", "pymunk:shipped", "box2d_v3:shipped")
 
 
@@ -98,20 +84,8 @@ def test_no_one_scene_is_the_pooled_curve():
 
 
 @pytest.mark.slow
-def test_the_scenes_and_the_median_of_before_fail_both():
-    # Negative control: with the scenes of before the statistic moves by more, and their median was
-    # free_fall's own closed form, a g dt t / 2 over the radius, at every step.
-    errors = errors_of(BEFORE, STEPPING)
-    fall = scored("free_fall", 0).scenario
-    g, t = float(np.linalg.norm(fall.scene.gravity)), fall.duration
-    for step_size in range(STEP_SIZES):
-        medians = np.percentile(errors["reference:exercise", step_size], 50, method="nearest")
-        assert medians == pytest.approx(
-            0.5 * fall.dt(2**step_size) * g * t / fall.scene.radius[0], rel=1e-9
-        )
-
-    assert most_moved(errors) > MOST
-    assert median_moved(errors) > 10 * MOST
+def test_with_the_scenes_of_before_one_scene_was_the_pooled_curve():
+    assert most_moved(errors_of(BEFORE, STEPPING)) > MOST
 
 
 @pytest.mark.long  # ten engines through fourteen scenes
