@@ -39,6 +39,7 @@ direction of a velocity to 1e-7; a collision as flat as this loses 1e-6 of the e
 
 
 def interval(trajectory: Trajectory) -> float:
+    """s between two samples."""
     return float(trajectory.t[1] - trajectory.t[0]) if len(trajectory) > 1 else 0.0
 
 
@@ -202,6 +203,8 @@ def match(played: Collisions, true: Collisions, end: float, dt: float) -> Matche
 
 
 class ByPair(NamedTuple):
+    """Collisions sorted by pair, for which `key` stands, and then by time in s."""
+
     key: np.ndarray
     t: Array
     i: np.ndarray

@@ -125,6 +125,7 @@ def nearest_velocity(played: Trajectory, truth: Trajectory, jumps: Jumps, dt: fl
 
 @njit(cache=True)
 def nearest(t, played, true, limits, when, change, window):  # type: ignore[no-untyped-def]
+    """(k, n, 2) as in `nearest_velocity`; `window` in s."""
     found = true.copy()
     for i in range(len(limits) - 1):
         first, past, now, last = limits[i], limits[i], limits[i], limits[i]  # as of `windows`

@@ -167,10 +167,12 @@ class Judge:
 
     @cached_property
     def interval(self) -> float:
+        """s between two samples."""
         return float(self.played.t[1] - self.played.t[0])
 
     @cached_property
     def g(self) -> float:
+        """m/s2."""
         return float(np.hypot(*self.scenario.scene.gravity))
 
     @cached_property
