@@ -37,8 +37,6 @@ class LibraryAtVersion(NamedTuple):
 
     @property
     def folder(self) -> Path:
-        """Where it is kept; wheels for each version of Python. Raises `NotInstalled` without a
-        cache."""
         # it imports numpy, which the process of an Exercise.js does not need
         from crosscheck2d.scenarios.truth.cache import folder
 
@@ -50,7 +48,6 @@ class LibraryAtVersion(NamedTuple):
 
     @property
     def recorded(self) -> str:
-        """The hash that was recorded when it was fetched; "" if it was not."""
         try:
             return (self.folder / RECORD).read_text(encoding="utf-8")
         except (OSError, NotInstalled):
@@ -58,7 +55,6 @@ class LibraryAtVersion(NamedTuple):
 
     @property
     def versions(self) -> dict[str, str]:
-        """The version and the hash, as a run records them."""
         return {self.package: self.version, f"{self.package}, SHA-256 of its files": self.recorded}
 
     def checked(self) -> Path:
@@ -88,7 +84,7 @@ class LibraryAtVersion(NamedTuple):
             (files / RECORD).write_text(digest_of(files), encoding="utf-8")
 
     def install_wheel(self, files: Path) -> None:
-        """The wheel alone: what it needs is that of this environment."""
+        # The wheel alone: what it needs is that of this environment.
         wanted = f"{self.package}=={self.version}"
         only = ["--no-deps", "--only-binary", ":all:", "--target", str(files), wanted]
         if uv := shutil.which("uv"):
@@ -110,7 +106,7 @@ class LibraryAtVersion(NamedTuple):
             raise self.not_fetched(reason_in(done.stderr))
 
     def unpack_npm(self, files: Path) -> None:
-        """The package alone: what an old one names as needed may be at an address that is gone."""
+        # The package alone: what an old one names as needed may be at an address that is gone.
         # a cache of its own: without a network npm says of an old one that there is no such version
         command = ["pack", "--cache=cache", f"{self.package}@{self.version}"]
         done = npm_run(command, files.parent)
@@ -123,7 +119,6 @@ class LibraryAtVersion(NamedTuple):
         os.replace(package, files)
 
     def not_fetched(self, reason: str) -> NotInstalled:
-        """The failure, with the reason that the tool gives."""
         return NotInstalled(
             f"{self.package} {self.version} could not be fetched from the"
             f" {'npm registry' if self.npm else 'package index'} ({reason})"

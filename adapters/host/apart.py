@@ -45,8 +45,6 @@ class EngineApart:
         self.calls: list[Call] = []  # they have no result, and are made before the next
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Start the process if there is none; raises `NotLoaded` if the version is not there, or
-        cannot be imported."""
         if self.process is None:
             self.start()
             self.ask(*self.made)
@@ -54,7 +52,6 @@ class EngineApart:
         self.ask("load", scene, dt, self.listening)
 
     def start(self) -> None:
-        """A process with the library, or one that waits."""
         try:
             folder = self.library.checked()
         except NotInstalled as reason:
@@ -71,7 +68,6 @@ class EngineApart:
         )
 
     def ask(self, *call: Any) -> Any:
-        """The result of a call, or what it raised."""
         process, calls = self.process, [*self.calls, call]
         self.process = None  # until there is an answer: one that is interrupted is not used again
         self.calls.clear()
@@ -96,34 +92,27 @@ class EngineApart:
         return result
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Sent with the next step."""
         self.calls.append(("apply_force", disk, force, torque))
 
     def step(self, count: int = 1) -> None:
-        """One exchange with the process."""
         self.wrapping += self.ask("step", count)
 
     def read(self) -> State:
-        """One exchange with the process."""
         state: State = self.ask("read")
         return state
 
     def collisions(self) -> list[ContactImpulse]:
-        """Those of the engine."""
         return list(self.ask("collisions"))
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """Those of the engine."""
         return dict(self.ask("settings"))
 
     def versions(self) -> dict[str, str]:
-        """Those of the engine, with the hash of what was fetched."""
         versions: dict[str, str] = self.ask("versions")
         versions.pop(BOX2D, None)  # of the distribution that is installed
         return versions | self.library.versions
 
     def close(self) -> None:
-        """Let the process wait for its next use."""
         if self.process is not None:
             key = os.getpid(), self.library.folder
             if before := waiting.pop(key, None):
@@ -133,7 +122,6 @@ class EngineApart:
 
 
 def serve(folder: str) -> None:
-    """In the process: answer calls until the other side ends."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # a library may write to it
     system.end_with_parent()

@@ -23,8 +23,7 @@ from crosscheck2d.adapters.safe_path import PACKAGE
 def modules_beside(
     folder: Path, text: str, read: Callable[[Path], str]
 ) -> Iterator[tuple[str, str]]:
-    """File, relative to `folder`, and text of every neighbour that `text` imports directly or
-    indirectly."""
+    """File, relative to `folder`, and text of every neighbour that `text` imports."""
     seen: set[str] = set()
     names = imported_by(text)
     while names:
@@ -49,8 +48,7 @@ USES_REFERENCE = re.compile(
 
 
 def reference_modules(text: str) -> dict[str, str]:
-    """File -> text of the two modules that a changed copy of the exercise's solver imports, by both
-    of their names; none if it imports nothing of reference_impl."""
+    """The two modules that a copy of the exercise's solver imports, by both of their names."""
     if not USES_REFERENCE.search(text):
         return {}
     files = ("__init__.py", "state.py", "compiled.py")
@@ -65,7 +63,7 @@ PARSING = Lock()
 
 
 def module_of(text: str) -> ast.Module | None:
-    """The syntax tree of a text; None if it is not Python, which is reported when it is run."""
+    """None if it is not Python, which is reported when it is run."""
     try:
         with PARSING, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # warnings about the text, meant for its author
@@ -75,8 +73,6 @@ def module_of(text: str) -> ast.Module | None:
 
 
 def imported_by(text: str) -> set[str]:
-    """The top-level names of all modules in the import statements of a text; none if it is not
-    Python."""
     module = module_of(text)
     nodes = list(ast.walk(module)) if module else []
     named = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
@@ -89,7 +85,6 @@ def imported_by(text: str) -> set[str]:
 
 
 def is_library(name: str, folder: Path) -> bool:
-    """Whether a module is found outside `folder`."""
     if name in sys.builtin_module_names or name in sys.stdlib_module_names or name in OURS:
         return True
     spec = PathFinder.find_spec(name, [path for path in sys.path if Path(path).resolve() != folder])
@@ -98,8 +93,6 @@ def is_library(name: str, folder: Path) -> bool:
 
 
 def files_of(folder: Path, name: str) -> Sequence[Path]:
-    """The files of a module in `folder`, all files for a package; none if there is no such
-    module."""
     package, module = folder / name, folder / f"{name}.py"
     try:
         module.lstat()

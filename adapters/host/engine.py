@@ -78,7 +78,6 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
 
 
 def box_of(walls: Array) -> list[list[float]] | None:
-    """Low and high corner of the box that four walls make; None if they make none."""
     low, high = (f(walls, axis=(0, 1), initial=z) for f, z in ((np.min, np.inf), (np.max, -np.inf)))
     corners = [low.tolist(), [high[0], low[1]], high.tolist(), [low[0], high[1]]]
     sides = {frozenset(map(tuple, side)) for side in zip(corners, corners[1:] + corners[:1])}
@@ -108,8 +107,6 @@ class GuestEngine:
 
     @property
     def process(self) -> SolverProcess:
-        """The process, started when first needed; raises `NotLoaded` if the file cannot be
-        loaded."""
         if self.started is None:
             try:
                 self.started = SolverProcess(self.solver, compiled=True)
@@ -122,7 +119,6 @@ class GuestEngine:
         """What has to be known of the file before a scene."""
 
     def load(self, scene: Scene, dt: float) -> None:
-        """Build a new world; raises `Unsupported` if the guest cannot play the scene."""
         assert self.process  # it is started, and known
         self.refuse(scene)
         self.scene, self.forces = scene, np.zeros((scene.n, 3))
@@ -136,20 +132,16 @@ class GuestEngine:
         """Raise `Unsupported` for a scene that the guest cannot play."""
 
     def message(self, scene: Scene, dt: float) -> dict[str, Any]:
-        """The scene as the guest gets it."""
         return scene_message(scene, dt, listening=self.listening)
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """One request to the process; raises `SolverFailed`."""
         return self.process.do(command, argument, limit)
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to the force and torque of the next step; nothing moves a static disk."""
         if not self.scene.static[disk]:
             self.forces[disk] += [*force, torque]
 
     def step(self, count: int = 1) -> None:
-        """One request for all the steps, at once or, if `collected`, with the next `read`."""
         forces = self.forces.tolist() if self.forces.any() else None
         single = forces is not None and count == 1
         last = self.requested[-1] if self.requested else {}
@@ -166,7 +158,6 @@ class GuestEngine:
             self.limit = self.patience
 
     def take(self) -> list[dict[str, Any]]:
-        """Return the steps not yet requested, and mark them as requested."""
         requested, self.requested = self.requested, []
         return requested
 
@@ -178,7 +169,6 @@ class GuestEngine:
         return self.rows
 
     def readings(self, answer: dict[str, Any]) -> Array:
-        """(readings, n, 6) of an answer; the collisions behind them are noted."""
         numbers, shape = answer["numbers"], (answer["readings"], self.scene.n, 6)
         rows, heard = np.split(numbers, [np.prod(shape)])
         self.log += [
@@ -188,7 +178,6 @@ class GuestEngine:
         return rows.reshape(shape)
 
     def read(self) -> State:
-        """All disks in one exchange."""
         rows = self.look()
         return State(*(rows[:, part].copy() for part in (slice(0, 2), slice(2, 4), 4, 5)))
 
@@ -199,11 +188,9 @@ class GuestEngine:
         return [collision for collision in self.log if collision.step < self.steps]
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """As the guest reads them back."""
         return {name: (wanted, value) for name, wanted, value in self.resolved}
 
     def of_file(self) -> dict[str, tuple[Any, Any]]:
-        """The file, and the modules that it imports from its folder."""
         files = ", ".join(file for file, _ in self.solver.imported)
         which = {"file": (str(self.path), f"sha256 {self.solver.digest}")}
         if not files:
@@ -211,11 +198,9 @@ class GuestEngine:
         return which | {"from beside it": (None, f"{files}; sha256 of all {self.solver.source}")}
 
     def versions(self) -> dict[str, str]:
-        """The versions of the language's engine, and of a package."""
         return self.process.versions
 
     def close(self) -> None:
-        """End the process."""
         if self.started is not None:
             self.started.close()
             self.started = None
@@ -254,7 +239,6 @@ class PackageEngine(GuestEngine):
 
     @property
     def process(self) -> SolverProcess:
-        """The process, with the package's text; raises `NotLoaded` if it is not installed."""
         if self.started is None:
             name, library = self.package, self.library
             try:
@@ -266,22 +250,18 @@ class PackageEngine(GuestEngine):
         return super().process
 
     def learn(self, process: SolverProcess) -> None:
-        """Its disks turn."""
         process.do("turns", True)
 
     def refuse(self, scene: Scene) -> None:
-        """A number of the scene overflows in float32, where the engine computes in it."""
         if self.float32:
             must_fit(scene)
         self.expected, self.thrown = (0, 0), None
         self.ahead = deque[Array]()
 
     def message(self, scene: Scene, dt: float) -> dict[str, Any]:
-        """The scene, the profile and its changes."""
         return super().message(scene, dt) | {"profile": self.profile, "changed": self.changed}
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer of the process; raises `Unsupported` where the engine's file refuses."""
         try:
             answer = super().do(command, argument, limit)
         except SolverFailed as failure:
@@ -298,11 +278,6 @@ class PackageEngine(GuestEngine):
         self.expected, self.thrusts = (count, times), sorted(acting, key=lambda row: row.step)
 
     def step(self, count: int = 1) -> None:
-        """One exchange with the process for all the steps, or none if they have been played ahead.
-
-        Raises:
-            ValueError: other steps were expected, and have been played.
-        """
         if self.expected[1] and self.expected[0] == count and not self.forces.any():
             self.steps += count
             self.rows = self.next_expected()
@@ -313,7 +288,6 @@ class PackageEngine(GuestEngine):
         super().step(count)
 
     def next_expected(self) -> Array:
-        """The reading after the steps that come next, which are played now or have been."""
         count, times = self.expected
         if not self.ahead and self.thrown is None:
             argument = {"count": count, "times": times, "thrusts": self.thrusts}
@@ -328,7 +302,6 @@ class PackageEngine(GuestEngine):
         return self.ahead.popleft()
 
     def read(self) -> State:
-        """All disks in one exchange; static disks stay as the scene states them."""
         state, scene = super().read(), self.scene
         still = scene.static
         return State(
@@ -339,7 +312,6 @@ class PackageEngine(GuestEngine):
         )
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """As the engine's file reads them back."""
         rows = super().settings()
         if self.float32:
             rows["float32 rounding of the start in m"] = (None, rounding(self.scene))
@@ -347,7 +319,6 @@ class PackageEngine(GuestEngine):
 
 
 def refused(failure: SolverFailed) -> Exception:
-    """What a failure of an engine is: `Unsupported` if it refuses the scene."""
     return Unsupported(failure.what) if failure.kind == "refused" else failure
 
 
@@ -360,26 +331,21 @@ class OwnEngine(GuestEngine):
     """
 
     def learn(self, process: SolverProcess) -> None:
-        """What it models; it lacks no function."""
         if missing := [name for name in ENGINE if not process.functions[name]]:
             raise SolverFailed("error", f"has no function {' and no '.join(missing)}; {HOW}")
         self.models = features_of(process.functions["models"])
         process.do("turns", "rotation" in self.models)
 
     def refuse(self, scene: Scene) -> None:
-        """What the scene has, and the file does not model."""
         must_model(scene, self.models, self.path.name)
 
     def apply_force(self, disk: int, force: Array, torque: float) -> None:
-        """Add to the forces of the next step; raises `Unsupported` if the file does not model
-        forces."""
         needed = ["forces", "rotation"] if torque else ["forces"]
         if missing := [word for word in needed if word not in self.models]:
             raise Unsupported(refusal(self.path.name, missing))
         super().apply_force(disk, force, torque)
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer of the process; a failure names the file and the function."""
         try:
             return super().do(command, argument, limit)
         except SolverFailed as failure:
@@ -394,7 +360,6 @@ class OwnEngine(GuestEngine):
             raise
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The settings that the file decides."""
         return {
             "models": (None, ", ".join(self.models)),
             "restitution": (None, "the scene's"),
@@ -418,7 +383,6 @@ class OwnSolver(GuestEngine):
     load_limit = STEP_LIMIT
 
     def learn(self, process: SolverProcess) -> None:
-        """Its restitution, where it is a constant in the file."""
         self.whole = process.surface == "advance"
         if not self.whole:
             make_globals(process)
@@ -427,7 +391,6 @@ class OwnSolver(GuestEngine):
                 self.own_restitution = self.restitution.own
 
     def refuse(self, scene: Scene) -> None:
-        """A missing function, friction, walls, disks that cannot move, another restitution."""
         must_be_frictionless(scene, self.path.name)
         if self.whole:
             return
@@ -446,15 +409,14 @@ class OwnSolver(GuestEngine):
             )
 
     def settings(self) -> dict[str, tuple[Any, Any]]:
-        """The settings that the file decides."""
         own = "the scene's" if self.whole else str(self.restitution)
         order = "the file's own advance" if self.whole else "integrate all, every pair i < j, wrap"
         return {"restitution": (None, own), "order of a step": (None, order), **self.of_file()}
 
 
 def make_globals(process: SolverProcess) -> None:
-    """Let the file make its own scene, as the exercise's page does before the first step, because
-    its functions may use `ufo` or `asteroids`."""
+    # Let the file make its own scene, as the exercise's page does before the first step, because
+    # its functions may use `ufo` or `asteroids`.
     if process.functions["begin"]:
         with suppress(SolverFailed):  # a function that needs them fails with its own message
             process.do("begin", None, BEGIN_LIMIT)
@@ -482,7 +444,6 @@ def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = Fals
 
 
 def packages_named(solver: SolverText) -> Iterable[str]:
-    """The modules that the import statements of a Python file, and of those beside it, name."""
     if solver.kind != "python":
         return set()
     texts = [solver.text, *(text for _, text in solver.imported)]

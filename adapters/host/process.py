@@ -44,8 +44,6 @@ Request = tuple[str, Any, float]
 
 
 class Idle(NamedTuple):
-    """A process that has finished, its output, and whether its guest is a package's."""
-
     process: subprocess.Popen[bytes]
     pieces: system.Pieces
     level: Level
@@ -67,7 +65,6 @@ def keep_processes() -> None:
 
 @contextmanager
 def processes_reused() -> Iterator[None]:
-    """Context in which processes are reused, as by `keep_processes`."""
     global _reusing
     keep_processes()
     try:
@@ -80,7 +77,6 @@ def processes_reused() -> Iterator[None]:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and all it has started."""
     if process.returncode is None:  # nobody else has its number before its status is read
         system.end_all(process.pid)
     process.wait()
@@ -133,8 +129,6 @@ class SolverProcess:
             self.versions["mini-racer"] = version("mini-racer")
 
     def connect(self) -> Any:
-        """Start a process, or reuse a waiting one, and send it the guest; returns its first answer.
-        The process itself stops a file that does not load in time."""
         try:
             if not self.reuse():
                 self.begin()
@@ -147,7 +141,6 @@ class SolverProcess:
         raise self.intruded()
 
     def reuse(self) -> bool:
-        """Whether a waiting process has the same texts, and is this one's now."""
         idle = waiting.pop(self.key, None)
         if idle is None or idle.process.poll() is not None:
             return False
@@ -155,8 +148,6 @@ class SolverProcess:
         return True
 
     def begin(self) -> None:
-        """Start the process, at the best level that works, and wait for its first line; raises
-        `NotStarted`."""
         reason = ""
         trusted = self.solver.package is not None  # its hash is that of what was read
         for level in [Level.NONE] if trusted else levels_here():
@@ -175,7 +166,6 @@ class SolverProcess:
         raise NotStarted(f"the process for a solver's file could not be started: {reason}")
 
     def launch(self, level: Level) -> None:
-        """Start the process at a level."""
         jit = self.copies is not None
         packages = self.solver.packages + (("numba",) if self.solver.reference else ())
         how = start(level, self.kind, packages, self.copies, jit)
@@ -223,7 +213,6 @@ class SolverProcess:
         return results
 
     def do(self, command: str, argument: Any = None, limit: float = 5.0) -> Any:
-        """One request; raises `SolverFailed` if it failed."""
         (answer,) = self.request([(command, argument, limit)])
         if isinstance(answer, SolverFailed):
             raise answer
@@ -246,7 +235,6 @@ class SolverProcess:
         return answer
 
     def receive(self, limit: float) -> Any:
-        """Read one line from the process, within `limit` s."""
         assert self.process is not None
         received, deadline = bytearray(), monotonic() + limit
         while b"\n" not in received[-system.PIECE :]:
@@ -271,19 +259,16 @@ class SolverProcess:
             raise self.intruded() from None
 
     def intruded(self) -> SolverFailed:
-        """The failure of a process that answers what it was not asked; it is ended."""
         self.end()
         return SolverFailed("crashed", INTRUDED)
 
     def end_if_too_large(self) -> None:
-        """End a process that takes more memory than it is given; raises `SolverFailed`."""
         assert self.process is not None
         if system.holds_more(self.process.pid, MEMORY):
             self.end()
             raise SolverFailed("memory", TOO_LARGE)
 
     def lost(self) -> SolverFailed:
-        """The failure of a process that has ended."""
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
         if self.level == Level.BUBBLEWRAP and code > 128:  # as a shell says it
@@ -304,7 +289,6 @@ class SolverProcess:
         return SolverFailed("crashed", f"ended its own process ({name})")
 
     def close(self) -> None:
-        """End the process, or let it wait for its next use."""
         keeps = _reusing or self.solver.package is not None
         free = keeps and self.sound and self.key not in waiting
         if free and self.process is not None and self.process.poll() is None:
@@ -318,7 +302,6 @@ class SolverProcess:
         self.end()
 
     def end(self) -> None:
-        """End the process and all it has started."""
         if self.process is not None:
             end(self.process)
             self.process = None
@@ -333,7 +316,6 @@ def clock_endings() -> int:
 
 
 def ended_by_clock(what: str, line: int = 0, column: int = 0) -> SolverFailed:
-    """The failure of such a call."""
     global _late
     _late += 1
     return SolverFailed("timeout", what, line, column)
@@ -343,7 +325,6 @@ _working: dict[tuple[Level, ...], Level] = {}
 
 
 def levels_here() -> Sequence[Level]:
-    """The levels to try, the best first; after the first start the one that works."""
     possible = levels()
     return [_working[possible]] if possible in _working else possible
 
@@ -358,23 +339,19 @@ def protection() -> Level:
 
 
 def check(fits: bool) -> None:
-    """Raise `TypeError` for an answer that has another form."""
     if not fits:
         raise TypeError("an answer has another form")
 
 
 def is_number(x: Any) -> bool:
-    """A float, or an integer that is not longer than one."""
     return type(x) is float or (type(x) is int and abs(x) < 2**1000)
 
 
 def is_words(x: Any) -> bool:
-    """A list of texts."""
     return isinstance(x, list) and all(isinstance(word, str) for word in x)
 
 
 def rows(value: Any, width: int) -> list[list[float]]:
-    """Rows of `width` numbers."""
     check(isinstance(value, list))
     for row in value:
         check(isinstance(row, list) and len(row) == width and all(map(is_number, row)))
@@ -382,7 +359,6 @@ def rows(value: Any, width: int) -> list[list[float]]:
 
 
 def failure_in(failed: Any) -> SolverFailed:
-    """The failure that a guest reports."""
     check(isinstance(failed, dict) and failed.get("kind") in KINDS_OF_FAILURE)
     place = [failed.get("line"), failed.get("column")]
     check(isinstance(failed.get("what"), str) and all(type(k) is int for k in place))
@@ -394,7 +370,6 @@ def failure_in(failed: Any) -> SolverFailed:
 
 
 def is_hello(answer: Any) -> bool:
-    """Whether an answer describes a loaded file."""
     functions, versions = answer.get("functions"), answer.get("versions")
     if not isinstance(functions, dict) or not isinstance(versions, dict):
         return False
@@ -406,7 +381,6 @@ def is_hello(answer: Any) -> bool:
 
 
 def answer_to_question(done: Any) -> dict[str, Any]:
-    """The answer to `ask`."""
     check(isinstance(done, dict) and isinstance(done["states"], list))
     check(isinstance(done["returned"], bool) and isinstance(done["strayed"], bool))
     check(is_words(done["strange"]) and is_words(done["kept"]) and isinstance(done["calls"], list))
@@ -422,7 +396,6 @@ def answer_to_question(done: Any) -> dict[str, Any]:
 
 
 def readings(done: Any) -> dict[str, Any]:
-    """Readings and collisions as one array of float64, and what was thrown after them."""
     check(isinstance(done, dict) and type(done["readings"]) is int and done["readings"] >= 0)
     check(is_number(done["seconds"]))
     try:
@@ -439,7 +412,6 @@ def readings(done: Any) -> dict[str, Any]:
 
 
 def accesses(done: Any) -> list[Any]:
-    """The reads and writes of a traced call."""
     check(isinstance(done, list))
     for access in done:
         kind, sphere, field, lines = access
@@ -449,7 +421,6 @@ def accesses(done: Any) -> list[Any]:
 
 
 def settings(done: Any) -> list[Any]:
-    """The settings of an engine: name, value that was asked for, value that it has."""
     check(isinstance(done, list))
     for setting in done:
         name, *values = setting
@@ -472,13 +443,11 @@ FORMS: dict[str, Callable[[Any], Any]] = {
 
 
 def result_of(command: str, answer: Any) -> Any:
-    """The value of an answer, or its failure; raises `TypeError` or `KeyError` for a wrong form."""
     check(isinstance(answer, dict))
     return failure_in(answer["failed"]) if "failed" in answer else FORMS[command](answer["done"])
 
 
 def calls_of(request: Request) -> list[str]:
-    """The names of the functions that a request calls."""
     command, argument, _ = request
     return [call[0] for call in argument["calls"]] if command == "ask" else [command]
 

@@ -55,7 +55,6 @@ class OwnRestitution:
         return fitting or self.own is None
 
     def __str__(self) -> str:
-        """The text in a table of settings."""
         has = (
             f"its collisions have {self.measured:.6g}"
             if self.measured == self.measured
@@ -68,17 +67,14 @@ class OwnRestitution:
 
 
 def restitution_of(solver: SolverText, process: SolverProcess) -> OwnRestitution:
-    """The stated and the measured restitution of a file."""
     return own_restitution(own_text(solver), probed(process))
 
 
 def own_text(solver: SolverText) -> str:
-    """All text that its author wrote."""
     return "\n".join([solver.text, *(module for file, module in solver.imported if is_own(file))])
 
 
 def own_restitution(text: str, measured: float) -> OwnRestitution:
-    """The restitution from a text, with the measured one, `measured`."""
     occurs = any(
         same(number, measured) or same(number, 1 + measured) for number in numbers_in(text)
     )
@@ -86,20 +82,16 @@ def own_restitution(text: str, measured: float) -> OwnRestitution:
 
 
 def is_own(file: str) -> bool:
-    """Whether a file beside a solver is its author's; the only other one is gl-matrix."""
     return file.endswith(".py")
 
 
 def stated(text: str) -> list[float]:
-    """The numbers from 0 to 1 assigned to a name such as e or restitution; then 0.9 if that or 1.9
-    occurs."""
     numbers = numbers_in(text)
     named = [e for e in named_in(text) if 0 <= e <= 1]
     return named + [EXERCISE] * (EXERCISE in numbers or 1 + EXERCISE in numbers)
 
 
 def named_in(text: str) -> list[float]:
-    """The numbers assigned to a name such as e or restitution."""
     return [float(number) for number in NAMED.findall(code_of(text))]
 
 
@@ -112,7 +104,6 @@ def with_restitution(text: str, old: float, new: float) -> str:
 
 
 def numbers_in(text: str) -> list[float]:
-    """All numbers of the code."""
     return [float(number) for number in NUMBER.findall(code_of(text))]
 
 
@@ -141,11 +132,8 @@ def probed(process: SolverProcess) -> float:
 
 
 def separation(closing: float, a: float, b: float) -> float:
-    """Separation over approach speed of two spheres that now move at `a` and `b` m/s along x;
-    `closing`: their approach speed."""
     return float(b - a) / closing
 
 
 def same(one: float, other: float) -> bool:
-    """Whether two restitutions agree; NaN agrees with nothing."""
     return abs(one - other) <= SAME

@@ -51,8 +51,6 @@ ALLOWED = {
 
 
 class Start(NamedTuple):
-    """A command line, its environment, and the level that it shall have."""
-
     level: Level
     command: list[str]
     environment: dict[str, str]
@@ -71,15 +69,14 @@ def levels() -> tuple[Level, ...]:
 
 
 def readable_by_others(file: str) -> bool:
-    """Whether any user may read a file: after it has become another user, a guest still imports
-    modules of Python."""
+    # Whether any user may read a file: after it has become another user, a guest still imports
+    # modules of Python.
     path = Path(os.path.realpath(file))
     return all(above.stat().st_mode & 0o005 for above in (path, *path.parents))
 
 
 @cache
 def bubblewrap() -> str | None:
-    """The program of the system, else that of the wheel."""
     if found := which("bwrap"):
         return found
     try:
@@ -94,7 +91,6 @@ def bubblewrap() -> str | None:
 
 @cache
 def secret() -> str:
-    """A file in a folder that only this user can enter; a guest tries to read it."""
     global _folder
     _folder = tempfile.TemporaryDirectory(prefix="crosscheck-")
     file = Path(_folder.name) / "secret"
@@ -142,7 +138,6 @@ def start(
 def walls(
     program: str, files: dict[str, str], copies: Path | None, environment: dict[str, str]
 ) -> list[str]:
-    """The command line of bubblewrap: an empty world with Python, the packages and the driver."""
     command = [str(bubblewrap()), "--unshare-all", "--unshare-user", "--disable-userns"]
     command += ["--die-with-parent", "--new-session", "--clearenv", "--cap-drop", "ALL"]
     libraries = [
@@ -172,13 +167,11 @@ def walls(
 
 
 def within(file: str) -> str:
-    """The place of a package's file below the folder of packages."""
     path = Path(file)
     return f"{path.parent.name}/{path.name}" if path.name == "__init__.py" else path.name
 
 
 def parts_of(files: dict[str, str]) -> Iterator[str]:
-    """The folders and files of packages, with the libraries that their wheels bring beside them."""
     for file in files.values():
         path = Path(file)
         package = path.parent if path.name == "__init__.py" else path
@@ -204,7 +197,6 @@ def files_of(names: tuple[str, ...]) -> dict[str, str]:
 
 
 def needs_of(module: str) -> Iterable[str]:
-    """The modules of the distributions that the distribution of a module needs."""
     if module in (
         "numpy",
         "py_mini_racer",
@@ -223,7 +215,6 @@ def needs_of(module: str) -> Iterable[str]:
 
 @cache
 def modules_of_distributions() -> dict[str, list[str]]:
-    """Distribution -> its modules."""
     table: dict[str, list[str]] = {}
     for module, names in metadata.packages_distributions().items():
         for name in names:

@@ -53,7 +53,6 @@ def holder_of(solver: SolverText) -> str | None:
 
 
 def must_be_either(solver: SolverText) -> None:
-    """Raise `NotASolver` for a file that defines names, but no function of either kind."""
     names = defined_in(solver.text, solver.kind)
     known = (*ENGINE, *EXERCISE, *SHARED)
     if names and not any(re.search(rf"\b{name}\b", solver.text) for name in known):
@@ -78,7 +77,6 @@ def defined_in(text: str, kind: str) -> set[str]:
 
 
 def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
-    """The names that statements of a module bind, also those within an `if` or a `try`."""
     for node in body:
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
             yield node.name
@@ -95,6 +93,5 @@ def names_of(body: Iterable[ast.stmt]) -> Iterator[str]:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names as "one, two and three"."""
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last

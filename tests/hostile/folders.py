@@ -56,12 +56,10 @@ Prepare = Callable[[Path], object]
 
 
 def link(to: str, here: Path) -> None:
-    """`out` leads there."""
     (here / "out").symlink_to(to)
 
 
 def bound(here: Path) -> None:
-    """A socket of the file system."""
     with contextlib.chdir(here), socket.socket(socket.AF_UNIX) as one:  # whose path may not be long
         one.bind("out")
 
@@ -100,25 +98,21 @@ NO_PLACE = tuple(
 
 
 def note(name: str, here: Path) -> None:
-    """The user has put something there."""
     path = here / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("years of work")
 
 
 def moved(name: str, to: str, here: Path) -> None:
-    """What is there is elsewhere now."""
     (here / name).rename(here / to)
 
 
 def moved_and_linked(name: str, here: Path) -> None:
-    """As people do when a disk is full."""
     moved(name, "elsewhere", here)
     (here / name).symlink_to(here / "elsewhere")
 
 
 def held(here: Path) -> None:
-    """Another process writes there, until this one has been played."""
     HELD.append(file := (here / "out" / ".crosscheck.lock").open("ab"))
     fcntl.flock(file, fcntl.LOCK_EX)
 
@@ -127,13 +121,11 @@ HELD: list[object] = []
 
 
 def damaged(here: Path) -> None:
-    """The file of the rows is torn."""
     path = here / "out" / "results.sqlite"
     path.write_bytes(path.read_bytes()[:20_000])
 
 
 def edited(here: Path) -> None:
-    """Every row is another."""
     file = sqlite3.connect(here / "out" / "results.sqlite")
     file.execute("update results set value = '{}' where kind = 'cell'")
     file.commit()

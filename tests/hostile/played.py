@@ -90,15 +90,12 @@ class Input(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What became of an input: one of `GOOD` or `BAD`, the exit code, and what was printed."""
-
     word: str
     code: int | None
     printed: str
 
 
 def outcome_of(tried: Input, folder: Path) -> Outcome:
-    """Play an input in an empty folder."""
     user = folder / "here"
     user.mkdir(parents=True)
     for name, content in tried.files.items():
@@ -143,7 +140,6 @@ def word_of(
     stray: bool,
     left: bool,
 ) -> str:
-    """The outcome, the worst first."""
     both = stdout + stderr
     if code is None:
         return HANG
@@ -158,8 +154,7 @@ def word_of(
 
 
 def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
-    """What is in the user's folder, but for what may be written: path -> what shows whether it has
-    changed."""
+    """What is in the user's folder, but for what may be written: path -> its content's hash."""
     found = {}
     for path in sorted(user.rglob("*")):
         name = str(path.relative_to(user))
@@ -176,10 +171,6 @@ def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
 
 
 def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
-    """Play it; its exit code, None where it had to be killed, and what was heard of its server.
-
-    What is printed goes into files beside `user`.
-    """
     if tried.environment or tried.shell:
         line = ["sh", "-c", tried.shell] if tried.shell else [CROSSCHECK, *tried.words]
         env = os.environ | {"crosscheck": str(CROSSCHECK)} | WIDE | dict(tried.environment)
@@ -207,7 +198,6 @@ def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
 
 
 def code_of(process: BaseProcess) -> int | None:
-    """Wait for it; None where it had to be killed, with all that it had started."""
     process.join(SECONDS)
     if process.exitcode is None:
         assert process.pid is not None
@@ -218,7 +208,6 @@ def code_of(process: BaseProcess) -> int | None:
 
 
 def left_behind(user: Path) -> bool:
-    """Whether a process still works in the user's folder after `GRACE` s; it is killed."""
     end = time.monotonic() + GRACE
     while (found := working_in(user)) and time.monotonic() < end:
         time.sleep(0.05)
@@ -228,7 +217,6 @@ def left_behind(user: Path) -> bool:
 
 
 def working_in(user: Path) -> list[int]:
-    """The processes whose current folder is the user's, or in it."""
     found = []
     for entry in Path("/proc").iterdir():
         try:

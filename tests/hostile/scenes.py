@@ -149,7 +149,6 @@ SHAPES: dict[str, tuple[str, str, str]] = {
 
 
 def turned(number: int, name: str, old: str, new: str, says: str) -> Input:
-    """A good scene in which one thing is another, put to the next command."""
     assert old in TWO, name
     return Input(
         name, COMMANDS[number % len(COMMANDS)], {FILE: TWO.replace(old, new, 1)}, says=says
@@ -189,22 +188,18 @@ AS_THEY_ARE = [
 
 
 def linked(to: str, here: Path) -> None:
-    """The scene file is a link."""
     (here / FILE).symlink_to(to)
 
 
 def device(path: str, here: Path) -> None:
-    """The scene file is a link to a device, which has no end."""
     (here / FILE).symlink_to(path)
 
 
 def fifo(here: Path) -> None:
-    """Nobody ever writes into it."""
     os.mkfifo(here / FILE)
 
 
 def folder(here: Path) -> None:
-    """With a scene's name."""
     (here / FILE).mkdir()
 
 

@@ -21,7 +21,6 @@ FRAME = json.dumps({"do": "frames", "count": 1})
 
 
 def message(**fields: object) -> str:
-    """JSON."""
     return json.dumps(fields)
 
 
@@ -118,7 +117,6 @@ TABS: dict[str, tuple[Talk, str]] = {
 
 
 def busy(_: Path) -> dict[str, str]:
-    """A port that somebody has, for as long as this process lives."""
     TAKEN.append(one := socket.socket())
     one.bind(("127.0.0.1", 0))
     one.listen()

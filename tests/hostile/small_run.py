@@ -39,7 +39,6 @@ def finished_run() -> Path:
 
 
 def copy(here: Path, *names: str) -> dict[str, str]:
-    """Set copies of the run into a folder, as if it had been made there, with its scene file."""
     for name in names:
         shutil.copytree(finished_run(), here / name)
     (here / "two.toml").write_text(TWO)
@@ -47,7 +46,6 @@ def copy(here: Path, *names: str) -> dict[str, str]:
 
 
 def copied(*names: str, then: Callable[[Path], object] | None = None) -> Prepare:
-    """What `copy` does, and then something more with the folder in which the copies are."""
     return partial(_copied, names, then)
 
 

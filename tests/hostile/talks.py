@@ -22,7 +22,6 @@ NOT_ANY_MORE = "it does not serve any more"
 
 
 def free_port() -> int:
-    """One that nobody has."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])
@@ -51,7 +50,7 @@ def hear(talk: Talk, server: BaseProcess, stdout: Path) -> str:
 
 
 def asked(port: int, method: str, path: str, body: bytes = b"", **headers: str) -> str:
-    """Status and text of the answer to a request; in the names of headers a `_` stands for `-`."""
+    """Status and text; in the names of headers a `_` stands for `-`."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWERS)
     try:
         connection.request(
@@ -67,7 +66,6 @@ def asked(port: int, method: str, path: str, body: bytes = b"", **headers: str) 
 
 
 def asks(method: str, path: str, body: bytes = b"", **headers: str) -> Talk:
-    """One request."""
     return partial(_asks, method, path, body, headers)
 
 
@@ -102,8 +100,6 @@ def says(
     origin: str = "http://localhost:PORT",
     wait: bool = True,
 ) -> Talk:
-    """A tab of the game that sends these after its first answer; what it hears, and how it is
-    closed."""
     return partial(_says, messages, path, origin, wait)
 
 

@@ -62,15 +62,13 @@ ENGINE = ("create", "step", "read", "collisions", "settings")
 
 
 class Failed(Exception):
-    """kind, what and the place in the guest's file, from 1; 0 if it is not known."""
-
     def __init__(self, kind: str, what: str, line: int = 0, column: int = 0) -> None:
         self.kind, self.what, self.line, self.column = kind, what[:LONGEST], line, column
 
 
 def stopped(limit: float, spent: float, when: str) -> Failed:
-    """A call that did not return: "waited" if the clock has ended it before it had half of its
-    processor time, `spent` s, as it does on a busy machine."""
+    # A call that did not return: "waited" if the clock has ended it before it had half of its
+    # processor time, `spent` s, as it does on a busy machine.
     kind = "waited" if spent < limit / 2 else "timeout"
     return Failed(kind, f"does not come back within {limit:g} s {when}")
 
@@ -79,13 +77,12 @@ def stopped(limit: float, spent: float, when: str) -> Failed:
 
 
 class Packages:
-    """Finds the named packages by their paths, so that no folder of packages is on the path."""
+    # Finds the named packages by their paths, so that no folder of packages is on the path.
 
     def __init__(self, files: dict[str, str]) -> None:
         self.files = files
 
     def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
-        """Called through `sys.meta_path`."""
         file = self.files.get(name)
         if file is None:
             return None
@@ -93,13 +90,12 @@ class Packages:
 
 
 class Neighbours(Loader):
-    """Finds the modules beside the guest's file, whose texts the parent has sent."""
+    # Finds the modules beside the guest's file, whose texts the parent has sent.
 
     def __init__(self, texts: dict[str, str], folder: str) -> None:
         self.texts, self.folder = texts, folder
 
     def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> ModuleSpec | None:
-        """As Python finds it in a folder: a package, a module, or a namespace package."""
         place = name.replace(".", "/")
         for file, package in ((f"{place}/__init__.py", True), (f"{place}.py", False)):
             if file in self.texts:
@@ -108,7 +104,6 @@ class Neighbours(Loader):
         return ModuleSpec(name, None, is_package=True) if inside else None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the text of a module."""
         assert module.__spec__ is not None
         file = str(module.__spec__.origin)
         module.__file__ = os.path.join(self.folder, file)
@@ -120,8 +115,8 @@ class Neighbours(Loader):
 
 
 class Fields:
-    """Named values that can be reached as attributes or as items: `sphere.position.x`,
-    `sphere["position"]["x"]`."""
+    # Named values that can be reached as attributes or as items: `sphere.position.x`,
+    # `sphere["position"]["x"]`.
 
     torque: float
 
@@ -139,7 +134,7 @@ class Fields:
 
 
 class Traced(Fields):
-    """The same, reporting every access to a number as ("r" or "w", the sphere's field)."""
+    # The same, reporting every access to a number as ("r" or "w", the sphere's field).
 
     def __init__(
         self, access: Callable[[str, str], None], values: dict[str, Any], within: str = ""
@@ -163,7 +158,6 @@ class Traced(Fields):
 
 
 def sphere_of(r: Sequence[float]) -> Fields:
-    """A sphere with the exercise's fields from its 12 numbers."""
     names = ("alpha", "angularVelocity", "torque", "mass", "MoI", "size")
     return Fields(
         position=Fields(x=r[0], y=r[1]),
@@ -177,7 +171,7 @@ NAMES = frozenset(vars(sphere_of([0.0] * 12)))
 
 
 def row_of(s: Any) -> list[float]:
-    """The 12 numbers of a sphere; NaN for a field that is not a number."""
+    # The 12 numbers of a sphere; NaN for a field that is not a number.
     try:
         vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
     except AttributeError:
@@ -190,7 +184,6 @@ def row_of(s: Any) -> list[float]:
 
 
 def number(x: Any) -> float:
-    """`x` as a float; NaN if it is not a number."""
     try:
         return float(x)
     except (TypeError, ValueError):
@@ -198,12 +191,10 @@ def number(x: Any) -> float:
 
 
 def motion(s: Any) -> tuple[float, float, float, float]:
-    """Position and velocity of a sphere."""
     return s.position.x, s.position.y, s.velocity.x, s.velocity.y
 
 
 def seed() -> None:
-    """Seed the random numbers, the same for every question and scene."""
     random.seed(1)
     if "numpy" in sys.modules:
         sys.modules["numpy"].random.seed(1)
@@ -213,7 +204,7 @@ def seed() -> None:
 
 
 class ExerciseWorld:
-    """A scene by the exercise's functions: integrate all, collide every pair i < j, wrap."""
+    # A scene by the exercise's functions: integrate all, collide every pair i < j, wrap.
 
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
         self.file, self.scene = guest.file, scene
@@ -226,7 +217,6 @@ class ExerciseWorld:
         ]
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held."""
         gx, gy = self.scene["gravity"]
         for k in range(count):
             for i, s in enumerate(self.spheres):
@@ -243,7 +233,6 @@ class ExerciseWorld:
             self.steps += 1
 
     def collide(self, i: int, j: int) -> None:
-        """Collide a pair, and record it if it overlapped or anything changed."""
         a, b = self.spheres[i], self.spheres[j]
         was_a, was_b = self.motions[i], self.motions[j]
         self.file["collide"](a, b)
@@ -261,18 +250,16 @@ class ExerciseWorld:
 
     @staticmethod
     def wrap(p: Any, low: Sequence[float], high: Sequence[float]) -> None:
-        """As projectObjects: beyond an edge of the box, onto the opposite one."""
         p.x = high[0] if p.x < low[0] else low[0] if p.x > high[0] else p.x
         p.y = high[1] if p.y < low[1] else low[1] if p.y > high[1] else p.y
 
     def read(self) -> array.array[float]:
-        """x, y, u, v, angle and spin of all spheres."""
         rows = (row_of(s) for s in self.spheres)
         return array.array("d", [x for r in rows for x in (*r[:4], r[6], r[7])])
 
 
 class GuestDisks(NamedTuple):
-    """What `advance` of a file like those of reference_impl works on; see its state.py."""
+    # What `advance` of a file like those of reference_impl works on; see its state.py.
 
     position: Any
     velocity: Any
@@ -287,8 +274,6 @@ class GuestDisks(NamedTuple):
 
 
 class GuestWorld(NamedTuple):
-    """What all disks share; see state.py of reference_impl."""
-
     restitution: float
     gravity: Any
     walls: Any
@@ -300,7 +285,6 @@ class GuestWorld(NamedTuple):
 
 
 def make_disks(np: Any, *columns: Any) -> GuestDisks:
-    """Disks without force: position, velocity, radius, mass, inertia, angle, angular velocity."""
     x, v, radius, mass, inertia, angle, spin = (np.array(c, float, order="C") for c in columns)
     zero = np.zeros(len(radius))
     return GuestDisks(
@@ -309,7 +293,7 @@ def make_disks(np: Any, *columns: Any) -> GuestDisks:
 
 
 class ArraysWorld:
-    """A scene by `advance(disks, world, dt, count)` on arrays, as in reference_impl."""
+    # A scene by `advance(disks, world, dt, count)` on arrays, as in reference_impl.
 
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
         self.np = np = import_module("numpy")
@@ -326,7 +310,6 @@ class ArraysWorld:
         self.advance(self.disks, self.world, self.dt, 0)  # compiles, if it is compiled
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held."""
         for times in [1, count - 1] if forces and not held else [count]:
             if forces:
                 self.disks.force[:] = [force[:2] for force in forces]
@@ -338,7 +321,6 @@ class ArraysWorld:
             self.steps, forces = self.steps + times, None
 
     def read(self) -> array.array[float]:
-        """x, y, u, v, angle and spin of all disks."""
         d = self.disks
         rows = self.np.column_stack([d.position, d.velocity, d.angle, d.angular_velocity])
         return array.array("d", rows.ravel().tolist())
@@ -375,7 +357,6 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
         return [module.ufo, *module.asteroids]
 
     def begin() -> None:
-        """A ufo and 20 asteroids in a grid, as the exercise's file has them."""
         places = [(-4.0 + 2.0 * (k % 5), -2.2 + 1.2 * (k // 5)) for k in range(20)]
         parked = [sphere_of([x, y, *[0.0] * 7, 1.0, 1.0, 0.1]) for x, y in places]
         ufo = sphere_of([-3.5, 0.0, *[0.0] * 7, 1.0, 1.0, 0.3])
@@ -391,8 +372,6 @@ def as_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
 
 
 class EngineWorld:
-    """A scene by the functions of an engine: create, step, read, perhaps collisions."""
-
     def __init__(self, guest: PythonGuest, scene: dict[str, Any]) -> None:
         self.guest, self.n, self.walls = guest, scene["n"], len(scene["walls"])
         self.dt, self.angle = scene["dt"], list(scene["angle"])
@@ -405,14 +384,11 @@ class EngineWorld:
             raise Failed("refused", self.world or "create returned an empty text")
 
     def call(self, name: str, *arguments: Any) -> Any:
-        """Call a function of the file and return its result."""
         self.guest.inside = name
         function, most = self.guest.file[name], self.guest.takes[name]
         return function(*arguments[:most])
 
     def step(self, count: int, forces: Any, held: bool) -> None:
-        """Forces act in the first step, or in all if held; a step may return a new world, which is
-        what `read` can read."""
         for k in range(count):
             acting = forces if forces and (held or k == 0) else None
             result = self.call(
@@ -427,7 +403,7 @@ class EngineWorld:
             self.steps += 1
 
     def is_world(self, result: Any) -> bool:
-        """Whether `read` can read it; if not, the step has to have moved the disks."""
+        # Whether `read` can read it; if not, the step has to have moved the disks.
         try:
             self.rows_of(result)
             return True
@@ -445,7 +421,6 @@ class EngineWorld:
         return False
 
     def hear(self) -> None:
-        """Record the collisions of this step."""
         rows = self.call("collisions", self.world)
         if not hasattr(rows, "__len__") or isinstance(rows, (str, dict)):
             raise wrong("collisions", rows, COLLISION)
@@ -460,13 +435,11 @@ class EngineWorld:
             self.log.extend((self.steps, i, j, impulse))
 
     def read(self) -> array.array[float]:
-        """x, y, u, v, angle and spin of all disks."""
         rows = self.rows_of(self.world)
         self.first = self.first or rows
         return array.array("d", [x for disk in rows for x in disk])
 
     def rows_of(self, world: Any) -> list[list[float]]:
-        """The same, a row for each disk."""
         state = self.call("read", world)
         rows = [self.column(state, name, 2) for name in ("position", "velocity")]
         if self.guest.turns:
@@ -476,7 +449,6 @@ class EngineWorld:
         return [[x for values in disk for x in values] for disk in zip(*rows)]
 
     def column(self, state: Any, name: str, width: int) -> list[list[float]]:
-        """The numbers of all disks from the result of `read`."""
         wanted = f"expected is {'[x, y]' if width == 2 else 'a number'} for each of {self.n} disks"
         value = state.get(name) if isinstance(state, dict) else getattr(state, name, None)
         if value is None:
@@ -506,15 +478,14 @@ class EngineWorld:
 
 
 def wrong(function: str, value: Any, wanted: str, what: str = "", kind: str = "error") -> Failed:
-    """The failure for an invalid return value of a function."""
     text = repr(value)
     text = text if len(text) <= SHOWN else text[:SHOWN] + " ..."
     return Failed(kind, f"{function} returned {text}{what}; {wanted}")
 
 
 def most_arguments(function: Callable[..., Any]) -> int | None:
-    """How many a function takes; None if any number, or it is not known. As in JavaScript it need
-    not take all that it is given."""
+    # How many a function takes; None if any number, or it is not known. As in JavaScript it need
+    # not take all that it is given.
     try:
         kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
@@ -547,7 +518,6 @@ class PythonGuest:
         self.renew()
 
     def renew(self) -> None:
-        """Load the file and the modules beside it again, without any state of earlier calls."""
         for name, loaded in list(sys.modules.items()):
             if getattr(getattr(loaded, "__spec__", None), "loader", None) is self.neighbours:
                 del sys.modules[name]
@@ -582,7 +552,6 @@ class PythonGuest:
         self.functions["advance"] = self.world_of is ArraysWorld
 
     def methods_of(self, holder: type, when: str) -> dict[str, Any]:
-        """The functions of an engine that is a class."""
         create = vars(holder)["create"]
         own = (
             inspect.isfunction(create)
@@ -595,7 +564,6 @@ class PythonGuest:
         }
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """The answer to a command; raises `Failed` after `limit` s, or if the file threw."""
         self.inside = ""
         if command == "turns":
             self.turns = bool(argument)
@@ -604,7 +572,6 @@ class PythonGuest:
             return getattr(self, command)(argument)
 
     def versions(self) -> dict[str, str]:
-        """The versions that affect the numbers."""
         return {"python": ".".join(map(str, sys.version_info[:3]))}
 
     @contextmanager
@@ -629,7 +596,6 @@ class PythonGuest:
             raise failure from None
 
     def failure(self, error: BaseException, when: str) -> Failed:
-        """An exception, with its place in the guest's file."""
         if isinstance(error, RecursionError):
             what = "calls itself without end (maximum recursion depth exceeded)"
         elif isinstance(error, MemoryError):
@@ -659,16 +625,13 @@ class PythonGuest:
     # ---- questions on spheres
 
     def begin(self, _argument: Any) -> None:
-        """Let the file make its scene."""
         if "begin" in self.file:
             self.file["begin"]()
 
     def everybody(self) -> list[Any]:
-        """The file's ufo and asteroids."""
         return [self.module.ufo, *self.module.asteroids]
 
     def globals(self, _argument: Any = None) -> list[list[float]] | None:
-        """The numbers of the file's own spheres; None if it has none."""
         try:
             return [row_of(s) for s in self.everybody()]
         except (AttributeError, TypeError):
@@ -711,22 +674,19 @@ class PythonGuest:
         }
 
     def left(self, _argument: Any) -> list[list[float]]:
-        """The spheres of the last question, which a failed call may have changed."""
         return [row_of(s) for s in self.spheres]
 
     def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
-        """Call a function of the file on some of the spheres, and return its result."""
         on = {"integrate": 1, "collide": 2}.get(name, 0)
         function = self.file["simulate" if name == "step" else name]
         return function(*(spheres[i] for i in arguments[:on]), *arguments[on:])
 
     def numbers(self) -> dict[str, str]:
-        """The file's global numbers as text; those that a call changes are its state."""
+        # The file's global numbers as text; those that a call changes are its state.
         values = vars(self.module).items()
         return {name: repr(x) for name, x in values if isinstance(x, (int, float, complex))}
 
     def watched(self, spheres: list[Any]) -> list[list[Any]]:
-        """A list that gets a row for every call of the file to its own functions."""
         calls: list[list[Any]] = []
         place = {id(s): k for k, s in enumerate(spheres)}
 
@@ -744,8 +704,6 @@ class PythonGuest:
         return calls
 
     def trace(self, question: dict[str, Any]) -> None:
-        """Make the calls of a question on spheres that record every read and write of their
-        numbers; `accesses` then returns these, even if a call never returned."""
         self.trail: list[tuple[str, int, str, list[int]]] = []
         seed()
         spheres = [self.traced(r, k) for k, r in enumerate(question["spheres"])]
@@ -758,8 +716,6 @@ class PythonGuest:
         return self.trail
 
     def traced(self, numbers: list[float], k: int) -> Any:
-        """Sphere `k` that records its accesses."""
-
         def access(kind: str, field: str) -> None:
             last = len(self.trail) > MOST  # only the latest accesses of an endless loop are kept
             self.trail[MOST if last else len(self.trail) :] = [
@@ -773,7 +729,6 @@ class PythonGuest:
         return Traced(access, vars(sphere))
 
     def lines_of(self, frame: FrameType | None) -> list[int]:
-        """The lines of the file in the calls that led to `frame`, the innermost first."""
         lines = []
         while frame is not None:
             if frame.f_code.co_filename == self.name:
@@ -782,7 +737,6 @@ class PythonGuest:
         return lines
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
-        """The spheres of a question, new ones or the file's own."""
         made = [sphere_of(r) for r in question["spheres"]]
         if not question["world"]:
             return made
@@ -799,7 +753,6 @@ class PythonGuest:
     # ---- whole scenes
 
     def load(self, scene: dict[str, Any]) -> Any:
-        """Begin a scene; the settings of an engine."""
         seed()
         for name in ("mass", "inertia"):
             scene[name] = [inf if x is None else x for x in scene[name]]
@@ -812,17 +765,14 @@ class PythonGuest:
         return [[str(name), *pair] for name, *pair in self.file["settings"](self.world.world)]
 
     def step(self, argument: dict[str, Any]) -> None:
-        """Some steps; forces act in the first, or in all if held."""
         self.world.step(argument["count"], argument["forces"], argument.get("held", False))
 
     def play(self, calls: list[dict[str, Any]]) -> dict[str, Any]:
-        """Call `step` several times, then return the state and the new collisions."""
         for step in calls:
             self.step(step)
         return self.handed([self.world.read()])
 
     def samples(self, argument: dict[str, Any]) -> dict[str, Any]:
-        """The states at the beginning and after each of `times` calls of `step`."""
         readings = [self.world.read()]
         for _ in range(argument["times"]):
             self.step(argument["step"])
@@ -830,7 +780,6 @@ class PythonGuest:
         return self.handed(readings)
 
     def handed(self, readings: list[array.array[float]]) -> dict[str, Any]:
-        """Readings and the collisions since the last time, as the parent takes them."""
         numbers = array.array("d")
         for rows in (*readings, self.world.log[self.heard :]):
             numbers.extend(rows)
@@ -839,7 +788,6 @@ class PythonGuest:
         return {"readings": len(readings), "thrown": None, "numbers": packed, "seconds": 0.0}
 
     def contacts(self, _argument: Any) -> list[list[float]]:
-        """The first calls of the collision function on pairs that overlap or are changed."""
         return getattr(self.world, "contacts", [])
 
 
@@ -849,13 +797,10 @@ _system: Any = None
 
 
 def system() -> Any:
-    """adapters/system.py, loaded by its path."""
     return _system
 
 
 def main(settings: dict[str, Any]) -> None:
-    """Load the file in an order, report its functions, then answer requests until the end of the
-    input."""
     global _system
     requests, answers = private_pipes()
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
@@ -889,14 +834,12 @@ def main(settings: dict[str, Any]) -> None:
 
 
 def make(order: dict[str, Any]) -> Any:
-    """The guest of an order; raises `Failed`."""
     if order["kind"] == "python":
         return PythonGuest(order)
     return sys.modules["v8"].V8Guest(order)
 
 
 def load_file(name: str, file: str) -> Any:
-    """A module from a file, wherever it is."""
     spec = spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
@@ -906,7 +849,6 @@ def load_file(name: str, file: str) -> Any:
 
 
 def private_pipes() -> tuple[Any, int]:
-    """The two pipes to the parent; output and input of the guest itself are discarded."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
@@ -915,8 +857,6 @@ def private_pipes() -> tuple[Any, int]:
 
 
 def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
-    """Pass on the lines of the parent; when it has closed the pipe, end this process and its
-    group."""
     for line in requests:
         lines.put(line)
     with suppress(AttributeError, OSError):  # Windows has no groups
@@ -925,7 +865,6 @@ def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
 
 
 def limit(settings: dict[str, Any]) -> None:
-    """Bound memory, files and processes, and become another user if there is one."""
     system().limit_memory(settings["memory"])
     system().write_no_core()
     if not settings["protected"]:
@@ -953,8 +892,8 @@ def limit(settings: dict[str, Any]) -> None:
 
 
 def attempts(secret: str) -> list[str]:
-    """What this process can still do of the things that a protected guest cannot, tried before
-    any text of a guest is there."""
+    # What this process can still do of the things that a protected guest cannot, tried before any
+    # text of a guest is there.
 
     def read() -> None:
         with open(secret, "rb") as file:
@@ -1019,7 +958,6 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
 
 
 def questions_at(requests: list[Any], k: int, guest: Any) -> list[Any]:
-    """The questions from number k on that can be asked together, if the guest takes several."""
     if not hasattr(guest, "together"):
         return []
     alike = takewhile(lambda each: (each[0], each[2]) == ("ask", requests[k][2]), requests[k:])
@@ -1028,7 +966,6 @@ def questions_at(requests: list[Any], k: int, guest: Any) -> list[Any]:
 
 
 def tell(answers: int, what: Any) -> None:
-    """One line to the parent."""
     data = memoryview(dumps(what).encode() + b"\n")
     while data:
         data = data[os.write(answers, data) :]

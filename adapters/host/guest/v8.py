@@ -82,13 +82,11 @@ class V8Guest:
         self.load()
 
     def renew(self) -> None:
-        """Load the file into a new V8, without any state of earlier calls."""
         self.v8.close()
         self.v8 = MiniRacer()
         self.load()
 
     def load(self) -> None:
-        """Load the file into an empty V8."""
         self.began = process_time()
         self.v8.set_hard_memory_limit(self.heap)
         self.v8.eval(DRIVER)
@@ -107,7 +105,7 @@ class V8Guest:
             raise self.failure(error, self.load_limit, "while it is loaded") from None
 
     def wait_until_ready(self) -> None:
-        """WebAssembly is compiled by V8 in its own time."""
+        # WebAssembly is compiled by V8 in its own time.
         until = monotonic() + self.load_limit
         while not self.v8.eval('__host("ready")'):
             if monotonic() > until:
@@ -115,7 +113,6 @@ class V8Guest:
             sleep(0.002)
 
     def load_library(self, name: str, text: str) -> None:
-        """Load gl-matrix, as the exercise's page does before the file."""
         try:
             self.v8.eval(f"{text}\n//# sourceURL={name}", timeout_sec=self.load_limit)
             self.v8.eval(TAKE_OUT)
@@ -124,8 +121,6 @@ class V8Guest:
             raise Failed("error", f"calls {name}, which cannot be loaded ({message})") from None
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
-        """The driver's answer to a command; raises `Failed` after `limit` s, or if the file
-        threw."""
         if command == "turns":
             return self.v8.eval(f'__host("turns", {json.dumps(argument)})')
         code = f'__host("{command}", {json.dumps(json.dumps(argument))})'
@@ -150,7 +145,6 @@ class V8Guest:
         return result
 
     def read(self, command: str, answer: dict[str, Any]) -> Any:
-        """The value of an answer of the driver; raises `Failed` if the file threw."""
         if "failed" in answer:
             raise self.thrown(answer["failed"])
         done = answer["done"]
@@ -162,7 +156,6 @@ class V8Guest:
         return done
 
     def thrown(self, error: dict[str, str]) -> Failed:
-        """What the guest threw, and its place in the file; of an engine with the function."""
         what, inside = plainly(error["what"]), error["inside"]
         if inside and self.order["engine"]:
             what = f"{inside} {'' if what.startswith(('calls ', 'needs ')) else 'threw '}{what}"
@@ -189,7 +182,6 @@ class V8Guest:
         return replies
 
     def done(self, code: str, limit: float) -> Any:
-        """The result of driver code in which the file cannot have thrown."""
         return json.loads(str(self.v8.eval(code, timeout_sec=limit)))["done"]
 
     def evaluate(self, code: str, limit: float, may_repeat: bool) -> object:
@@ -205,11 +197,9 @@ class V8Guest:
             return self.v8.eval(code, timeout_sec=(PATIENCE - 1) * limit)
 
     def versions(self) -> dict[str, str]:
-        """The versions that affect the numbers."""
         return {"V8": self.v8.v8_version}
 
     def failure(self, error: JSEvalException, limit: float, when: str) -> Failed:
-        """The message of V8, with line and column if known."""
         if isinstance(error, JSTimeoutException):
             return stopped(limit, process_time() - self.began, when)
         if isinstance(error, JSOOMException):
@@ -232,7 +222,6 @@ class V8Guest:
 
 
 def lines_of(stack: str) -> list[int]:
-    """The lines of the guest's file in a stack, the innermost call first."""
     return [int(line) for line in re.findall(rf"{NAME}:(\d+):\d+", stack)]
 
 
@@ -241,7 +230,6 @@ SCRIPT = "the exercise's page loads the file as a plain script, which has no mod
 
 
 def plainly(what: str) -> str:
-    """V8's message, with a hint if it alone does not help."""
     what = what.removeprefix("Uncaught ")
     if "Maximum call stack" in what:
         return "calls itself without end (maximum call stack size exceeded)"
