@@ -15,14 +15,10 @@ from crosscheck2d.adapters import system
 from crosscheck2d.adapters.engine import ContactImpulse, NotLoaded
 from crosscheck2d.adapters.host.file import SolverFailed
 from crosscheck2d.adapters.host.process import end
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion, NotInstalled
 from crosscheck2d.adapters.library_versions import BOX2D
-from crosscheck2d.adapters.npm_packages import NotInstalled
 from crosscheck2d.adapters.safe_path import python
 from crosscheck2d.scenarios.model import Array, Scene, State
-
-Call = tuple[Any, ...]
-"""A method of the engine and its arguments; of "make" the class of the adapter and its own."""
 
 # (this process, folder) -> a process that waits for the next engine; it ends with this one
 waiting: dict[tuple[int, Path], subprocess.Popen[bytes]] = {}
@@ -40,14 +36,15 @@ class EngineApart:
     def __init__(
         self, library: LibraryAtVersion, place: str, *arguments: Any, **settings: Any
     ) -> None:
-        self.library, self.made = library, ("make", place, arguments, settings)
+        self.name = f"{library.package} {library.version}"
+        self.library, self.made = library, (place, arguments, settings)
         self.process: subprocess.Popen[bytes] | None = None
-        self.calls: list[Call] = []  # they have no result, and are made before the next
+        self.calls: list[tuple[Any, ...]] = []  # without a result, made before the next
 
     def load(self, scene: Scene, dt: float) -> None:
         if self.process is None:
             self.start()
-            self.ask(*self.made)
+            self.ask("make", *self.made)
         self.calls.clear()
         self.ask("load", scene, dt, self.listening)
 
@@ -55,7 +52,7 @@ class EngineApart:
         try:
             folder = self.library.checked()
         except NotInstalled as reason:
-            raise NotLoaded(f"{self.library.package} {self.library.version}: {reason}") from None
+            raise NotLoaded(f"{self.name}: {reason}") from None
         self.process = waiting.pop((os.getpid(), folder), None)
         if self.process is not None and self.process.poll() is None:
             return
@@ -80,8 +77,7 @@ class EngineApart:
             result, raised = pickle.load(process.stdout)
         except (EOFError, OSError):
             end(process)
-            library = f"{self.library.package} {self.library.version}"
-            what = f"the process of {library} ended (exit status {process.returncode})"
+            what = f"the process of {self.name} ended (exit status {process.returncode})"
             raise SolverFailed("crashed", what) from None
         except BaseException:
             end(process)

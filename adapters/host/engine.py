@@ -4,7 +4,7 @@ of the exercise; each is driven in a process of its own, by the same messages.""
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -19,20 +19,28 @@ from crosscheck2d.adapters.engine import SILENT, ContactImpulse, NotLoaded, Unsu
 from crosscheck2d.adapters.engine_row import FLOAT64, EngineRow
 from crosscheck2d.adapters.float32 import must_fit, rounding
 from crosscheck2d.adapters.friction import must_be_frictionless
-from crosscheck2d.adapters.host.beside import imported_by
-from crosscheck2d.adapters.host.features import features_of, must_model, refusal
 from crosscheck2d.adapters.host.file import (
     LONGEST,
     SolverFailed,
     SolverText,
+    imported_by,
     printable,
     read_solver,
 )
 from crosscheck2d.adapters.host.process import SolverProcess
 from crosscheck2d.adapters.host.restitution import EXERCISE, restitution_of
-from crosscheck2d.adapters.host.surface import ENGINE, HOW, holder_of, is_engine, must_be_either
-from crosscheck2d.adapters.library_at_version import LibraryAtVersion
-from crosscheck2d.adapters.npm_packages import NotInstalled, text_of, version_of
+from crosscheck2d.adapters.host.surface import (
+    ENGINE,
+    HOW,
+    features_of,
+    holder_of,
+    is_engine,
+    must_be_either,
+    must_model,
+    refusal,
+)
+from crosscheck2d.adapters.library_at_version import LibraryAtVersion, NotInstalled
+from crosscheck2d.adapters.npm_packages import pinned_file, text_of, version_of
 from crosscheck2d.scenarios.model import Array, Scene, State
 
 HERE = Path(__file__).parent
@@ -78,11 +86,14 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
 
 
 def box_of(walls: Array) -> list[list[float]] | None:
-    low, high = (f(walls, axis=(0, 1), initial=z) for f, z in ((np.min, np.inf), (np.max, -np.inf)))
-    corners = [low.tolist(), [high[0], low[1]], high.tolist(), [low[0], high[1]]]
+    if len(walls) != 4:
+        return None
+    low, high = walls.min(axis=(0, 1)).tolist(), walls.max(axis=(0, 1)).tolist()
+    corners = [low, [high[0], low[1]], high, [low[0], high[1]]]
     sides = {frozenset(map(tuple, side)) for side in zip(corners, corners[1:] + corners[:1])}
-    fits = len(walls) == 4 and {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides
-    return [low.tolist(), high.tolist()] if fits else None
+    return (
+        [low, high] if {frozenset(map(tuple, wall)) for wall in walls.tolist()} == sides else None
+    )
 
 
 class GuestEngine:
@@ -92,6 +103,10 @@ class GuestEngine:
         compiled.
     collected: steps are requested together with the next `read`: a frame under thrust is one
         exchange with the process instead of one per step.
+
+    Attributes:
+        inside: s that V8 took for the steps so far, of the time of `step`: the rest is the exchange
+            with the process.
     """
 
     listening, wrapping = True, 0.0
@@ -103,6 +118,7 @@ class GuestEngine:
     ) -> None:
         self.solver, self.path = solver, solver.path
         self.patience, self.limit, self.collected = patience, STEP_LIMIT, collected
+        self.inside = 0.0
         self.started: SolverProcess | None = None
 
     @property
@@ -144,27 +160,24 @@ class GuestEngine:
     def step(self, count: int = 1) -> None:
         forces = self.forces.tolist() if self.forces.any() else None
         single = forces is not None and count == 1
+        request = {"count": count, "forces": forces, "held": single}
         last = self.requested[-1] if self.requested else {}
-        if single and last.get("held") and last["forces"] == forces:
-            last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
-        else:
-            self.requested.append({"count": count, "forces": forces, "held": single})
         self.forces[:] = 0.0
         self.steps += count
         self.rows = None
         if not self.collected:
-            for steps in self.take():
-                self.do("step", steps, self.limit)
+            self.inside += self.do("step", request, self.limit)
             self.limit = self.patience
-
-    def take(self) -> list[dict[str, Any]]:
-        requested, self.requested = self.requested, []
-        return requested
+        elif single and last.get("held") and last["forces"] == forces:
+            last["count"] += 1  # a frame under thrust: one list of forces, not one for each step
+        else:
+            self.requested.append(request)
 
     def look(self) -> Array:
         """(n, 6) x, y, u, v, angle, spin; also records collisions."""
         if self.rows is None:
-            self.rows = self.readings(self.do("play", self.take(), self.limit))[0]
+            requested, self.requested = self.requested, []
+            self.rows = self.readings(self.do("play", requested, self.limit))[0]
             self.limit = self.patience
         return self.rows
 
@@ -212,9 +225,6 @@ class PackageEngine(GuestEngine):
     Its file says what the profiles choose; `changed` are keys of that choice; `library` is another
     version than the pinned one. The driver does the wrap, and its time is in that of `step`.
 
-    Attributes:
-        inside: s that V8 took for the steps so far, of the time of `step`: the rest is the exchange
-            with the process.
     """
 
     load_limit = 2 * STEP_LIMIT
@@ -230,8 +240,7 @@ class PackageEngine(GuestEngine):
         **changed: Any,
     ) -> None:
         self.package, self.profile, self.changed = package, profile, changed
-        self.library = library
-        self.float32, self.inside = float32, 0.0
+        self.library, self.float32 = library, float32
         file = HERE / f"{name}.js"
         text = file.read_text(encoding="utf-8")
         super().__init__(SolverText(file, "javascript", text, "", engine=True))
@@ -242,15 +251,12 @@ class PackageEngine(GuestEngine):
         if self.started is None:
             name, library = self.package, self.library
             try:
-                text = library.text() if library else text_of(name)
+                text = library.text(pinned_file(name)) if library else text_of(name)
                 versions = library.versions if library else {name: version_of(name)}
                 self.solver = replace(self.solver, package=text, versions=versions)
             except NotInstalled as reason:
                 raise NotLoaded(f"{name}: {reason}") from None
         return super().process
-
-    def learn(self, process: SolverProcess) -> None:
-        process.do("turns", True)
 
     def refuse(self, scene: Scene) -> None:
         if self.float32:
@@ -263,12 +269,9 @@ class PackageEngine(GuestEngine):
 
     def do(self, command: str, argument: Any, limit: float) -> Any:
         try:
-            answer = super().do(command, argument, limit)
+            return super().do(command, argument, limit)
         except SolverFailed as failure:
             raise refused(failure) from None
-        if command == "step":
-            self.inside += answer
-        return answer
 
     def expect(self, count: int, times: int, thrusts: Sequence[Foreseen] = ()) -> None:
         """The next `times` calls are `step(count)`, each followed by `read`, and only `thrusts`
@@ -334,7 +337,6 @@ class OwnEngine(GuestEngine):
         if missing := [name for name in ENGINE if not process.functions[name]]:
             raise SolverFailed("error", f"has no function {' and no '.join(missing)}; {HOW}")
         self.models = features_of(process.functions["models"])
-        process.do("turns", "rotation" in self.models)
 
     def refuse(self, scene: Scene) -> None:
         must_model(scene, self.models, self.path.name)
@@ -385,7 +387,9 @@ class OwnSolver(GuestEngine):
     def learn(self, process: SolverProcess) -> None:
         self.whole = process.surface == "advance"
         if not self.whole:
-            make_globals(process)
+            if process.functions["begin"]:  # as the exercise's page does before the first step
+                with suppress(SolverFailed):  # a function that needs it fails with its own message
+                    process.do("begin", None, BEGIN_LIMIT)
             self.restitution = restitution_of(self.solver, process)
             if self.restitution.own is not None:
                 self.own_restitution = self.restitution.own
@@ -414,14 +418,6 @@ class OwnSolver(GuestEngine):
         return {"restitution": (None, own), "order of a step": (None, order), **self.of_file()}
 
 
-def make_globals(process: SolverProcess) -> None:
-    # Let the file make its own scene, as the exercise's page does before the first step, because
-    # its functions may use `ufo` or `asteroids`.
-    if process.functions["begin"]:
-        with suppress(SolverFailed):  # a function that needs them fails with its own message
-            process.do("begin", None, BEGIN_LIMIT)
-
-
 def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = False) -> EngineRow:
     """The row of a file in its present state, an engine or a solver of the exercise; raises
     `NotASolver`. Its own user plays it: it may import what is installed."""
@@ -430,8 +426,9 @@ def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = Fals
     engine = holder is not None or is_engine(solver)
     if not engine:
         must_be_either(solver)
-    solver = replace(solver, engine=engine, holder=holder)
-    solver = replace(solver, packages=tuple(sorted(packages_named(solver))))
+    texts = [solver.text, *(text for _, text in solver.imported)] * (solver.kind == "python")
+    packages = tuple(sorted(set[str]().union(*map(imported_by, texts))))
+    solver = replace(solver, engine=engine, holder=holder, packages=packages)
     make = OwnEngine if engine else OwnSolver
     return EngineRow(
         partial(make, solver, patience, collected),
@@ -441,10 +438,3 @@ def row_of_file(path: Path, patience: float = STEP_LIMIT, collected: bool = Fals
         source=solver.source,
         exercise=not engine,
     )
-
-
-def packages_named(solver: SolverText) -> Iterable[str]:
-    if solver.kind != "python":
-        return set()
-    texts = [solver.text, *(text for _, text in solver.imported)]
-    return set[str]().union(*map(imported_by, texts))

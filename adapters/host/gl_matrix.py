@@ -7,9 +7,11 @@ import json
 import re
 from collections.abc import Iterator
 from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 
-from crosscheck2d.adapters.npm_packages import HOW, file_of, missing
+from crosscheck2d.adapters.library_at_version import HOW
+from crosscheck2d.adapters.npm_packages import file_of, missing
 
 NAMES = ("vec2", "vec3", "vec4", "mat2", "mat2d", "mat3", "mat4", "quat", "quat2", "glMatrix")
 CALLS = re.compile(rf"\b(?:{'|'.join(NAMES)})\b")
@@ -23,9 +25,9 @@ BESIDE = "put the gl-matrix.js that the exercise hands out beside the file"
 BUILT = ("dist/gl-matrix.js", "dist/gl-matrix-min.js", "gl-matrix.js", "gl-matrix-min.js")
 
 
-def gl_matrix_of(solver: Path, text: str) -> tuple[str, Path] | None:
-    """Relative name and path; only if the text uses one of its names."""
-    return next(found_from(solver), None) if CALLS.search(text) else None
+def gl_matrix_of(solver: Path, text: str) -> dict[str, Path]:
+    """Relative name and path; none if the text uses none of its names."""
+    return dict(islice(found_from(solver), 1 if CALLS.search(text) else 0))
 
 
 def found_from(solver: Path) -> Iterator[tuple[str, Path]]:

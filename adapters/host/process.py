@@ -150,14 +150,14 @@ class SolverProcess:
     def begin(self) -> None:
         reason = ""
         trusted = self.solver.package is not None  # its hash is that of what was read
-        for level in [Level.NONE] if trusted else levels_here():
+        possible = (Level.NONE,) if trusted else levels()
+        for level in (_working[possible],) if possible in _working else possible:
             try:
                 self.launch(level)
                 hello = self.receive(STARTING)
                 able = set(hello.get("can", ())) if isinstance(hello, dict) else {"speak"}
                 if able <= ALLOWED[level]:
-                    if not trusted:
-                        _working[levels()] = level
+                    _working[possible] = level
                     return
                 reason = f"at level {level} a guest could {', '.join(sorted(able))}"
             except (OSError, SolverFailed, TypeError) as fault:
@@ -166,9 +166,8 @@ class SolverProcess:
         raise NotStarted(f"the process for a solver's file could not be started: {reason}")
 
     def launch(self, level: Level) -> None:
-        jit = self.copies is not None
         packages = self.solver.packages + (("numba",) if self.solver.reference else ())
-        how = start(level, self.kind, packages, self.copies, jit)
+        how = start(level, self.kind, packages, self.copies)
         self.process = subprocess.Popen(
             how.command,
             stdin=subprocess.PIPE,
@@ -196,16 +195,20 @@ class SolverProcess:
         """The answer to each request, or its failure, within `total` s; raises `SolverFailed` if
         the process is lost."""
         # After a call that does not return the driver makes no other like it.
-        stopped_once = max(1, len({call for each in requests for call in calls_of(each)}))
+        calls = {command for command, _, _ in requests if command != "ask"}
+        for command, argument, _ in requests:
+            calls |= {call[0] for call in argument["calls"]} if command == "ask" else set()
         longest = max((limit for _, _, limit in requests), default=0.0)
-        most = stopped_once * PATIENCE * longest
+        most = max(1, len(calls)) * PATIENCE * longest
         answers = self.exchange({"do": requests}, min(most + GRACE, total)).get("done")
         if not isinstance(answers, list) or len(answers) != len(requests):
             raise self.intruded()
         results = []
         for (command, _, _), answer in zip(requests, answers):
             try:
-                results.append(result_of(command, answer))
+                check(isinstance(answer, dict))
+                failed, form = "failed" in answer, FORMS[command]
+                results.append(failure_in(answer["failed"]) if failed else form(answer["done"]))
             except (TypeError, ValueError, KeyError, OverflowError):
                 raise self.intruded() from None
         kinds = {result.kind for result in results if isinstance(result, SolverFailed)}
@@ -243,7 +246,9 @@ class SolverProcess:
             if chunk is None and self.process.poll() is not None:
                 chunk = self.pieces.next(0.0) or b""  # its child may keep the pipe open
             if chunk is None and left > system.LOOK:
-                self.end_if_too_large()
+                if system.holds_more(self.process.pid, MEMORY):
+                    self.end()
+                    raise SolverFailed("memory", TOO_LARGE)
                 continue
             if chunk is None or left < 0:  # a process that writes endlessly always has a next piece
                 self.end()
@@ -262,12 +267,6 @@ class SolverProcess:
         self.end()
         return SolverFailed("crashed", INTRUDED)
 
-    def end_if_too_large(self) -> None:
-        assert self.process is not None
-        if system.holds_more(self.process.pid, MEMORY):
-            self.end()
-            raise SolverFailed("memory", TOO_LARGE)
-
     def lost(self) -> SolverFailed:
         assert self.process is not None
         code = self.process.wait(timeout=GRACE)
@@ -278,26 +277,21 @@ class SolverProcess:
         ends_v8 = self.kind != "python" and code in (system.TRAPPED, system.ABORTED)
         if ends_v8 or code == system.OUT_OF_MEMORY:
             return SolverFailed("memory", TOO_LARGE)
-        if code == system.KILLED:
-            return SolverFailed(
-                "crashed",
-                "its process was ended by SIGKILL, as a system does that runs out of memory",
-            )
-        if code == system.ABORTED:
-            return SolverFailed("crashed", "its process was ended by SIGABRT")
+        if code in (system.KILLED, system.ABORTED):
+            name = signal.Signals(-code).name
+            cause = ", as a system does that runs out of memory" * (code == system.KILLED)
+            return SolverFailed("crashed", f"its process was ended by {name}{cause}")
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"
         return SolverFailed("crashed", f"ended its own process ({name})")
 
     def close(self) -> None:
-        keeps = _reusing or self.solver.package is not None
-        free = keeps and self.sound and self.key not in waiting
+        packaged = self.solver.package is not None
+        free = (_reusing or packaged) and self.sound and self.key not in waiting
         if free and self.process is not None and self.process.poll() is None:
             mine = [key for key in waiting if key[0] == os.getpid()]
             for oldest in mine[: max(0, len(mine) - MOST_WAITING + 1)]:
                 end(waiting.pop(oldest).process)
-            waiting[self.key] = Idle(
-                self.process, self.pieces, self.level, self.solver.package is not None
-            )
+            waiting[self.key] = Idle(self.process, self.pieces, self.level, packaged)
             self.process = None
         self.end()
 
@@ -308,6 +302,7 @@ class SolverProcess:
 
 
 _late = 0
+_working: dict[tuple[Level, ...], Level] = {}  # levels that may work -> the best that does
 
 
 def clock_endings() -> int:
@@ -319,14 +314,6 @@ def ended_by_clock(what: str, line: int = 0, column: int = 0) -> SolverFailed:
     global _late
     _late += 1
     return SolverFailed("timeout", what, line, column)
-
-
-_working: dict[tuple[Level, ...], Level] = {}
-
-
-def levels_here() -> Sequence[Level]:
-    possible = levels()
-    return [_working[possible]] if possible in _working else possible
 
 
 def protection() -> Level:
@@ -344,7 +331,7 @@ def check(fits: bool) -> None:
 
 
 def is_number(x: Any) -> bool:
-    return type(x) is float or (type(x) is int and abs(x) < 2**1000)
+    return type(x) is float or (type(x) is int and abs(x) < 2**1000)  # not longer than a float
 
 
 def is_words(x: Any) -> bool:
@@ -438,18 +425,8 @@ FORMS: dict[str, Callable[[Any], Any]] = {
     "load": settings,
     **dict.fromkeys(("play", "ahead", "samples"), readings),
     "step": lambda done: float(done) if is_number(done) else 0.0,  # s in V8
-    **dict.fromkeys(("renew", "begin", "trace", "turns"), lambda _: None),
+    **dict.fromkeys(("renew", "begin", "trace"), lambda _: None),
 }
-
-
-def result_of(command: str, answer: Any) -> Any:
-    check(isinstance(answer, dict))
-    return failure_in(answer["failed"]) if "failed" in answer else FORMS[command](answer["done"])
-
-
-def calls_of(request: Request) -> list[str]:
-    command, argument, _ = request
-    return [call[0] for call in argument["calls"]] if command == "ask" else [command]
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:

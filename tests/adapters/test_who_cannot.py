@@ -12,7 +12,7 @@ import pyb2d3
 import pymunk
 import pytest
 
-from crosscheck2d.adapters.npm_packages import missing, pinned, place
+from crosscheck2d.adapters.npm_packages import missing, pinned, pinned_library
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "adapters" / "README.md").read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ RAPIER = "@dimforge/rapier2d-compat"
 
 @pytest.mark.skipif(bool(missing(RAPIER)), reason=missing(RAPIER))
 def test_the_npm_package_of_rapier_does_not_hand_on_the_cap_on_speed():
-    dist = place() / "node_modules" / RAPIER / "dist" / "dynamics"
-    text = (dist / "integration_parameters.d.ts").read_text(encoding="utf-8").lower()
+    dynamics = pinned_library(RAPIER).folder / "dist" / "dynamics"
+    text = (dynamics / "integration_parameters.d.ts").read_text(encoding="utf-8").lower()
     assert "velocity" not in text
     assert "lengthunit" in text

@@ -26,6 +26,7 @@ import socket
 import sys
 import traceback
 from base64 import b64encode
+from collections import namedtuple
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -38,8 +39,8 @@ from math import inf, isinf, nan
 from operator import index
 from threading import Thread
 from time import process_time
-from types import FrameType, ModuleType
-from typing import Any, NamedTuple
+from types import ModuleType
+from typing import Any
 
 PATIENCE = 3  # times its limit of processor time that a call may take by the clock
 LOAD_LIMIT = 3.0  # s; importing numba takes one
@@ -228,8 +229,10 @@ class ExerciseWorld:
                 for j in range(i + 1, len(self.spheres)):
                     self.collide(i, j)
             if self.scene["wrap"]:
-                for s in self.spheres:
-                    self.wrap(s.position, *self.scene["wrap"])
+                (left, bottom), (right, top) = self.scene["wrap"]  # as projectObjects
+                for p in (s.position for s in self.spheres):
+                    p.x = right if p.x < left else left if p.x > right else p.x
+                    p.y = top if p.y < bottom else bottom if p.y > top else p.y
             self.steps += 1
 
     def collide(self, i: int, j: int) -> None:
@@ -248,40 +251,21 @@ class ExerciseWorld:
             numbers = map(number, (*was_a, *was_b, *is_a, *is_b))
             self.contacts.append([self.steps, i, j, *numbers])
 
-    @staticmethod
-    def wrap(p: Any, low: Sequence[float], high: Sequence[float]) -> None:
-        p.x = high[0] if p.x < low[0] else low[0] if p.x > high[0] else p.x
-        p.y = high[1] if p.y < low[1] else low[1] if p.y > high[1] else p.y
-
     def read(self) -> array.array[float]:
         rows = (row_of(s) for s in self.spheres)
         return array.array("d", [x for r in rows for x in (*r[:4], r[6], r[7])])
 
 
-class GuestDisks(NamedTuple):
-    # What `advance` of a file like those of reference_impl works on; see its state.py.
-
-    position: Any
-    velocity: Any
-    force: Any
-    angle: Any
-    angular_velocity: Any
-    torque: Any
-    radius: Any
-    mass: Any
-    inertia: Any
-    remainder: Any
-
-
-class GuestWorld(NamedTuple):
-    restitution: float
-    gravity: Any
-    walls: Any
-    low: Any
-    high: Any
-    split: int = 0
-    approaching_only: bool = True
-    friction: float = 0.0
+# What `advance` of a file like those of reference_impl works on; see its state.py.
+GuestDisks = namedtuple(
+    "GuestDisks",
+    "position velocity force angle angular_velocity torque radius mass inertia remainder",
+)
+GuestWorld = namedtuple(
+    "GuestWorld",
+    "restitution gravity walls low high split approaching_only friction",
+    defaults=(0, True, 0.0),
+)
 
 
 def make_disks(np: Any, *columns: Any) -> GuestDisks:
@@ -409,15 +393,10 @@ class EngineWorld:
             return True
         except Exception:
             now, first = self.rows_of(self.world), self.first
-        if (
-            first
-            and [d[:2] for d in now] == [d[:2] for d in first]
-            and any(any(d[2:4]) for d in now)
-        ):
-            wanted = (
-                "expected is that it changes its world, or returns a new one that read can read"
-            )
-            raise wrong("step", result, wanted, " and moved no disk")
+        still = first and [d[:2] for d in now] == [d[:2] for d in first]
+        if still and any(any(d[2:4]) for d in now):
+            wanted = "it changes its world, or returns a new one that read can read"
+            raise wrong("step", result, f"expected is that {wanted}", " and moved no disk")
         return False
 
     def hear(self) -> None:
@@ -460,20 +439,20 @@ class EngineWorld:
                 wanted += "; create keeps disks of the scene before"
             raise wrong("read", value, wanted, f" as {name}")
         column = []
-        for i, disk in enumerate(value):
-            disk = disk.tolist() if hasattr(disk, "tolist") else disk
-            numbers = [disk] if width == 1 else disk
-            if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
-                raise wrong("read", value, wanted, f" as {name}")
-            try:
+        try:
+            for i, disk in enumerate(value):
+                disk = disk.tolist() if hasattr(disk, "tolist") else disk
+                numbers = [disk] if width == 1 else disk
+                if not isinstance(numbers, (list, tuple)) or len(numbers) != width:
+                    raise TypeError
                 if any(isinstance(x, (str, bool, complex)) for x in numbers):
                     raise TypeError
                 column.append([float(x) for x in numbers])
-            except (TypeError, ValueError):
-                raise wrong("read", value, wanted, f" as {name}") from None
-            if not all(abs(x) < inf for x in column[-1]):
-                where = f" as {name} of disk {i}"
-                raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+                if not all(abs(x) < inf for x in column[-1]):
+                    where = f" as {name} of disk {i}"
+                    raise wrong("read", disk, "expected are finite numbers", where, "diverged")
+        except (TypeError, ValueError):
+            raise wrong("read", value, wanted, f" as {name}") from None
         return column
 
 
@@ -490,12 +469,10 @@ def most_arguments(function: Callable[..., Any]) -> int | None:
         kinds = [parameter.kind for parameter in inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
         return None
+    if inspect.Parameter.VAR_POSITIONAL in kinds:
+        return None
     positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return (
-        None
-        if inspect.Parameter.VAR_POSITIONAL in kinds
-        else sum(map(positional.__contains__, kinds))
-    )
+    return sum(kind in positional for kind in kinds)
 
 
 # ---- a guest in Python --------------------------------------------------------------------------
@@ -513,7 +490,8 @@ class PythonGuest:
         self.order, folder = order, order["folder"] or ""
         self.name = os.path.join(folder, order["name"])
         self.neighbours = Neighbours(dict(order["imported"]), folder)
-        self.turns, self.inside, self.loads = False, "", 0
+        self.inside = ""
+        self.versions = {"python": ".".join(map(str, sys.version_info[:3]))}
         sys.meta_path.insert(0, self.neighbours)
         self.renew()
 
@@ -531,7 +509,7 @@ class PythonGuest:
             exec(compile(self.order["text"], self.name, "exec", dont_inherit=True), vars(module))
         self.loads, names = 0, vars(module)
         if self.order["holder"]:  # a class has the functions, of itself or of its instances
-            names = self.methods_of(names[self.order["holder"]], "while it is loaded")
+            names = self.methods_of(names[self.order["holder"]])
         if self.order["engine"]:
             self.world_of: Any = EngineWorld
             self.file = {name: names[name] for name in ENGINE if callable(names.get(name))}
@@ -546,18 +524,19 @@ class PythonGuest:
         else:
             self.world_of = ExerciseWorld
             self.file = {k: names[f] for k, f in EXERCISE.items() if callable(names.get(f))}
-        self.functions: dict[str, Any] = {k: k in self.file for k in (*EXERCISE, *ENGINE)}
-        models = names.get("models")
-        self.functions |= {"replaced": [], "models": models if isinstance(models, str) else None}
-        self.functions["advance"] = self.world_of is ArraysWorld
+        models = names["models"] if isinstance(names.get("models"), str) else None
+        self.turns = "rotation" in (models or "").split()
+        self.functions: dict[str, Any] = {
+            **{name: name in self.file for name in (*EXERCISE, *ENGINE)},
+            "replaced": [],
+            "models": models,
+            "advance": self.world_of is ArraysWorld,
+        }
 
-    def methods_of(self, holder: type, when: str) -> dict[str, Any]:
+    def methods_of(self, holder: type) -> dict[str, Any]:
         create = vars(holder)["create"]
-        own = (
-            inspect.isfunction(create)
-            and next(iter(inspect.signature(create).parameters), "") == "self"
-        )
-        with self.guarded(LOAD_LIMIT, when):
+        own = inspect.isfunction(create) and [*inspect.signature(create).parameters][:1] == ["self"]
+        with self.guarded(LOAD_LIMIT, "while it is loaded"):
             engine = holder() if own else holder
         return {
             name: getattr(engine, name) for name in (*ENGINE, "models") if hasattr(engine, name)
@@ -565,14 +544,8 @@ class PythonGuest:
 
     def run(self, command: str, argument: Any, limit: float) -> Any:
         self.inside = ""
-        if command == "turns":
-            self.turns = bool(argument)
-            return None
         with self.guarded(limit, "in one call"):
-            return getattr(self, command)(argument)
-
-    def versions(self) -> dict[str, str]:
-        return {"python": ".".join(map(str, sys.version_info[:3]))}
+            return getattr(self, command)(*([] if argument is None else [argument]))
 
     @contextmanager
     def guarded(self, limit: float, when: str) -> Iterator[None]:
@@ -585,7 +558,7 @@ class PythonGuest:
             return stopped(limit, process_time() - began, when)
 
         try:
-            with system().stopped_after(limit, PATIENCE * limit, too_late):
+            with system.stopped_after(limit, PATIENCE * limit, too_late):
                 yield
         except BaseException as error:  # SystemExit too: a guest may not end the process
             failure = error if isinstance(error, Failed) else self.failure(error, when)
@@ -624,14 +597,14 @@ class PythonGuest:
 
     # ---- questions on spheres
 
-    def begin(self, _argument: Any) -> None:
+    def begin(self) -> None:
         if "begin" in self.file:
             self.file["begin"]()
 
     def everybody(self) -> list[Any]:
         return [self.module.ufo, *self.module.asteroids]
 
-    def globals(self, _argument: Any = None) -> list[list[float]] | None:
+    def globals(self) -> list[list[float]] | None:
         try:
             return [row_of(s) for s in self.everybody()]
         except (AttributeError, TypeError):
@@ -658,7 +631,7 @@ class PythonGuest:
                 returned = returned or hasattr(result, "position")
                 spheres = self.everybody() if question["world"] else spheres
                 states.append([row_of(s) for s in spheres])
-        except (Failed, system().TimeIsUp):
+        except (Failed, system.TimeIsUp):
             raise
         except BaseException as raised:
             error = vars(self.failure(raised, "in one call"))
@@ -673,7 +646,7 @@ class PythonGuest:
             "error": error,
         }
 
-    def left(self, _argument: Any) -> list[list[float]]:
+    def left(self) -> list[list[float]]:
         return [row_of(s) for s in self.spheres]
 
     def call(self, name: str, arguments: list[Any], spheres: list[Any]) -> Any:
@@ -710,31 +683,23 @@ class PythonGuest:
         for name, *arguments in question["calls"]:
             self.call(name, arguments, spheres)
 
-    def accesses(self, _argument: Any) -> list[tuple[str, int, str, list[int]]]:
+    def accesses(self) -> list[tuple[str, int, str, list[int]]]:
         """("r" or "w", sphere, field, lines of the file, the innermost call first) of the last
         `trace`."""
         return self.trail
 
     def traced(self, numbers: list[float], k: int) -> Any:
         def access(kind: str, field: str) -> None:
+            stack = traceback.walk_stack(sys._getframe(2))
+            lines = [line for frame, line in stack if frame.f_code.co_filename == self.name]
             last = len(self.trail) > MOST  # only the latest accesses of an endless loop are kept
-            self.trail[MOST if last else len(self.trail) :] = [
-                (kind, k, field, self.lines_of(sys._getframe(2)))
-            ]
+            self.trail[MOST if last else len(self.trail) :] = [(kind, k, field, lines)]
 
         sphere = sphere_of(numbers)
         for name, value in vars(sphere).items():
             if isinstance(value, Fields):
                 vars(sphere)[name] = Traced(access, vars(value), name)
         return Traced(access, vars(sphere))
-
-    def lines_of(self, frame: FrameType | None) -> list[int]:
-        lines = []
-        while frame is not None:
-            if frame.f_code.co_filename == self.name:
-                lines.append(frame.f_lineno)
-            frame = frame.f_back
-        return lines
 
     def placed(self, question: dict[str, Any]) -> list[Any]:
         made = [sphere_of(r) for r in question["spheres"]]
@@ -787,25 +752,24 @@ class PythonGuest:
         packed = b64encode(numbers.tobytes()).decode("ascii")
         return {"readings": len(readings), "thrown": None, "numbers": packed, "seconds": 0.0}
 
-    def contacts(self, _argument: Any) -> list[list[float]]:
+    def contacts(self) -> list[list[float]]:
         return getattr(self.world, "contacts", [])
 
 
 # ---- the process --------------------------------------------------------------------------------
 
-_system: Any = None
-
-
-def system() -> Any:
-    return _system
+system: Any = None  # adapters/system.py, loaded by its path
 
 
 def main(settings: dict[str, Any]) -> None:
-    global _system
-    requests, answers = private_pipes()
+    global system
+    requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):  # input and output of the guest itself are discarded
+        os.dup2(nowhere, stream)
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     sys.modules["driver"] = sys.modules["__main__"]
-    _system = load_file("system", settings["system"])
+    system = load_file("system", settings["system"])
     sys.meta_path.insert(0, Packages(settings["packages"]))
     for name in settings["preload"]:
         with suppress(ImportError):
@@ -817,6 +781,10 @@ def main(settings: dict[str, Any]) -> None:
     limit(settings)
     Thread(target=listen, args=(requests, lines), daemon=True).start()
     tell(answers, {"here": True, "can": attempts(settings["secret"])})
+    serve(lines, answers)
+
+
+def serve(lines: queue.SimpleQueue[bytes], answers: int) -> None:
     guest: Any = None
     while True:
         request = loads(lines.get())
@@ -825,35 +793,24 @@ def main(settings: dict[str, Any]) -> None:
             continue
         try:
             order = request["open"]
-            guest = guest.renew() or guest if guest else make(order)
-            hello = {"functions": guest.functions, "versions": guest.versions()}
+            if guest:
+                guest.renew()
+            elif order["kind"] == "python":
+                guest = PythonGuest(order)
+            else:
+                guest = sys.modules["v8"].V8Guest(order)
+            hello = {"functions": guest.functions, "versions": guest.versions}
             tell(answers, {"id": request["id"], **hello})
         except Failed as failure:
             tell(answers, {"id": request["id"], "failed": vars(failure)})
             return
 
 
-def make(order: dict[str, Any]) -> Any:
-    if order["kind"] == "python":
-        return PythonGuest(order)
-    return sys.modules["v8"].V8Guest(order)
-
-
 def load_file(name: str, file: str) -> Any:
-    spec = spec_from_file_location(name, file)
-    assert spec is not None
-    assert spec.loader is not None
+    spec: Any = spec_from_file_location(name, file)
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def private_pipes() -> tuple[Any, int]:
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nowhere, stream)
-    return requests, answers
 
 
 def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
@@ -865,8 +822,8 @@ def listen(requests: Any, lines: queue.SimpleQueue[bytes]) -> None:
 
 
 def limit(settings: dict[str, Any]) -> None:
-    system().limit_memory(settings["memory"])
-    system().write_no_core()
+    system.limit_memory(settings["memory"])
+    system.write_no_core()
     if not settings["protected"]:
         return
     import resource
@@ -894,35 +851,21 @@ def limit(settings: dict[str, Any]) -> None:
 def attempts(secret: str) -> list[str]:
     # What this process can still do of the things that a protected guest cannot, tried before any
     # text of a guest is there.
-
-    def read() -> None:
-        with open(secret, "rb") as file:
-            file.read()
-
-    def signal_parent() -> None:
-        if os.getppid() in (0, 1):  # in a world of its own
-            raise PermissionError
-        os.kill(os.getppid(), 0)
-
-    def connect() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-            udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
-
-    def write() -> None:
-        with open(secret + ".guest", "wb"):
-            pass
-        os.unlink(secret + ".guest")
-
     possible = []
-    for name, attempt in {
-        "read": read,
-        "write": write,
-        "signal": signal_parent,
-        "network": connect,
-    }.items():
-        with suppress(OSError, AttributeError):
-            attempt()
-            possible.append(name)
+    with suppress(OSError), open(secret, "rb") as file:
+        file.read()
+        possible.append("read")
+    with suppress(OSError), open(secret + ".guest", "wb"):
+        possible.append("write")
+    with suppress(OSError):
+        os.unlink(secret + ".guest")
+    with suppress(OSError, AttributeError):
+        if os.getppid() not in (0, 1):  # else in a world of its own
+            os.kill(os.getppid(), 0)
+            possible.append("signal")
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.connect(("192.0.2.1", 9))  # an address for documentation; nothing is sent
+        possible.append("network")
     return possible
 
 
@@ -936,11 +879,14 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
     alone = -1  # the question that stopped those after it
     while len(answers) < len(requests):
         k = len(answers)
-        if k != alone and not endless and (questions := questions_at(requests, k, guest)):
-            answers += guest.together(questions, requests[k][2] * TOGETHER)
-            alone = len(answers)
-            continue
         command, argument, seconds = requests[k]
+        if k != alone and not endless and hasattr(guest, "together"):
+            alike = list(takewhile(["ask", seconds].__eq__, (one[::2] for one in requests[k:])))
+            if len(alike) > 1:
+                questions = [question for _, question, _ in requests[k : k + len(alike)]]
+                answers += guest.together(questions, seconds * TOGETHER)
+                alone = len(answers)
+                continue
         calls = [call[0] for call in argument["calls"]] if command == "ask" else []
         known = next((endless[call] for call in calls if call in endless), None)
         try:
@@ -955,14 +901,6 @@ def reply(guest: Any, requests: list[Any]) -> list[dict[str, Any]]:
             if failure.kind in ("timeout", "waited", "memory"):
                 endless |= dict.fromkeys([*calls, "step"], vars(failure))
     return answers
-
-
-def questions_at(requests: list[Any], k: int, guest: Any) -> list[Any]:
-    if not hasattr(guest, "together"):
-        return []
-    alike = takewhile(lambda each: (each[0], each[2]) == ("ask", requests[k][2]), requests[k:])
-    questions = [argument for _, argument, _ in alike]
-    return questions if len(questions) > 1 else []
 
 
 def tell(answers: int, what: Any) -> None:
