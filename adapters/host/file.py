@@ -273,9 +273,13 @@ def read_bytes(path: Path, wanted: str) -> bytes:
         return path.read_bytes()
     except OSError as fault:
         what = f"{fault.strerror or fault}; name a file that can be read"
-        if os.path.islink(path) and not os.path.exists(path):
+        if dangling(path):
             what = f"is a link to {path.readlink()}, which is not there"
         raise NotASolver(f"{path}: {what}") from None
+
+
+def dangling(path: Path) -> bool:
+    return os.path.islink(path) and not os.path.exists(path)
 
 
 def decoded(path: Path, data: bytes) -> str:
