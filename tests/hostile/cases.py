@@ -9,19 +9,8 @@ from tests.hostile.small_run import TWO
 
 SCENES = Path(__file__).parents[1] / "data" / "scenes"
 FILE = "two.toml"
-TRUTH = ("truth", FILE, "--timeout", "20")
-PLAYED = (
-    "run",
-    FILE,
-    "--engine",
-    "pymunk:shipped",
-    "--out",
-    "out",
-    "--workers",
-    "1",
-    "--timeout",
-    "5",
-)
+TRUTH = f"truth {FILE} --timeout 20"
+PLAYED = f"run {FILE} --engine pymunk:shipped --out out --workers 1 --timeout 5"
 
 
 def scene(
@@ -194,49 +183,43 @@ CASES = (
     ),
     Input(
         "stability: a scene in which nothing moves",
-        ("stability", FILE, "--vary", "speed", "--engine", "pymunk:shipped", "--out", "out"),
+        f"stability {FILE} --vary speed --engine pymunk:shipped --out out",
         {FILE: (SCENES / "still.toml").read_text()},
         codes=(0, 1, 2),
         writes=("out", "out.part"),
     ),
     Input(
         "stability: a parameter that does not exist",
-        ("stability", FILE, "--vary", "colour"),
+        f"stability {FILE} --vary colour",
         {FILE: TWO},
         says="colour",
     ),
     Input(
         "stability: a parameter without a scene file",
-        ("stability", "slow_collision", "--vary", "dt"),
+        "stability slow_collision --vary dt",
         says="--vary",
     ),
     Input(
         "play: more disks than a page can draw",
-        ("play", FILE),
+        f"play {FILE}",
         {FILE: scene(";".join(f"{k} 0 0 0" for k in range(201)))},
         says="201 disks",
     ),
     Input(
-        "two files with one name",
-        ("run", FILE, "b.toml"),
-        {FILE: TWO, "b.toml": TWO},
-        says="taken by",
+        "two files with one name", f"run {FILE} b.toml", {FILE: TWO, "b.toml": TWO}, says="taken by"
     ),
     Input(
         "a file with the name of a scenario",
-        ("run", FILE),
+        f"run {FILE}",
         {FILE: TWO.replace("two-disks", "slow_collision")},
         says="taken by a scenario",
     ),
     Input(
-        "a file whose name does not end in .toml",
-        ("run", "two.txt"),
-        {"two.txt": TWO},
-        says="two.txt",
+        "a file whose name does not end in .toml", "run two.txt", {"two.txt": TWO}, says="two.txt"
     ),
     Input(
         "a scene that is a folder's name with a slash",
-        ("truth", "two.toml/"),
+        "truth two.toml/",
         {FILE: TWO},
         says="two.toml/",
     ),

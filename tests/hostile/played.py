@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shlex
 import signal
 import stat
 import subprocess
@@ -78,7 +79,7 @@ class Input(NamedTuple):
     """
 
     name: str
-    words: tuple[str, ...] = ()
+    words: str | tuple[str, ...] = ()
     files: Mapping[str, str | bytes] = {}
     prepare: Callable[[Path], Any] | None = None
     writes: tuple[str, ...] = ()
@@ -87,6 +88,10 @@ class Input(NamedTuple):
     environment: Mapping[str, str] = {}
     shell: str = ""
     talk: Callable[[int], str] | None = None
+
+    @property
+    def line(self) -> tuple[str, ...]:
+        return tuple(shlex.split(self.words)) if isinstance(self.words, str) else self.words
 
 
 class Outcome(NamedTuple):
@@ -104,7 +109,7 @@ def outcome_of(tried: Input, folder: Path) -> Outcome:
         path.write_bytes(content.encode() if isinstance(content, str) else content)
     meant = tried.prepare(user) if tried.prepare is not None else None
     if isinstance(meant, dict):
-        tried = tried._replace(words=tuple(meant.get(word, word) for word in tried.words))
+        tried = tried._replace(words=tuple(meant.get(word, word) for word in tried.line))
     before = kept(user, tried.writes)
     code, heard = ended(tried, user, folder)
     left = left_behind(user)
@@ -172,7 +177,7 @@ def kept(user: Path, writes: tuple[str, ...]) -> dict[str, str]:
 
 def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
     if tried.environment or tried.shell:
-        line = ["sh", "-c", tried.shell] if tried.shell else [CROSSCHECK, *tried.words]
+        line = ["sh", "-c", tried.shell] if tried.shell else [CROSSCHECK, *tried.line]
         env = os.environ | {"crosscheck": str(CROSSCHECK)} | WIDE | dict(tried.environment)
         with (folder / "stdout").open("wb") as stdout, (folder / "stderr").open("wb") as stderr:
             process = subprocess.Popen(
@@ -191,7 +196,7 @@ def ended(tried: Input, user: Path, folder: Path) -> tuple[int | None, str]:
                 process.wait()
                 return None, ""
     port = free_port() if tried.talk is not None else 0
-    words = tuple(word.replace("PORT", str(port)) for word in tried.words) if port else tried.words
+    words = tuple(word.replace("PORT", str(port)) if port else word for word in tried.line)
     forked = start(crosscheck_in, words, user, folder, WIDE)
     heard = "" if tried.talk is None else hear(tried.talk, forked, folder / "stdout")
     return code_of(forked), heard

@@ -14,14 +14,14 @@ from tests.hostile.small_run import TWO
 
 FILE = "two.toml"
 # A faulty scene is refused alike by whoever reads it: each input asks another command.
-COMMANDS: tuple[tuple[str, ...], ...] = (
-    ("truth", FILE),
-    ("run", FILE, "--out", "out"),
-    ("stability", FILE, "--vary", "speed", "--out", "out"),
-    ("play", FILE),
-    ("speed", FILE, "--out", "out"),
-    ("truth", FILE, "--json"),
-    ("run", "free_fall", FILE),
+COMMANDS = (
+    f"truth {FILE}",
+    f"run {FILE} --out out",
+    f"stability {FILE} --vary speed --out out",
+    f"play {FILE}",
+    f"speed {FILE} --out out",
+    f"truth {FILE} --json",
+    f"run free_fall {FILE}",
 )
 THRUST = "[[thrust]]\ndisk = 0\nstart = 0.0\nstop = 1.0\nforce = [{}, 0.0]\n"
 BOX = "[box]\nlow = [-3.0, -1.0]\nhigh = [3.0, 1.0]\n"
@@ -220,7 +220,7 @@ NO_FILES: dict[str, Callable[[Path], None]] = {
 }
 READERS = cycle(COMMANDS[:4])
 NOT_FILES = [
-    Input(f"{name}, {words[0]}", words, prepare=prepare, says="two.toml: ")
+    Input(f"{name}, {words.split()[0]}", words, prepare=prepare, says="two.toml: ")
     for name, prepare in NO_FILES.items()
     for words in [next(READERS), next(READERS)]
 ]

@@ -16,7 +16,7 @@ from tests.hostile.played import CROSSCHECK
 
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
 MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is
-RUN = ("run", "two.toml", "--engine", "pymunk", "--dt", "0.02", "--workers", "1")
+RUN = "run two.toml --engine pymunk --dt 0.02 --workers 1"
 Prepare = Callable[[Path], dict[str, str]]
 
 
@@ -28,7 +28,7 @@ def finished_run() -> Path:
         atexit.register(shutil.rmtree, place, ignore_errors=True)
         (place / "two.toml").write_text(TWO)
         subprocess.run(
-            [CROSSCHECK, *RUN, "--out", "out"],
+            [CROSSCHECK, *RUN.split(), "--out", "out"],
             cwd=place,
             check=True,
             capture_output=True,
