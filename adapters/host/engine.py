@@ -281,17 +281,14 @@ class PackageEngine(GuestEngine):
         self.expected, self.thrusts = (count, times), sorted(acting, key=lambda row: row.step)
 
     def step(self, count: int = 1) -> None:
-        if self.expected[1] and self.expected[0] == count and not self.forces.any():
-            self.steps += count
-            self.rows = self.next_expected()
+        expected, times = self.expected
+        if not times or expected != count or self.forces.any():
+            if self.ahead:
+                raise ValueError("steps were expected that have been played, and do not come")
+            self.expected = (0, 0)
+            super().step(count)
             return
-        if self.ahead:
-            raise ValueError("steps were expected that have been played, and do not come")
-        self.expected = (0, 0)
-        super().step(count)
-
-    def next_expected(self) -> Array:
-        count, times = self.expected
+        self.steps += count
         if not self.ahead and self.thrown is None:
             argument = {"count": count, "times": times, "thrusts": self.thrusts}
             answer = self.do("ahead", argument, self.limit)
@@ -302,7 +299,7 @@ class PackageEngine(GuestEngine):
             assert self.thrown is not None
             raise refused(self.thrown)
         self.expected = (count, times - 1)
-        return self.ahead.popleft()
+        self.rows = self.ahead.popleft()
 
     def read(self) -> State:
         state, scene = super().read(), self.scene

@@ -11,7 +11,6 @@ import signal
 import subprocess
 import tempfile
 from base64 import b64decode
-from binascii import Error as NotBase64
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -34,10 +33,12 @@ INTRUDED = "wrote into the channel that its answers come by"
 TOO_LARGE = "needs more memory than it may use, and its process was ended"
 LONGEST_ANSWER = 2**28  # bytes of a line: the states of a million disks take less than 2**27
 GRACE = 4.0  # s beyond what the calls of a request may take
-KINDS_OF_FAILURE = (
-    *("error", "timeout", "memory", "crashed", "refused", "diverged"),
-    "unavailable",  # it imports what is not there, or what a guest may not
-    "waited",  # ended by the clock, before it had its processor time
+KINDS_OF_FAILURE = frozenset(
+    {
+        *("error", "timeout", "memory", "crashed", "refused", "diverged"),
+        "unavailable",  # it imports what is not there, or what a guest may not
+        "waited",  # ended by the clock, before it had its processor time
+    }
 )
 Request = tuple[str, Any, float]
 """A command of the driver, its argument, and how long it may take, s."""
@@ -118,9 +119,9 @@ class SolverProcess:
         digest = hashlib.sha256(json.dumps([levels(), self.order]).encode()).hexdigest()
         self.key = os.getpid(), digest
         hello = self.connect()
-        if "failed" in hello:
+        if failure := failure_in(hello.get("failed")):
             self.end()
-            raise failure_in(hello["failed"])
+            raise failure
         self.functions: dict[str, Any] = hello["functions"]
         advance = bool(self.functions.get("advance"))
         self.surface = "engine" if solver.engine else "advance" if advance else "exercise"
@@ -136,7 +137,7 @@ class SolverProcess:
         except BaseException:
             self.end()
             raise
-        if "failed" in hello or is_hello(hello):
+        if fits(hello, {"failed": FAILURE}) or fits(hello, HELLO):
             return hello
         raise self.intruded()
 
@@ -205,11 +206,12 @@ class SolverProcess:
             raise self.intruded()
         results = []
         for (command, _, _), answer in zip(requests, answers):
+            if fits(answer, {"failed": FAILURE}):
+                results.append(failure_in(answer["failed"]))
+                continue
             try:
-                check(isinstance(answer, dict))
-                failed, form = "failed" in answer, FORMS[command]
-                results.append(failure_in(answer["failed"]) if failed else form(answer["done"]))
-            except (TypeError, ValueError, KeyError, OverflowError):
+                results.append(value_of(command, answer["done"]))
+            except (TypeError, ValueError, KeyError):
                 raise self.intruded() from None
         kinds = {result.kind for result in results if isinstance(result, SolverFailed)}
         self.sound &= not {"timeout", "memory", "crashed"} & kinds
@@ -322,111 +324,106 @@ def protection() -> Level:
         return process.level
 
 
-# ---- the types of what a guest answers ----------------------------------------------------------
+# ---- the forms of what a guest answers ----------------------------------------------------------
 
 
-def check(fits: bool) -> None:
-    if not fits:
-        raise TypeError("an answer has another form")
+def fits(value: Any, form: Any) -> bool:
+    """Whether a value of JSON has a form: a type, a set of words, a predicate; [form], a list of
+    any length; (form, form), a list of just these; {name: form}, a table with at least these."""
+    if isinstance(form, type):
+        return type(value) is form  # so that no bool is an int
+    if isinstance(form, frozenset):
+        return type(value) is str and value in form
+    if isinstance(form, list):
+        return type(value) is list and all(fits(item, form[0]) for item in value)
+    if isinstance(form, tuple):
+        return type(value) is list and len(value) == len(form) and all(map(fits, value, form))
+    if isinstance(form, dict):
+        return type(value) is dict and all(fits(value.get(name), form[name]) for name in form)
+    return bool(form(value))
 
 
 def is_number(x: Any) -> bool:
     return type(x) is float or (type(x) is int and abs(x) < 2**1000)  # not longer than a float
 
 
-def is_words(x: Any) -> bool:
-    return isinstance(x, list) and all(isinstance(word, str) for word in x)
+def is_count(x: Any) -> bool:
+    return type(x) is int and 0 <= x < 2**31
 
 
-def rows(value: Any, width: int) -> list[list[float]]:
-    check(isinstance(value, list))
-    for row in value:
-        check(isinstance(row, list) and len(row) == width and all(map(is_number, row)))
-    return [[float(x) for x in row] for row in value]
+def is_call(call: Any) -> bool:
+    names = ("integrate", "collide", "wrap", "step")
+    return type(call) is list and bool(call) and call[0] in names and all(map(is_number, call[1:]))
 
 
-def failure_in(failed: Any) -> SolverFailed:
-    check(isinstance(failed, dict) and failed.get("kind") in KINDS_OF_FAILURE)
-    place = [failed.get("line"), failed.get("column")]
-    check(isinstance(failed.get("what"), str) and all(type(k) is int for k in place))
-    check(all(0 <= k < 2**31 for k in place))
+def is_functions(table: Any) -> bool:
+    others = {"models": optional(str), "replaced": [str]}
+    return fits(table, others) and all(type(table[name]) is bool for name in table.keys() - others)
+
+
+def optional(form: Any) -> Callable[[Any], bool]:
+    return lambda value: value is None or fits(value, form)
+
+
+def row(width: int) -> Callable[[Any], bool]:
+    return lambda value: type(value) is list and len(value) == width and all(map(is_number, value))
+
+
+FAILURE = {"kind": KINDS_OF_FAILURE, "what": str, "line": is_count, "column": is_count}
+HELLO = {
+    "functions": is_functions,
+    "versions": lambda table: type(table) is dict and fits([*table.values()], [str]),
+}
+SETTING = optional(lambda value: type(value) in (str, bool, int, float))
+READINGS = {"readings": is_count, "seconds": is_number, "numbers": str}
+FORMS: dict[str, Any] = {
+    "ask": {
+        **{"states": [[row(12)]], "returned": bool, "strayed": bool, "strange": [str]},
+        **{"kept": [str], "calls": [is_call], "error": optional(FAILURE)},
+    },
+    "accesses": [(frozenset("rw"), int, str, [is_count])],
+    "left": [row(12)],
+    "globals": optional([row(12)]),
+    "contacts": [row(19)],
+    "load": [(str, SETTING, SETTING)],
+    **dict.fromkeys(("play", "ahead", "samples"), READINGS | {"thrown": optional(FAILURE)}),
+}
+
+
+def value_of(command: str, done: Any) -> Any:
+    """Of an answer: with numbers as floats and failures as exceptions; raises `ValueError` for
+    another form."""
+    if command == "step":
+        return float(done) if is_number(done) else 0.0  # s in V8
+    if command not in FORMS:
+        return None
+    if not fits(done, FORMS[command]):
+        raise ValueError("an answer has another form")
+    if command == "ask":
+        return done | {"states": floats(done["states"]), "error": failure_in(done["error"])}
+    if command in ("left", "globals", "contacts"):
+        return floats(done)
+    if "numbers" in done:
+        numbers = np.frombuffer(b64decode(done["numbers"], validate=True))
+        return done | {"numbers": numbers, "thrown": failure_in(done["thrown"])}
+    return done
+
+
+def floats(value: Any) -> Any:
+    """Lists of numbers; None stays."""
+    if type(value) is list:
+        return [floats(item) for item in value]
+    return None if value is None else float(value)
+
+
+def failure_in(failed: Any) -> SolverFailed | None:
+    """What a guest reports, which fits `FAILURE`; None if it is None."""
+    if failed is None:
+        return None
     what = with_hint(failed["what"])
     if failed["kind"] == "waited":
-        return ended_by_clock(what, *place)
-    return SolverFailed(failed["kind"], what, *place)
-
-
-def is_hello(answer: Any) -> bool:
-    functions, versions = answer.get("functions"), answer.get("versions")
-    if not isinstance(functions, dict) or not isinstance(versions, dict):
-        return False
-    models, replaced = functions.get("models"), functions.get("replaced")
-    flags = (value for name, value in functions.items() if name not in ("models", "replaced"))
-    fits = models is None or isinstance(models, str)
-    fits = fits and is_words(replaced) and all(isinstance(flag, bool) for flag in flags)
-    return fits and is_words(list(versions)) and is_words(list(versions.values()))
-
-
-def answer_to_question(done: Any) -> dict[str, Any]:
-    check(isinstance(done, dict) and isinstance(done["states"], list))
-    check(isinstance(done["returned"], bool) and isinstance(done["strayed"], bool))
-    check(is_words(done["strange"]) and is_words(done["kept"]) and isinstance(done["calls"], list))
-    for call in done["calls"]:
-        check(isinstance(call, list) and call[0] in ("integrate", "collide", "wrap", "step"))
-        check(all(map(is_number, call[1:])))
-    error = done["error"]
-    return {
-        **done,
-        "states": [rows(state, 12) for state in done["states"]],
-        "error": None if error is None else failure_in(error),
-    }
-
-
-def readings(done: Any) -> dict[str, Any]:
-    check(isinstance(done, dict) and type(done["readings"]) is int and done["readings"] >= 0)
-    check(is_number(done["seconds"]))
-    try:
-        numbers = np.frombuffer(b64decode(done["numbers"], validate=True))
-    except NotBase64:
-        raise TypeError("no numbers") from None
-    thrown = done["thrown"]
-    return {
-        "readings": done["readings"],
-        "seconds": float(done["seconds"]),
-        "numbers": numbers,
-        "thrown": None if thrown is None else failure_in(thrown),
-    }
-
-
-def accesses(done: Any) -> list[Any]:
-    check(isinstance(done, list))
-    for access in done:
-        kind, sphere, field, lines = access
-        check(kind in ("r", "w") and type(sphere) is int and isinstance(field, str))
-        check(isinstance(lines, list) and all(type(k) is int and k >= 0 for k in lines))
-    return list(done)
-
-
-def settings(done: Any) -> list[Any]:
-    check(isinstance(done, list))
-    for setting in done:
-        name, *values = setting
-        check(isinstance(name, str) and len(values) == 2)
-        check(all(value is None or isinstance(value, (str, bool, int, float)) for value in values))
-    return list(done)
-
-
-FORMS: dict[str, Callable[[Any], Any]] = {
-    "ask": answer_to_question,
-    "accesses": accesses,
-    "left": lambda done: rows(done, 12),
-    "globals": lambda done: None if done is None else rows(done, 12),
-    "contacts": lambda done: rows(done, 19),
-    "load": settings,
-    **dict.fromkeys(("play", "ahead", "samples"), readings),
-    "step": lambda done: float(done) if is_number(done) else 0.0,  # s in V8
-    **dict.fromkeys(("renew", "begin", "trace"), lambda _: None),
-}
+        return ended_by_clock(what, failed["line"], failed["column"])
+    return SolverFailed(failed["kind"], what, failed["line"], failed["column"])
 
 
 def kept_copies(solver: SolverText, kept: Path) -> Path | None:

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.conformance.conform import ask, conform
-from crosscheck2d.adapters.host.engine import row_of_file
+from crosscheck2d.adapters.host.engine import STEP_LIMIT, row_of_file
 from crosscheck2d.adapters.host.process import SolverProcess
 from crosscheck2d.adapters.host.restitution import own_restitution
-from crosscheck2d.adapters.play import play
+from crosscheck2d.adapters.play import play_once
+from crosscheck2d.adapters.run import Run
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.families.exercise import asteroid_field
 from tests.reports.terminal.command_line import crosscheck
@@ -24,22 +25,33 @@ from tests.solvers.mutants import CORRECT, MUTANTS, Mutant
 RIGHT = next(path for path in CORRECT if path.name == "plain.js")
 
 
+def played(path: Path, scene: str, step: int = 0, patience: float = STEP_LIMIT) -> Run:
+    """`step`: of the scene's step sizes, from coarse to fine."""
+    question = scenario(scene)
+    dt = question.dt(question.substeps[step])
+    return play_once(row_of_file(path, patience).make, "x:own", question, dt)
+
+
+def changed(folder: Path, changes: dict[str, str]) -> Path:
+    """The right file with these texts in the place of others."""
+    text = RIGHT.read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "Exercise.js").write_text(text)
+    return folder / "Exercise.js"
+
+
 @pytest.mark.parametrize(
     "name", ["plain.js", "plain.py", pytest.param("arrays.py", marks=pytest.mark.slow)]
 )
 def test_a_file_plays_as_an_engine(name: str):
-    flight = scenario("ship_thrust")
-    runs = {}
-    for row in (row_of_file(RIGHT.parent / name), row_of_file(RIGHT)):
-        engine = row.make()
-        runs[row.summary] = play(engine, "x:own", flight, flight.dt(4))
-        engine.close()
-    first, *others = runs.values()
-
-    assert all(one.status == "ok" for one in runs.values())
-    assert all(
-        abs(one.trajectory.position - first.trajectory.position).max() < 1e-12 for one in others
-    )  # type: ignore[union-attr]
+    runs = [played(RIGHT.parent / file, "ship_thrust") for file in (name, "plain.js")]
+    assert [run.status for run in runs] == ["ok", "ok"]
+    one, right = (run.trajectory for run in runs)
+    assert one is not None
+    assert right is not None
+    assert abs(one.position - right.position).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", ["plain.js", "plain.py"])
@@ -79,13 +91,9 @@ def test_equal_forces_are_sent_once(name: str, monkeypatch: pytest.MonkeyPatch):
     ],
 )
 def test_a_scene_that_the_file_cannot_play_is_refused(scene: str, reason: str):
-    engine = row_of_file(RIGHT).make()
-    question = scenario(scene)
-    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-    engine.close()
-
-    assert played.status == "unsupported"
-    assert reason in played.reason
+    run = played(RIGHT, scene)
+    assert run.status == "unsupported"
+    assert reason in run.reason
 
 
 HALF = {"restitution = 0.9": "restitution = 0.5"}
@@ -125,17 +133,8 @@ UNCLOSED = {"projectObjects();\n}": "projectObjects();"}
 def test_what_a_file_does_is_the_status_of_its_cell(
     tmp_path: Path, changes: dict[str, str], scene: str, status: str, reason: str
 ):
-    text = RIGHT.read_text()
-    for old, new in changes.items():
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "Exercise.js").write_text(text)
-    engine = row_of_file(tmp_path / "Exercise.js", patience=1.0).make()
-    question = scenario(scene)
-    played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
-    engine.close()
-
-    assert (played.status, reason in played.reason) == (status, True), played.reason
+    run = played(changed(tmp_path, changes), scene, step=-1, patience=1.0)
+    assert (run.status, reason in run.reason) == (status, True), run.reason
 
 
 WATCHED = (  # a mutant, and what its collisions would be taken for if they told the file's e
@@ -163,17 +162,13 @@ def test_a_faulty_file_is_played(tmp_path: Path, mutant: Mutant):
     # Every mutant of the catalogue: refused only for a function that it lacks or for its e, and
     # then that is the reason; where it ends in no numbers or throws, what came before can be
     # watched.
-    engine = row_of_file(mutant.write(tmp_path), patience=2.0).make()
-    question = scenario("head_on_equal_e09")
-    played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-    engine.close()
-
+    run = played(mutant.write(tmp_path), "head_on_equal_e09", patience=2.0)
     if (reason := REFUSED.get(Path(mutant.name).stem)) is not None:
-        assert (played.status, reason in played.reason) == ("unsupported", True), played.reason
+        assert (run.status, reason in run.reason) == ("unsupported", True), run.reason
     else:
-        assert played.status in ("ok", "diverged", "error", "timeout"), played.reason
-        assert played.trajectory is not None
-        assert len(played.trajectory) > 0
+        assert run.status in ("ok", "diverged", "error", "timeout"), run.reason
+        assert run.trajectory is not None
+        assert len(run.trajectory) > 0
 
 
 NO_WALLS = "the exercise has no walls"
@@ -184,15 +179,6 @@ FORGETS_NOTHING = {  # its acceleration grows with the number of calls
     "function integrate(": "let steps = 0;\nfunction integrate(",
     "sphere.force.y / sphere.mass * dt": "sphere.force.y / sphere.mass * dt * (1 + steps++)",
 }
-
-
-def changed(folder: Path, changes: dict[str, str]) -> Path:
-    text = RIGHT.read_text()
-    for old, new in changes.items():
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "Exercise.js").write_text(text)
-    return folder / "Exercise.js"
 
 
 @pytest.mark.slow
@@ -245,23 +231,10 @@ def test_only_a_file_that_breaks_the_protocol_is_not_scored(tmp_path: Path, muta
 
 
 def test_a_file_without_collisions_plays_a_lone_disk(tmp_path: Path):
-    text = RIGHT.read_text().replace("function sphereSphere", "function laterSphereSphere")
-    (tmp_path / "Exercise.js").write_text(text)
-    row = row_of_file(tmp_path / "Exercise.js")
-    statuses = {}
-    for name in ("ship_thrust", "head_on_equal_e09"):
-        engine, question = row.make(), scenario(name)
-        played = play(engine, "x:own", question, question.dt(question.substeps[0]))
-        engine.close()
-        statuses[name] = (played.status, played.reason)
-
-    assert statuses == {
-        "ship_thrust": ("ok", ""),
-        "head_on_equal_e09": (
-            "unsupported",
-            "Exercise.js has no function sphereSphereCollisionHandling",
-        ),
-    }
+    file = changed(tmp_path, {"function sphereSphere": "function laterSphereSphere"})
+    runs = [played(file, name) for name in ("ship_thrust", "head_on_equal_e09")]
+    missing = "Exercise.js has no function sphereSphereCollisionHandling"
+    assert [(run.status, run.reason) for run in runs] == [("ok", ""), ("unsupported", missing)]
 
 
 @pytest.mark.parametrize(
@@ -320,13 +293,9 @@ def test_a_file_that_ends_its_process_is_a_crash(tmp_path: Path):
     (tmp_path / "solver.py").write_text(
         text.replace("    sphere.alpha +=", "    import os; os._exit(3)\n    sphere.alpha +=")
     )
-    engine = row_of_file(tmp_path / "solver.py").make()
-    question = scenario("head_on_equal_e09")
-    played = play(engine, "x:own", question, question.dt(question.substeps[-1]))
-    engine.close()
-
-    assert played.status == "crashed"
-    assert "ended its own process (exit status 3)" in played.reason
+    run = played(tmp_path / "solver.py", "head_on_equal_e09", step=-1)
+    assert run.status == "crashed"
+    assert "ended its own process (exit status 3)" in run.reason
 
 
 @pytest.mark.long

@@ -71,6 +71,10 @@ main()
 """
 
 
+BALL = [0.0] * 9 + [1.0, 1.0, 1.0]
+QUESTION = {"spheres": [BALL], "calls": [["integrate", 0, 0.1]], "world": False}
+
+
 def choose_branch(monkeypatch: pytest.MonkeyPatch, branch: str) -> None:
     monkeypatch.setenv("CROSSCHECK_SYSTEM", branch)
     monkeypatch.setattr(system, "KERNEL", branch == "kernel")
@@ -86,16 +90,7 @@ def test_a_class_is_marked_without_what_only_linux_has(tmp_path: Path, platform:
             (group / f"{student} {name}").mkdir(parents=True)
             crlf = given.replace(b"\n", b"\r\n")
             (group / f"{student} {name}" / f"Exercise{name[-3:]}").write_bytes(crlf)
-    words = [
-        "check",
-        str(group),
-        "--format",
-        "csv",
-        "--out",
-        str(tmp_path / "here.csv"),
-        "--seed",
-        "0",
-    ]
+    words = ["check", group, "--format", "csv", "--seed", "0", "--out", tmp_path / "here.csv"]
     here = subprocess.run([CROSSCHECK, *words], capture_output=True, timeout=200)
     code = (ELSEWHERE + MARKED).replace("PLATFORM", platform).replace("CLASS", str(group))
     there = subprocess.run(
@@ -179,10 +174,8 @@ def test_an_endless_function_is_stopped_as_such(
         "def sphereSphereCollisionHandling(a, b):\n    pass\n"
     )
     choose_branch(monkeypatch, system_is)
-    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
-    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
     with SolverProcess(read_solver(file)) as solver:
-        first, again = solver.request([("ask", question, 1.0)] * 2)
+        first, again = solver.request([("ask", QUESTION, 1.0)] * 2)
 
     assert first.kind == "timeout"
     assert str(first) == str(again) == "does not come back within 1 s in one call"
@@ -315,9 +308,7 @@ def test_a_thread_ends_a_solver_that_takes_all_memory(
         "\n\ndef sphereSphereCollisionHandling(a, b):\n    pass\n"
     )
     choose_branch(monkeypatch, "portable")
-    ball = [0.0] * 9 + [1.0, 1.0, 1.0]
-    question = {"spheres": [ball], "calls": [["integrate", 0, 0.1]], "world": False}
     with SolverProcess(read_solver(file)) as solver, pytest.raises(SolverFailed) as failed:
-        solver.do("ask", question, 20.0)
+        solver.do("ask", QUESTION, 20.0)
 
     assert failed.value.kind == "memory"
