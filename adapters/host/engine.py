@@ -53,6 +53,7 @@ BEGIN_LIMIT = 2.0  # s that initScene may take
 # The relative rounding that the probes allow: that of an engine that stores a velocity as the
 # difference of two positions some 1e-4 m apart.
 ROUNDING = 2.0**-36
+ARRAYS = ("position", "velocity", "radius", "angle", "angular_velocity", "walls", "gravity")
 NEEDED = {"integrate": "integrate", "collide": "sphereSphereCollisionHandling"}
 CALLED = {"load": "create", "step": "step", "play": "step or read"}
 
@@ -67,16 +68,10 @@ def scene_message(scene: Scene, dt: float, **more: Any) -> dict[str, Any]:
     return {
         "n": scene.n,
         "dt": dt,
-        "position": scene.position.tolist(),
-        "velocity": scene.velocity.tolist(),
-        "radius": scene.radius.tolist(),
+        **{name: getattr(scene, name).tolist() for name in ARRAYS},
         "mass": plain(scene.mass),
         "inertia": plain(scene.inertia),
-        "angle": scene.angle.tolist(),
-        "angular_velocity": scene.angular_velocity.tolist(),
-        "walls": scene.walls.tolist(),
         "box": box_of(scene.walls),
-        "gravity": scene.gravity.tolist(),
         "restitution": scene.restitution,
         "friction": scene.friction,
         "wrap": None if scene.wrap is None else scene.wrap.tolist(),

@@ -59,17 +59,11 @@ Object.defineProperty(globalThis, "__host", { value: (() => {
     };
   }
   if (typeof atob === "undefined") {
-    const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     globe.atob = (text) => {
-      const parts = [];
-      let bits = 0, held = 0, part = "";
-      for (let k = 0; k < text.length && text[k] !== "="; k++) {
-        bits = (bits << 6) | digits.indexOf(text[k]);
-        held += 6;
-        if (held >= 8) { held -= 8; part += String.fromCharCode((bits >> held) & 255); }
-        if (part.length > 8191) { parts.push(part); part = ""; }
-      }
-      return parts.join("") + part;
+      const bytes = Uint8Array.fromBase64(text);
+      let all = "";
+      for (let k = 0; k < bytes.length; k += 8192) all += String.fromCharCode(...bytes.subarray(k, k + 8192));
+      return all;
     };
   }
 

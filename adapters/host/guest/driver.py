@@ -158,14 +158,13 @@ class Traced(Fields):
     __setitem__ = __setattr__
 
 
+VECTORS = ("position", "velocity", "force")
+SCALARS = ("alpha", "angularVelocity", "torque", "mass", "MoI", "size")
+
+
 def sphere_of(r: Sequence[float]) -> Fields:
-    names = ("alpha", "angularVelocity", "torque", "mass", "MoI", "size")
-    return Fields(
-        position=Fields(x=r[0], y=r[1]),
-        velocity=Fields(x=r[2], y=r[3]),
-        force=Fields(x=r[4], y=r[5]),
-        **dict(zip(names, r[6:])),
-    )
+    vectors = {name: Fields(x=x, y=y) for name, x, y in zip(VECTORS, r[:6:2], r[1:6:2])}
+    return Fields(**vectors, **dict(zip(SCALARS, r[6:])))
 
 
 NAMES = frozenset(vars(sphere_of([0.0] * 12)))
@@ -174,14 +173,12 @@ NAMES = frozenset(vars(sphere_of([0.0] * 12)))
 def row_of(s: Any) -> list[float]:
     # The 12 numbers of a sphere; NaN for a field that is not a number.
     try:
-        vectors = (s.position.x, s.position.y, s.velocity.x, s.velocity.y, s.force.x, s.force.y)
+        numbers = [x for name in VECTORS for v in [getattr(s, name)] for x in (v.x, v.y)]
     except AttributeError:
         raise AttributeError(
             "a sphere is left with a position, velocity or force that has no x and y"
         ) from None
-    return [
-        number(x) for x in (*vectors, s.alpha, s.angularVelocity, s.torque, s.mass, s.MoI, s.size)
-    ]
+    return [*map(number, numbers), *(number(getattr(s, name)) for name in SCALARS)]
 
 
 def number(x: Any) -> float:
