@@ -103,13 +103,9 @@ def note(name: str, here: Path) -> None:
     path.write_text("years of work")
 
 
-def moved(name: str, to: str, here: Path) -> None:
-    (here / name).rename(here / to)
-
-
-def moved_and_linked(name: str, here: Path) -> None:
-    moved(name, "elsewhere", here)
-    (here / name).symlink_to(here / "elsewhere")
+def moved_and_linked(here: Path) -> None:
+    (here / "out").rename(here / "elsewhere")
+    (here / "out").symlink_to(here / "elsewhere")
 
 
 def held(here: Path) -> None:
@@ -140,7 +136,7 @@ OURS = (
         Input(
             f"{what}, {words.split()[1]}",
             words,
-            prepare=copied("out", then=partial(note, f"out/{path}")),
+            prepare=copied(partial(note, f"out/{path}")),
             says="holds",
         )
         for what, path in {
@@ -155,24 +151,16 @@ OURS = (
     Input(
         "a run that is a link to a run",
         AGAIN,
-        prepare=copied("out", then=partial(moved_and_linked, "out")),
+        prepare=copied(moved_and_linked),
         codes=(0,),
         writes=("elsewhere", "out"),
         says="2 cells ended",
     ),
     Input(
-        "a run that another process writes",
-        AGAIN,
-        prepare=copied("out", then=held),
-        says="another crosscheck",
+        "a run that another process writes", AGAIN, prepare=copied(held), says="another crosscheck"
     ),
     *(
-        Input(
-            f"a run that is {what}, {words.split()[0]}",
-            words,
-            prepare=copied("out", then=how),
-            **ends,
-        )
+        Input(f"a run that is {what}, {words.split()[0]}", words, prepare=copied(how), **ends)
         for what, how, words, ends in (
             ("damaged", damaged, AGAIN, {"says": "is damaged"}),
             ("damaged", damaged, REPORT, {"says": "is damaged"}),
@@ -180,7 +168,7 @@ OURS = (
             ("edited", edited, REPORT, {"says": "is not what was written"}),
         )
     ),
-    done("a run again", AGAIN, prepare=copied("out")),
+    done("a run again", AGAIN, prepare=copied()),
     done(
         "a run into a folder that is empty",
         AGAIN,
@@ -194,23 +182,15 @@ OURS = (
         says="holds scenes",
     ),
     Input(
-        "speed into a run",
-        f"{OUT['speed']} out",
-        prepare=copied("out"),
-        says="made by crosscheck run",
+        "speed into a run", f"{OUT['speed']} out", prepare=copied(), says="made by crosscheck run"
     ),
     Input(
         "stability into a run",
         f"{OUT['stability']} out",
-        prepare=copied("out"),
+        prepare=copied(),
         says="made by crosscheck run",
     ),
-    Input(
-        "tune into a run",
-        f"{OUT['tune']} out",
-        prepare=copied("out"),
-        says="made by crosscheck run",
-    ),
+    Input("tune into a run", f"{OUT['tune']} out", prepare=copied(), says="made by crosscheck run"),
     Input(
         "a run into where the current folder is",
         f"{RUN} --out ../here",

@@ -76,13 +76,13 @@ WHOLE = [
     right(
         "report: streams in ASCII",
         "report out",
-        prepare=copied("out"),
+        prepare=copied(),
         environment={"PYTHONIOENCODING": "ascii"},
     ),
     Input(
         "diff: streams in ASCII",
         "diff out out",
-        prepare=copied("out"),
+        prepare=copied(),
         environment={"PYTHONIOENCODING": "ascii"},
         codes=(0,),
     ),

@@ -191,32 +191,16 @@ def linked(to: str, here: Path) -> None:
     (here / FILE).symlink_to(to)
 
 
-def device(path: str, here: Path) -> None:
-    (here / FILE).symlink_to(path)
-
-
-def fifo(here: Path) -> None:
-    os.mkfifo(here / FILE)
-
-
-def folder(here: Path) -> None:
-    (here / FILE).mkdir()
-
-
-def nobody(_: Path) -> None:
-    """There is no file."""
-
-
 NO_FILES: dict[str, Callable[[Path], None]] = {
-    "no file": nobody,
-    "a folder as scene file": folder,
-    "a pipe as scene file": fifo,
+    "no file": lambda _: None,
+    "a folder as scene file": lambda here: (here / FILE).mkdir(),
+    "a pipe as scene file": lambda here: os.mkfifo(here / FILE),
     "a link to nothing": partial(linked, "nothing.toml"),
     "a link to itself": partial(linked, FILE),
     "a link to a folder": partial(linked, "."),
-    "a device without an end": partial(device, "/dev/zero"),
-    "a terminal that is none": partial(device, "/dev/tty"),
-    "a file of the kernel": partial(device, "/proc/self/mem"),
+    "a device without an end": partial(linked, "/dev/zero"),
+    "a terminal that is none": partial(linked, "/dev/tty"),
+    "a file of the kernel": partial(linked, "/proc/self/mem"),
 }
 READERS = cycle(COMMANDS[:4])
 NOT_FILES = [

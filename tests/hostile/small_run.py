@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from tests.hostile.played import CROSSCHECK
@@ -17,7 +16,6 @@ from tests.hostile.played import CROSSCHECK
 TWO = (Path(__file__).parents[1] / "data" / "scenes" / "two.toml").read_text()
 MADE = "CROSSCHECK_HOSTILE_RUN"  # variable that says to the processes of the pool where it is
 RUN = "run two.toml --engine pymunk --dt 0.02 --workers 1"
-Prepare = Callable[[Path], dict[str, str]]
 
 
 def finished_run() -> Path:
@@ -38,21 +36,14 @@ def finished_run() -> Path:
     return Path(os.environ[MADE])
 
 
-def copy(here: Path, *names: str) -> dict[str, str]:
-    for name in names:
-        shutil.copytree(finished_run(), here / name)
-    (here / "two.toml").write_text(TWO)
-    return {}
+def copied(then: Callable[[Path], object] | None = None) -> Callable[[Path], None]:
+    """Sets a copy of the run into a folder, as if it had been made there, with its scene file;
+    then something more."""
 
+    def copy(here: Path) -> None:
+        shutil.copytree(finished_run(), here / "out")
+        (here / "two.toml").write_text(TWO)
+        if then is not None:
+            then(here)
 
-def copied(*names: str, then: Callable[[Path], object] | None = None) -> Prepare:
-    return partial(_copied, names, then)
-
-
-def _copied(
-    names: tuple[str, ...], then: Callable[[Path], object] | None, here: Path
-) -> dict[str, str]:
-    words = copy(here, *names)
-    if then is not None:
-        then(here)
-    return words
+    return copy
