@@ -758,7 +758,7 @@ class PythonGuest:
 system: Any = None  # adapters/system.py, loaded by its path
 
 
-def main(settings: dict[str, Any]) -> None:
+def prepare(settings: dict[str, Any]) -> tuple[queue.SimpleQueue[bytes], int]:
     global system
     requests, answers = os.fdopen(os.dup(0), "rb"), os.dup(1)
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -778,7 +778,7 @@ def main(settings: dict[str, Any]) -> None:
     limit(settings)
     Thread(target=listen, args=(requests, lines), daemon=True).start()
     tell(answers, {"here": True, "can": attempts(settings["secret"])})
-    serve(lines, answers)
+    return lines, answers
 
 
 def serve(lines: queue.SimpleQueue[bytes], answers: int) -> None:
@@ -909,7 +909,7 @@ def tell(answers: int, what: Any) -> None:
 if __name__ == "__main__":
     sys.dont_write_bytecode = True
     try:
-        main(loads(sys.argv[1]))
+        serve(*prepare(loads(sys.argv[1])))
     finally:
         # Without Python's own end: taking down a V8 that was stopped in an endless loop never
         # returns.
