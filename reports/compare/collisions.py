@@ -67,13 +67,17 @@ def on_faces(trajectory: Trajectory, scene: Scene) -> Collisions:
         return collisions
     j = firsts[np.searchsorted(walls, collisions.j)]
     order = np.lexsort((collisions.t, j, collisions.i))
-    near = np.diff(collisions.t[order]) <= SAME * interval(trajectory)
+    t, touched = collisions.t[order], collisions.j[order]
+    near = np.diff(t) <= SAME * interval(trajectory)
     pair = (np.diff(collisions.i[order]) == 0) & (np.diff(j[order]) == 0)
     again = pair & near
-    for k in np.flatnonzero(pair & ~near & (np.diff(collisions.j[order]) != 0)):
-        before, at = collisions.t[order[k : k + 2]]
-        wall = scene.walls[-1 - j[order[k]]]
-        again[k] = slides(trajectory, scene, int(collisions.i[order[k]]), wall, (before, at))
+    # the walls of the surface that are touched at once
+    at_once = np.split(touched, np.flatnonzero(~again) + 1)
+    for k, before, after in zip(np.flatnonzero(~again), at_once, at_once[1:]):
+        if pair[k] and not np.intersect1d(before, after).size:
+            wall = scene.walls[-1 - j[order[k]]]
+            span = (float(t[k]), float(t[k + 1]))
+            again[k] = slides(trajectory, scene, int(collisions.i[order[k]]), wall, span)
     first = np.ones(len(collisions), bool)
     first[order[1:][again]] = False
     return Collisions(
