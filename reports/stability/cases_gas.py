@@ -4,6 +4,7 @@ remembers. The hard-disk gas: Alder & Wainwright, J. Chem. Phys. 31, 459, 1959."
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.random import Generator, default_rng
 from numpy.typing import ArrayLike
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.stability.limits import RARELY, Case
+from crosscheck2d.reports.stability.cases_few import RADIUS, SEEDS, disks, scenario_of
+from crosscheck2d.reports.stability.limits import RARELY, Case, DrivenEngine, played, with_variant
 from crosscheck2d.reports.stability.predicates_gas import (
     ENERGY_DRIFTS,
     GAS_DIVERGES,
@@ -19,8 +21,6 @@ from crosscheck2d.reports.stability.predicates_gas import (
     TEMPERATURES_PART,
     WRONG_GAS,
 )
-from crosscheck2d.reports.stability.scenes import RADIUS, SEEDS, disks, scenario_of
-from crosscheck2d.reports.stability.variants import DrivenEngine, played, with_variant
 from crosscheck2d.scenarios.families.placing import box
 from crosscheck2d.scenarios.model import Array, Collisions, Scenario, Scene, Trajectory, frozen
 
@@ -67,68 +67,29 @@ def maxwell(rng: Generator, mass: Array, speed: float) -> Array:
     return velocity
 
 
-def dense(x: float, run: int) -> Scenario:
-    """Up to which packing does a gas of 100 disks keep its energy over 200 steps?"""
-    return gas(x, run, rows=10, columns=10, steps=200)
-
-
-def coarse(x: float, run: int) -> Scenario:
-    """How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?"""
-    return gas(0.3, run, step=x, steps=300)
-
-
 def long_run(x: float, run: int) -> Scenario:
-    """For how many steps does a gas of 20 disks keep its energy?
-
-    At packing 0.3.
-    """
     return gas(0.3, run, rows=5, columns=4, steps=int(x), every=int(x) // 50)
 
 
 def wrapped_run(x: float, run: int) -> Scenario:
-    """For how many steps does a gas without walls keep its momentum?
-
-    The gas of `long_run` in a box that wraps as the exercise's does: there is no wall that could
-    change the momentum.
-    """
+    # in a box that wraps as the exercise's does: there is no wall that could change the momentum
     boxed = long_run(x, run)
     scene = boxed.scene
     corners = np.stack([scene.walls.min(axis=(0, 1)), scene.walls.max(axis=(0, 1))])
     return replace(boxed, scene=replace(scene, walls=np.zeros((0, 2, 2)), wrap=corners))
 
 
-def heavy_one(x: float, run: int) -> Scenario:
-    """How heavy may one disk of a gas be?
-
-    Among 35 of mass 1.
-    """
-    return gas(0.3, run, mass=np.where(np.arange(36) == 14, x, 1.0))
-
-
 def mixture(x: float, run: int) -> Scenario:
-    """Do light and heavy disks of a gas keep the same temperature?
-
-    Every other disk has mass x.
-    """
     return gas(0.3, run, mass=np.where(np.arange(36) % 2, x, 1.0), steps=2000, every=4)
 
 
-def thermometer(x: float, run: int) -> Scenario:
-    """Does a gas have the speeds, collision rate and wall pressure that the literature gives?
-
-    100 disks, 4000 steps; sampled more often than a disk collides.
-    """
-    return gas(x, run, rows=10, columns=10, steps=4000, every=20)
-
-
 def steps_of_gas(x: float, run: int) -> Scenario:
-    """x = number of steps of 36 disks at packing 0.3, sampled at most fifty times."""
+    # sampled at most fifty times
     every = max(1, int(x) // 50)
     return gas(0.3, run, steps=int(x) // every * every, every=every)
 
 
 def against(first: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The scenario, with another run of the same engine in place of the exact answer."""
     if first.status != "ok" or first.trajectory is None:
         return scenario, first
     instead: Trajectory = first.trajectory
@@ -136,29 +97,20 @@ def against(first: Run, run: Run, scenario: Scenario) -> tuple[Scenario, Run]:
 
 
 def reversed_order(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The same gas with its disks inserted in the opposite order, compared with the gas in its
-    own order."""
     scene = scenario.scene
     fields = {name: getattr(scene, name)[::-1] for name in (*STATE, "radius", "mass", "inertia")}
     run = played(driven, replace(scenario, scene=replace(scene, **fields)))
-    if run.trajectory is not None:
-        run = replace(run, trajectory=renumbered(run.trajectory, scene.n))
+    if run.trajectory is not None:  # disk i is renamed n - 1 - i
+        n, met = scene.n, run.trajectory.collisions
+        i, j = n - 1 - met.i, np.where(met.j < 0, met.j, n - 1 - met.j)
+        low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
+        collisions = Collisions(met.t, frozen(low, np.int64), frozen(high, np.int64), met.impulse)
+        state = {name: getattr(run.trajectory, name)[:, ::-1] for name in STATE}
+        run = replace(run, trajectory=replace(run.trajectory, **state, collisions=collisions))
     return against(played(driven, scenario), run, scenario)
 
 
-def renumbered(played: Trajectory, n: int) -> Trajectory:
-    """The trajectory with disk i renamed n - 1 - i."""
-    met = played.collisions
-    i, j = n - 1 - met.i, np.where(met.j < 0, met.j, n - 1 - met.j)
-    low, high = np.where(j < 0, i, np.minimum(i, j)), np.where(j < 0, j, np.maximum(i, j))
-    collisions = Collisions(met.t, frozen(low, np.int64), frozen(high, np.int64), met.impulse)
-    state = {name: getattr(played, name)[:, ::-1] for name in STATE}
-    return replace(played, **state, collisions=collisions)
-
-
 def restarted(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
-    """The gas stopped half-way, read and loaded into a new engine, compared with the gas played
-    without a stop."""
     whole = played(driven, scenario)
     if whole.status != "ok" or whole.trajectory is None:
         return scenario, whole
@@ -181,118 +133,109 @@ def restarted(driven: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
 
 # at 0.851 the lattice is jammed: 0.85 takes long
 PACKINGS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85)
-COUNTS = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0)
 FAST = (0.01, 0.02, 0.04, 0.07, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 2.0)
 LONG = (1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6)
-HEAVY = (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8)
-MIXED = (1.5, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4)
 # Where a block error is 2 % an exact gas reads 4 of them and 5 % off once in 6000 times (Student's
 # t, 9 degrees), and 16 runs are 112 readings: that would be a limit of what has none.
 BY_CHANCE = 1 / 16
 ITERATIONS = with_variant("fifty_iterations")
 
+seeded = partial(Case, runs=SEEDS)
+long = partial(Case, runs=2, whole=True, quick_values=(1e3, 1e4), refines=False)
+remembered = partial(
+    seeded,
+    scene=steps_of_gas,
+    parameter="steps",
+    values=(10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0),
+    predicate=GAS_DIVERGES,
+    whole=True,
+    quick_values=(10.0, 50.0, 200.0, 1000.0),
+    ratio=1.5,
+)
 GAS = (
-    Case(
+    seeded(
         "dense_gas",
-        dense,
+        "Up to which packing does a gas of 100 disks keep its energy over 200 steps?",
+        lambda x, run: gas(x, run, rows=10, columns=10, steps=200),
         "packing",
         PACKINGS,
         ENERGY_DRIFTS,
-        runs=SEEDS,
         by_chance=RARELY,
         also=ITERATIONS,
         quick_values=PACKINGS[:-1],
         ratio=1.25,
     ),
-    Case(
+    seeded(
         "fast_gas",
-        coarse,
+        "How far may the disks of a gas of packing 0.3 fly in a step, over 300 steps?",
+        lambda x, run: gas(0.3, run, step=x, steps=300),
         "v dt / R",
         FAST,
         ENERGY_DRIFTS,
-        runs=SEEDS,
         by_chance=RARELY,
         quick_values=FAST[:-2],
         ratio=1.1,
     ),
-    *(
-        Case(
-            name,
-            scene,
-            "steps",
-            LONG,
-            predicate,
-            runs=2,
-            whole=True,
-            quick_values=(1e3, 1e4),
-            refines=False,
-            also=also,
-        )
-        for name, scene, predicate, also in (
-            ("long_gas", long_run, ENERGY_DRIFTS, ITERATIONS),
-            ("long_wrapped_gas", wrapped_run, MOMENTUM_DRIFTS, ()),
-        )
-    ),
-    Case(
-        "heavy_in_gas",
-        heavy_one,
-        "m2 / m1",
-        HEAVY,
+    long(
+        "long_gas",
+        "For how many steps does a gas of 20 disks keep its energy?",
+        long_run,
+        "steps",
+        LONG,
         ENERGY_DRIFTS,
-        runs=SEEDS,
+        also=ITERATIONS,
+    ),
+    long(
+        "long_wrapped_gas",
+        "For how many steps does a gas without walls keep its momentum?",
+        wrapped_run,
+        "steps",
+        LONG,
+        MOMENTUM_DRIFTS,
+    ),
+    seeded(
+        "heavy_in_gas",
+        "How heavy may one disk of a gas be?",
+        # among 35 of mass 1
+        lambda x, run: gas(0.3, run, mass=np.where(np.arange(36) == 14, x, 1.0)),
+        "m2 / m1",
+        (1.0, 10.0, 100.0, 1e3, 1e4, 1e6, 1e8),
+        ENERGY_DRIFTS,
         by_chance=RARELY,
         ratio=1.5,
     ),
-    Case(
+    seeded(
         "equipartition",
+        "Do light and heavy disks of a gas keep the same temperature?",
         mixture,
         "m2 / m1",
-        MIXED,
+        (1.5, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4),
         TEMPERATURES_PART,
-        runs=SEEDS,
         refines=False,
         by_chance=BY_CHANCE,
     ),
-    Case(
+    seeded(
         "thermometer",
-        thermometer,
+        "Does a gas have the speeds, collision rate and wall pressure that the literature gives?",
+        # sampled more often than a disk collides
+        lambda x, run: gas(x, run, rows=10, columns=10, steps=4000, every=20),
         "packing",
         (0.2, 0.3, 0.4, 0.5, 0.6),
         WRONG_GAS,
-        runs=SEEDS,
         refines=False,
         by_chance=BY_CHANCE,
         quick_values=(0.2, 0.6),
     ),
-    *(
-        Case(
-            name,
-            steps_of_gas,
-            "steps",
-            COUNTS,
-            GAS_DIVERGES,
-            asks,
-            runs=SEEDS,
-            whole=True,
-            play=play,
-            shown_with=beside,
-            quick_values=(10.0, 50.0, 200.0, 1000.0),
-            ratio=1.5,
-        )
-        for name, play, beside, asks in (
-            (
-                "insertion_order",
-                reversed_order,
-                "in its own order of insertion",
-                "After how many steps does a gas depend on the order in which its disks were"
-                " added?",
-            ),
-            (
-                "restart",
-                restarted,
-                "played through",
-                "After how many steps does a gas that was read and loaded again half-way differ?",
-            ),
-        )
+    remembered(
+        "insertion_order",
+        asks="After how many steps does a gas depend on the order in which its disks were added?",
+        play=reversed_order,
+        shown_with="in its own order of insertion",
+    ),
+    remembered(
+        "restart",
+        asks="After how many steps does a gas that was read and loaded again half-way differ?",
+        play=restarted,
+        shown_with="played through",
     ),
 )

@@ -3,12 +3,14 @@ rest."""
 
 from __future__ import annotations
 
+from functools import partial
 from math import sqrt
 
 import numpy as np
 from numpy.random import default_rng
 from numpy.typing import ArrayLike
 
+from crosscheck2d.reports.stability.cases_few import DT, RADIUS, SEEDS, G, disks, phase, scenario_of
 from crosscheck2d.reports.stability.limits import RARELY, Case
 from crosscheck2d.reports.stability.predicates import (
     BURSTS,
@@ -17,7 +19,6 @@ from crosscheck2d.reports.stability.predicates import (
     STANDS,
     STILL_OVERLAP,
 )
-from crosscheck2d.reports.stability.scenes import DT, RADIUS, SEEDS, G, disks, phase, scenario_of
 from crosscheck2d.scenarios.families.placing import box
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.truth.closed_forms import at_rest
@@ -34,27 +35,13 @@ def column(count: int, mass: ArrayLike = 1.0) -> Scenario:
     return scenario_of(scene, 2.0, DT, truth=lambda t: at_rest(scene, t))
 
 
-def column_of(x: float, _run: int) -> Scenario:
-    """How many disks can stand on each other between two walls?"""
-    return column(int(x))
-
-
-def heavy_on_light(x: float, _run: int) -> Scenario:
-    """How heavy a disk can a disk of mass 1 carry?"""
-    return column(2, [1.0, x])
-
-
 def overlapping(x: float, _run: int) -> Scenario:
-    """Two disks at rest that overlap by x radii, e = 0, 1 s."""
     scene = disks([[-(1 - x / 2) * RADIUS, 0], [(1 - x / 2) * RADIUS, 0]], e=0.0)
     return scenario_of(scene, 1.0, DT)
 
 
 def overfull(x: float, _run: int) -> Scenario:
-    """How full may a box be before it bursts?
-
-    A hundred disks at rest on a lattice, x times its area, e = 0, 1 s.
-    """
+    # a hundred disks at rest on a lattice that cover x times the area of the box
     k = np.arange(100)
     size = np.array([10.5, 9 * sqrt(0.75) + 1])
     lattice = np.stack([k % 10 + 0.5 * (k // 10 % 2) + 0.5, sqrt(0.75) * (k // 10) + 0.5], -1)
@@ -68,10 +55,7 @@ def last_bounce(height: float, e: float) -> float:
 
 
 def dropped(x: float, run: int) -> Scenario:
-    """Up to which e does a ball come to rest when it should?
-
-    It falls from 1 m to 1.1 m, and is sampled for 1.5 times as long as it should bounce.
-    """
+    # sampled for 1.5 times as long as it should bounce
     height = 1.0 + 0.1 * phase(run)
     until = 1.5 * last_bounce(height, 1 - x)
     samples = max(1, int(until / DT / 4))
@@ -80,10 +64,7 @@ def dropped(x: float, run: int) -> Scenario:
 
 
 def pile(x: float, run: int) -> Scenario:
-    """Up to which e does a pile of twelve disks come to rest?
-
-    They fall into a box; the run is four times as long as one of them would bounce alone.
-    """
+    # the run is four times as long as one of the disks would bounce alone
     rng = default_rng(run)
     k = np.arange(12)
     position = np.stack([0.8 * (k % 3) - 0.8, 0.5 + 0.7 * (k // 3)], -1) + rng.uniform(
@@ -94,22 +75,59 @@ def pile(x: float, run: int) -> Scenario:
     return scenario_of(scene, samples * 4 * DT, 4 * DT, 4, seed=run)
 
 
-COUNTS = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0)
-LOADS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e6, 1e8)
 OVERLAPS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99)
-FULL = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5, 2.0)
 INELASTIC = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05)
-EJECTS = "From how deep an overlap on does an engine eject two disks at rest?"
-RECOVERS = "From how deep an overlap are two disks separated within a second?"
+overlap = partial(Case, scene=overlapping, parameter="overlap", values=OVERLAPS, unit="radii")
 STACKS = (
-    Case("column", column_of, "disks", COUNTS, STANDS, whole=True, report="column_of_ten"),
-    Case("heavy_on_light", heavy_on_light, "m2 / m1", LOADS, STANDS),
-    Case("overlap_energy", overlapping, "overlap", OVERLAPS, EJECTED, EJECTS, "radii"),
-    Case("overlap_recovery", overlapping, "overlap", OVERLAPS, STILL_OVERLAP, RECOVERS, "radii"),
-    Case("overfull_box", overfull, "area fraction", FULL, BURSTS, ratio=1.1),
-    Case("ball_comes_to_rest", dropped, "1 - e", INELASTIC, NOT_AT_REST, runs=SEEDS),
+    Case(
+        "column",
+        "How many disks can stand on each other between two walls?",
+        lambda x, _run: column(int(x)),
+        "disks",
+        (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0),
+        STANDS,
+        whole=True,
+        report="column_of_ten",
+    ),
+    Case(
+        "heavy_on_light",
+        "How heavy a disk can a disk of mass 1 carry?",
+        lambda x, _run: column(2, [1.0, x]),
+        "m2 / m1",
+        (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e6, 1e8),
+        STANDS,
+    ),
+    overlap(
+        "overlap_energy",
+        "From how deep an overlap on does an engine eject two disks at rest?",
+        predicate=EJECTED,
+    ),
+    overlap(
+        "overlap_recovery",
+        "From how deep an overlap are two disks separated within a second?",
+        predicate=STILL_OVERLAP,
+    ),
+    Case(
+        "overfull_box",
+        "How full may a box be before it bursts?",
+        overfull,
+        "area fraction",
+        (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.5, 2.0),
+        BURSTS,
+        ratio=1.1,
+    ),
+    Case(
+        "ball_comes_to_rest",
+        "Up to which e does a ball come to rest when it should?",
+        dropped,
+        "1 - e",
+        INELASTIC,
+        NOT_AT_REST,
+        runs=SEEDS,
+    ),
     Case(
         "pile_comes_to_rest",
+        "Up to which e does a pile of twelve disks come to rest?",
         pile,
         "1 - e",
         INELASTIC,

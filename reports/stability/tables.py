@@ -19,8 +19,10 @@ import numpy as np
 from crosscheck2d.adapters.engines import ENGINES, changed
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.stability.cases_few import LEAD, RADIUS, disks, flyby
 from crosscheck2d.reports.stability.cases_gas import gas
 from crosscheck2d.reports.stability.cases_stacks import column
+from crosscheck2d.reports.stability.limits import play_as
 from crosscheck2d.reports.stability.predicates import (
     REFUSED,
     RESTITUTION_OFF,
@@ -29,8 +31,6 @@ from crosscheck2d.reports.stability.predicates import (
     judge,
 )
 from crosscheck2d.reports.stability.predicates_gas import ENERGY_DRIFTS
-from crosscheck2d.reports.stability.scenes import LEAD, RADIUS, disks, flyby
-from crosscheck2d.reports.stability.variants import play_as
 from crosscheck2d.scenarios.model import Array, Scenario
 from crosscheck2d.scenarios.truth.exact import with_oracle
 
@@ -73,7 +73,6 @@ class MapOf:
 
 
 def map_of(name: str, engine: str) -> MapOf:
-    """Play a map's grid on an engine."""
     grid, cells = MAPS[name], []
     for x, y in product(grid.x, grid.y):
         scenarios = [grid.scene(x, y, run) for run in range(grid.runs)]
@@ -85,7 +84,6 @@ def map_of(name: str, engine: str) -> MapOf:
 
 
 def with_iterations(engine: str, scenario: Scenario, count: float) -> Run:
-    """Play with this many iterations, or substeps if the engine has those instead."""
     work = ENGINES[engine].work
     assert work is not None
     make = partial(changed, engine, **{work.setting: int(count)})
@@ -175,8 +173,6 @@ class AtGap(NamedTuple):
 
 @dataclass(frozen=True)
 class LawOf:
-    """The result of an engine at every gap."""
-
     name: str
     engine: str
     gaps: tuple[AtGap, ...]
@@ -184,7 +180,6 @@ class LawOf:
 
 
 def cradle(n: int) -> Touching:
-    """A disk strikes a row of n - 1 disks."""
     row = np.stack([2.0 * np.arange(n) - 2, np.zeros(n)], axis=-1)
     apart = np.stack([np.maximum(0.0, np.arange(n) - 1), np.zeros(n)], axis=-1)
     last, together = np.zeros((n, 2)), np.zeros((n, 2))
@@ -238,7 +233,6 @@ def answers(name: str, gap: float) -> Laws:
 
 
 def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
-    """Play a scene at every gap, and compare with every law."""
     results = []
     for gap in gaps:
         run = play_as(engine, scene_of(TOUCHING[name], gap))

@@ -29,14 +29,20 @@ from crosscheck2d.reports.compare.causes import (
 )
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.explain import Ablations, explained, sufficient_mechanisms
-from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch, Trial
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as
+from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
+    QUICK,
+    DrivenEngine,
+    Limit,
+    LimitSearch,
+    Trial,
+    play_as,
+)
 from crosscheck2d.scenarios.catalogue import scenario
 
 
 @cache
 def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
-    """The limit of an engine, and the search that remembers its failing run."""
     search = LimitSearch(CASES[case], engine, QUICK)
     return search, search.limit()
 
@@ -62,13 +68,10 @@ def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
     ],
 )
 def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, mechanisms: str):
-    """Mechanisms with a closed form or a setting of their own."""
     assert sufficient_mechanisms(*found(case, engine)) == (mechanisms,)
 
 
 def test_an_ablation_without_the_cause_does_not_have_the_limit():
-    """Negative control: neither end-of-step detection alone, nor all of the engine's mechanisms but
-    the threshold."""
     search, limit = found("slow_collision", "box2d:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
@@ -81,8 +84,7 @@ def test_an_ablation_without_the_cause_does_not_have_the_limit():
 
 
 def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.MonkeyPatch):
-    """pymunk with a bug of its own, half of every elasticity, under the name of one that has
-    none."""
+    # pymunk with a bug of its own, half of every elasticity, under the name of one that has none.
 
     def halved() -> Any:
         engine = ENGINES["pymunk:matched"].make()
@@ -99,7 +101,6 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
 
 
 def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does():
-    """Failing anywhere proves nothing of one that fails everywhere: its number has to come out."""
     search, limit = found("dt_wall_to_wall", "pymunk:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
@@ -112,19 +113,15 @@ def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does(
 
 @pytest.mark.parametrize("engine", ["reference:ordered", "event_driven:float64"])
 def test_of_an_engine_whose_mechanisms_nobody_knows_there_is_no_ablation(engine: str):
-    """End-of-step detection explains nothing in an engine that orders its collisions within the
-    step."""
     search = LimitSearch(CASES["overlap_recovery"], engine, QUICK)
     assert sufficient_mechanisms(search, search.limit()) == ()
 
 
 def causes(limits: list[Limit]) -> list[Cause]:
-    """Their causes."""
     return [limit.cause for limit in explained(limits) if limit.cause is not None]
 
 
 def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablation():
-    """And where it speaks of what the ablation has, it stays, and says how it was tested."""
     failing = Trial(10.0, 1, 1, 2.0, 0)
     limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
     [kept, other, untested] = causes(
@@ -148,7 +145,6 @@ def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablatio
 
 @pytest.mark.parametrize("engine", [name for name in MECHANISMS if name in ENGINES])
 def test_every_mechanism_has_words(engine: str):
-    """All of an engine's that the reference has."""
     one = scenario("head_on_equal_e09")
     settings = play_as(engine, replace(one, substeps=(4,))).settings
     names = [
@@ -166,7 +162,6 @@ def test_every_mechanism_has_words(engine: str):
 
 @pytest.mark.parametrize("engine", [*MECHANISMS, "new:plain"])
 def test_every_name_of_a_mechanism_has_words(engine: str):
-    """Whatever engine has it, fetched or new; a name that is none has none."""
     for name in NAMES:
         assert mechanism_words(name, engine)[2:] != ("", "")
     both = by_mechanisms([RESTITUTION, RECYCLING], engine).text

@@ -13,7 +13,15 @@ import pytest
 from crosscheck2d.adapters.engines import changed
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_few import ball, far, on_spring, oscillator
-from crosscheck2d.reports.stability.limits import QUICK, Limit, LimitSearch
+from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
+    QUICK,
+    DrivenEngine,
+    Limit,
+    LimitSearch,
+    play_as,
+    played,
+)
 from crosscheck2d.reports.stability.predicates import apexes
 from crosscheck2d.reports.stability.tables import (
     AT_ONCE,
@@ -24,7 +32,6 @@ from crosscheck2d.reports.stability.tables import (
     law_of,
     named,
 )
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES, DrivenEngine, play_as, played
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 
 PARTNERS = [
@@ -41,12 +48,10 @@ DISCRETE = [
 
 @cache
 def limit(case: str, engine: str) -> Limit:
-    """The limit in the quick form."""
     return LimitSearch(CASES[case], engine, QUICK).limit()
 
 
 def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) -> Limit:
-    """The bracket holds the value; `slack` times further out is still called holding."""
     found = limit(case, engine)
     low, high = sorted((found.works_at, found.fails_at))
     assert low / slack <= value <= high * slack, (
@@ -71,8 +76,8 @@ def assert_fails_at(case: str, engine: str, value: float, slack: float = 1.0) ->
 def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(
     case: str, value: float, engine: str
 ):
-    """v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall; what is
-    passed through is named."""
+    # v dt > 2R between disks head-on, 2R sqrt(1 - (b/2R)2) off centre, R at a thin wall; what is
+    # passed through is named.
     found = assert_fails_at(case, engine, value)
     assert found.failing is not None
     assert ("wall" in found.failing.event) == ("wall" in case)
@@ -83,14 +88,13 @@ def test_a_collision_is_missed_from_where_a_step_may_jump_over_the_approach(
 )
 @pytest.mark.parametrize("case", ["tunnelling_head_on", "tunnelling_thin_wall"])
 def test_nothing_is_missed_by_what_sweeps(case: str, engine: str):
-    """The change that shows it: bullets, which all moving disks are in Box2D 2.3 as matched, and no
-    steps at all. Box2D 3.1 misses a bullet from 27 radii a step on."""
+    # The change that shows it: bullets, which all moving disks are in Box2D 2.3 as matched, and no
+    # steps at all. Box2D 3.1 misses a bullet from 27 radii a step on.
     found = limit(case, engine)
     assert found.verdict == "does not fail" or ("v3" in engine and found.fails_at > 20)
 
 
 def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
-    """Both Box2Ds sweep moving disks against what is static, unasked."""
     assert all(
         limit("tunnelling_thin_wall", partner).verdict == "does not fail" for partner in PARTNERS
     )
@@ -98,8 +102,7 @@ def test_a_wall_is_not_missed_by_what_ships_with_continuous_collision():
 
 @pytest.mark.slow
 def test_only_the_speculative_margin_makes_spurious_collisions():
-    """Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody
-    else."""
+    # Box2D 3.1, within four slops: as shipped 0.02 m, 0.04 of the sum of the radii; nobody else.
     found = {engine: limit("near_miss", engine).verdict for engine in (*DISCRETE, *PARTNERS)}
 
     spurious = {engine for engine, verdict in found.items() if verdict != "does not fail"}
@@ -110,8 +113,6 @@ def test_only_the_speculative_margin_makes_spurious_collisions():
 
 @pytest.mark.parametrize("box", ["box2d", "box2d_v3"])
 def test_the_threshold_is_1_m_per_s_and_goes_with_the_matched_profile(box: str):
-    """Closing slower than that is played as inelastic; a scene of a quarter of the size closes at
-    it."""
     assert_fails_at("slow_collision", f"{box}:shipped", 1.0)
     assert_fails_at("scale_down", f"{box}:shipped", 0.25)
     assert limit("slow_collision", f"{box}:matched").verdict == "does not fail"
@@ -119,15 +120,15 @@ def test_the_threshold_is_1_m_per_s_and_goes_with_the_matched_profile(box: str):
 
 
 def test_the_caps_on_speed_are_2_units_a_step_and_400_m_per_s():
-    """At 4 m/s and 1/60 s they are reached at 30 and at 100 times the size; pymunk has none."""
+    # At 4 m/s and 1/60 s they are reached at 30 and at 100 times the size; pymunk has none.
     assert_fails_at("scale_up", "box2d:shipped", 30.0, slack=1.01)
     assert_fails_at("scale_up", "box2d_v3:shipped", 100.0)
     assert limit("scale_up", "pymunk:shipped").verdict == "does not fail"
 
 
 def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
-    """Matched refuses there; shipped is off by 2 % a little later, and 3.1 turns by atan(w h) a
-    substep besides."""
+    # Matched refuses there; shipped is off by 2 % a little later, and 3.1 turns by atan(w h) a
+    # substep besides.
     assert_fails_at("spin", "box2d:matched", pi / 2)
     assert_fails_at("spin", "box2d_v3:matched", pi / 4)
     assert_fails_at("spin", "box2d:shipped", pi / 2 / 0.98)
@@ -135,18 +136,12 @@ def test_the_caps_on_spin_are_a_quarter_and_an_eighth_of_a_turn_a_step():
 
 
 def apex_drift(scenario: Scenario, played: Trajectory) -> float:
-    """Mean change of a bouncing ball's apex per bounce, from the first bounce to the last, over the
-    height of the drop.
-
-    nan if it does not bounce twice.
-    """
     heights = apexes(scenario, played)[1:]
     return float((heights[-1] - heights[0]) / (len(heights) - 1)) if len(heights) > 1 else np.nan
 
 
 def drift(engine: str | DrivenEngine, x: float, runs: int = 1) -> float:
-    """Gain of height per bounce over |v| dt, of balls dropped from 1.25 m and a little more; x = dt
-    / fall time."""
+    """Gain of height per bounce over |v| dt; x = dt / fall time."""
     found = []
     for scenario in (ball(x, run) for run in range(runs)):
         trajectory = played(
@@ -163,8 +158,8 @@ def drift(engine: str | DrivenEngine, x: float, runs: int = 1) -> float:
 
 
 def test_a_bounce_gains_what_the_order_of_operations_says():
-    """Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt /
-    substeps."""
+    # Closed forms: pymunk 0, Box2D 2.3 +|v| dt; Box2D 3.1 with soft contacts about -|v| dt /
+    # substeps.
     assert abs(drift("pymunk:matched+no_correction", 0.02)) < 1e-9  # rounding of 1000 steps
     # Higher orders in dt: a tenth at this step. Continuous collision takes the ball at the wall,
     # and the gain with it.
@@ -189,8 +184,7 @@ def test_a_bounce_gains_what_the_order_of_operations_says():
 
 @pytest.mark.parametrize("engine", PARTNERS)
 def test_float32_is_off_by_6_percent_at_10_km(engine: str):
-    """At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1
-    %."""
+    # At 1 m/s and 1/240 s, exactly as adding up in float32 is; from 4096 m on it is more than 1 %.
     scenario = far(1e4, 0)
     trajectory = play_as(engine, scenario).trajectory
     x = np.float32(1e4)
@@ -209,7 +203,7 @@ def test_float32_is_off_by_6_percent_at_10_km(engine: str):
 def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(
     engine: str, factor: float
 ):
-    """E / E0 after 400 steps at w dt = 0.05, engine_facts section 5."""
+    # E / E0 after 400 steps at w dt = 0.05, engine_facts section 5.
     trajectory: Trajectory | None = on_spring(DRIVEN_ENGINES[engine], oscillator(0.05, 0))[
         1
     ].trajectory
@@ -229,14 +223,14 @@ def test_a_force_read_off_the_positions_makes_an_oscillator_grow_as_published(
     ],
 )
 def test_it_doubles_where_the_determinant_of_the_map_says(engine: str, gain: float):
-    """1 + (1 - alpha) (w dt)2 a step, over 300 steps; symplectic Euler holds until w dt = 2."""
+    # 1 + (1 - alpha) (w dt)2 a step, over 300 steps; symplectic Euler holds until w dt = 2.
     assert_fails_at("stiff_force", engine, sqrt((2 ** (1 / 300) - 1) / gain))
     assert_fails_at("stiff_force", "reference:exercise", 2.0)
 
 
 def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
-    """e - e2 reaches 0.01 at 1 - e = 0.0101; at e = 0 it is right again, so the limit is not
-    monotone."""
+    # e - e2 reaches 0.01 at 1 - e = 0.0101; at e = 0 it is right again, so the limit is not
+    # monotone.
     assert_fails_at("restitution", "pymunk:shipped", 1 - (1 + sqrt(1 - 0.04)) / 2)
     assert not limit("restitution", "pymunk:shipped").monotone
     assert limit("restitution", "pymunk:matched").verdict == "does not fail"
@@ -244,14 +238,12 @@ def test_a_restitution_of_a_pair_is_e_squared_only_in_pymunk_as_shipped():
 
 @pytest.mark.slow
 def test_a_pair_keeps_its_velocities_up_to_a_mass_ratio_of_1e8():
-    """Alone, no engine has trouble with unequal masses."""
     assert all(
         limit("mass_ratio", engine).verdict == "does not fail" for engine in (*DISCRETE, *PARTNERS)
     )
 
 
 def test_a_wrong_threshold_would_be_noticed():
-    """The negative control: a scene that closes at twice the speed does not fail at 1 m/s."""
     case = CASES["slow_collision"]
     faster = replace(case, scene=lambda x, run: case.scene(2 * x, run))
     found = LimitSearch(faster, "box2d:shipped", QUICK).limit()
@@ -279,13 +271,10 @@ GAPS_TRIED = (0.0, 0.01, 0.1)
 def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(
     scene: str, engine: str, words: tuple
 ):
-    """engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to
-    neither.
-
-    From a gap on that is wider than the way in a step, a thirty-second of a radius, everybody plays
-    pair after pair. Box2D 3.1 holds for touching what is within its margin: four slops, with a unit
-    of 0.3 radii 0.6 % of one.
-    """
+    # engine_facts section 2: sequential impulses end with all contacts at once; Box2D 3.1 keeps to
+    # neither. From a gap on that is wider than the way in a step, a thirty-second of a radius,
+    # everybody plays pair after pair. Box2D 3.1 holds for touching what is within its margin: four
+    # slops, with a unit of 0.3 radii 0.6 % of one.
     found = law_of(scene, engine, GAPS_TRIED)
 
     assert tuple(at.law for at in found.gaps) == words
@@ -295,8 +284,6 @@ def test_touching_disks_are_struck_after_the_law_that_the_engine_is_known_for(
 
 
 def test_the_named_laws_keep_momentum_and_energy_at_every_gap():
-    """Whatever is compared with is at least possible; and a gap that goes to 0 comes to one of the
-    answers there."""
     for name, one in TOUCHING.items():
         for gap in GAPS:
             for velocity in (v for allowed in answers(name, gap).values() for v in allowed):
@@ -307,8 +294,6 @@ def test_the_named_laws_keep_momentum_and_energy_at_every_gap():
 
 
 def test_an_engine_that_keeps_to_no_law_is_not_given_one():
-    """The negative control: an answer in the middle between the two laws, and one that loses a
-    twentieth."""
     laws = answers("touching_break", 0.0)
     pairs, at_once = laws[PAIRS][0], laws[AT_ONCE][0]
 

@@ -15,6 +15,7 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES, UNASKED
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import (
+    DRIVEN_ENGINES,
     FULL,
     NEVER_FAILS,
     QUICK,
@@ -22,7 +23,6 @@ from crosscheck2d.reports.stability.limits import (
     LimitSearch,
     engines_of,
 )
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
 from tests.measured import MEASURED
 from tests.reports.stability.kept_limits import (
     FILE,
@@ -70,12 +70,10 @@ CHANGED = (
 
 @cache
 def quick(case: str, engine: str) -> Limit:
-    """Found here and now in the quick form."""
     return LimitSearch(CASES[case], engine, QUICK).limit()
 
 
 def assert_agrees(row: Kept) -> None:
-    """The quick form's bracket holds the full form's limit: strict both ways."""
     found = quick(row.case, row.engine)
     assert agrees(found, row), (
         f"{found.verdict}, {found.works_at} to {found.fails_at}, for {row}: {CHANGED}"
@@ -83,13 +81,12 @@ def assert_agrees(row: Kept) -> None:
 
 
 def name_of(row: Kept) -> str:
-    """As a test is called."""
     return f"{row.case}-{row.engine}"
 
 
 def some_of(rows: list[Kept]) -> list[Any]:
-    """Every twentieth is for the gate, the others are for the long run; begun where none of them is
-    a gas of a million steps, which takes 8 s."""
+    # Every twentieth is for the gate, the others are for the long run; begun where none of them is
+    # a gas of a million steps, which takes 8 s.
     return [
         pytest.param(row, marks=[] if k % 20 == 15 else [pytest.mark.long])
         for k, row in enumerate(rows)
@@ -98,14 +95,12 @@ def some_of(rows: list[Kept]) -> list[Any]:
 
 @pytest.mark.parametrize("row", SOME, ids=name_of)
 def test_the_quick_form_finds_the_limit_of_the_full_one(row: Kept):
-    """Of the cases that take a tenth of a second."""
     assert_agrees(row)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row", some_of(SEARCHED), ids=name_of)
 def test_the_quick_form_finds_a_limit_of_the_full_one_in_every_case(row: Kept):
-    """The suite's own scenes among them."""
     assert_agrees(row)
 
 
@@ -118,18 +113,14 @@ SEARCHABLE = {
 
 
 def test_every_case_and_every_engine_is_searched():
-    """In the fast or in the long test."""
     assert {row.case for row in (*SOME, *SEARCHED)} == set(CASES)
     assert {row.engine for row in (*SOME, *SEARCHED)} == SEARCHABLE
 
 
 def wrong_ends(row: Kept) -> list[float]:
-    """Where it fails though it is said to work, and works though it is said to fail: there and a
-    hundredth away from the edge.
-
-    The file keeps six digits, and which bounce comes too low may hang on the seventh; a hundredth
-    is the width of a bracket of the full form.
-    """
+    # Where it fails though it is said to work, and works though it is said to fail: there and a
+    # hundredth away from the edge. The file keeps six digits, and which bounce comes too low may
+    # hang on the seventh; a hundredth is the width of a bracket of the full form.
     search = LimitSearch(CASES[row.case], row.engine, QUICK)
     away = FULL.ratio if row.fails_at > row.works_at else 1 / FULL.ratio
     ends = [(row.works_at, True, 1 / away), (row.fails_at, False, away)]
@@ -144,12 +135,10 @@ def wrong_ends(row: Kept) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("row", some_of([row for row in REST if row not in SEARCHED]), ids=name_of)
 def test_a_limit_of_the_full_form_works_and_fails_where_it_says(row: Kept):
-    """All phases of the last value that works and the first one that fails."""
     assert wrong_ends(row) == []
 
 
 def test_an_end_that_has_moved_is_noticed():
-    """The negative control: a limit that is said to lie a twentieth further out, or nearer."""
     row = next(row for row in KEPT if (row.case, row.engine) == ("slow_collision", "box2d:shipped"))
     moved = [
         row._replace(works_at=row.works_at * factor, fails_at=row.fails_at * factor)
@@ -161,7 +150,6 @@ def test_an_end_that_has_moved_is_noticed():
 
 
 def test_every_case_and_engine_is_kept():
-    """None is left out."""
     asked = {
         (name, engine)
         for name, case in CASES.items()
@@ -174,7 +162,6 @@ def test_every_case_and_engine_is_kept():
 
 
 def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
-    """A limit without a sentence on why would be a number to wonder at."""
     for row in KEPT:
         if row.verdict == NEVER_FAILS:
             assert row.reason == ""
@@ -186,12 +173,10 @@ def test_every_limit_has_a_reason_and_an_untested_one_is_called_likely():
 
 @pytest.mark.parametrize("file", [FILE, FILE_OF_FETCHED], ids=lambda file: file.stem)
 def test_the_kept_limits_are_as_they_are_written(file: Path):
-    """Byte for byte, so that an edit by hand leaves a text with a comma in its quotes."""
     assert text_of(rows_of(file)).encode() == file.read_bytes()
 
 
 def test_a_comma_that_is_not_in_quotes_is_refused(tmp_path: Path):
-    """The negative control: read as two fields, the rest of the reason would stand for its test."""
     damaged = tmp_path / "limits.csv"
     text = FILE.read_text("utf-8")
     row = next(k for k, line in enumerate(text.splitlines(), start=1) if '"explicit' in line)
@@ -203,7 +188,6 @@ def test_a_comma_that_is_not_in_quotes_is_refused(tmp_path: Path):
 
 @pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
-    """The negative control: a limit moved by a quarter either way, and one that is gone."""
     row = next(row for row in KEPT if (row.case, row.engine) == ("slow_collision", "box2d:shipped"))
     now = quick(row.case, row.engine)
 
@@ -215,8 +199,8 @@ def test_an_engine_that_fails_earlier_or_later_is_noticed(factor: float):
 
 
 def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
-    """The negative control: the scan as it was once, few heights of the ball and few values, called
-    0.057 a limit."""
+    # The negative control: the scan as it was once, few heights of the ball and few values, called
+    # 0.057 a limit.
     row = next(
         row for row in KEPT if (row.case, row.engine) == ("bounce_drift", "reference:exercise")
     )
@@ -235,12 +219,9 @@ def test_a_scan_that_steps_over_the_first_failures_does_not_agree():
     ],
 )
 def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine: str):
-    """At values, heights and phases that no form has played, the ball comes back wherever it is
-    said to.
-
-    Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 % from
-    0.005 on.
-    """
+    # At values, heights and phases that no form has played, the ball comes back wherever it is said
+    # to. Each of these loses or gains up to |v| dt of height a bounce, 2 dt over the fall time: 1 %
+    # from 0.005 on.
     found = quick("bounce_drift", engine)
     case = CASES["bounce_drift"]
     others = [0.0021, 0.0026, 0.0034, 0.0039, 0.0043, 0.0046]
@@ -254,7 +235,6 @@ def test_a_limit_is_the_first_failure_between_the_values_scanned_as_well(engine:
 
 
 def test_a_limit_that_is_not_the_only_edge_is_marked():
-    """In a table the first failure, and a star."""
     row = next(
         row for row in KEPT if row.case == "slow_collision" and row.engine == "box2d:shipped"
     )

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from crosscheck2d.reports.stability.scenes import EDGE, phase
+from crosscheck2d.reports.stability.cases_few import EDGE, phase
 
 
 def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():
-    """The step's very beginning first; no gap between 32 phases is wider than a sixteenth of a
-    step."""
+    # The step's very beginning first; no gap between 32 phases is wider than a sixteenth of a step.
     phases = [phase(run) for run in range(32)]
 
     assert phases[0] == EDGE

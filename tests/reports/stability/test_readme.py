@@ -23,8 +23,6 @@ FOUND = {(row.case, row.engine): row for row in kept()}
 
 
 def cells_of(text: str, table: int = 0) -> dict[tuple[str, str], str]:
-    """(row, engine:profile) -> what stands there, of the first or second table whose first heading
-    is "fails at"."""
     lines = text.split("| fails at |")[1 + table].split("\n\n")[0].splitlines()
     head, _, *rows = [[cell.strip() for cell in line.strip(" |").split("|")] for line in lines]
     engines = [name.replace("<br>", ":") for name in head]
@@ -39,7 +37,6 @@ CELLS, CELLS_OF_FETCHED = cells_of(TEXT), cells_of(TEXT, 1)
 
 
 def test_a_number_of_the_table_is_the_first_failure_of_the_full_form():
-    """Row and column by their headings, to the digits that are shown."""
     places = [(case, engine) for case in IN_README for engine in VARIANTS]
 
     assert {place: CELLS[IN_README[place[0]], place[1]] for place in places} == {
@@ -48,7 +45,6 @@ def test_a_number_of_the_table_is_the_first_failure_of_the_full_form():
 
 
 def test_the_javascript_engines_have_a_table_of_their_own():
-    """Each of them, as shipped and as matched."""
     found = {(row.case, row.engine): row for row in kept(FILE_OF_FETCHED)}
 
     assert {
@@ -58,13 +54,11 @@ def test_the_javascript_engines_have_a_table_of_their_own():
 
 
 def test_the_table_has_no_other_rows_and_no_other_columns():
-    """Nothing in it that no limit holds."""
     assert {row for row, _ in CELLS} == set(IN_README.values())
     assert {engine for _, engine in CELLS} == set(VARIANTS)
 
 
 def test_a_number_that_is_no_longer_true_is_noticed():
-    """The negative control: one digit of one engine."""
     line = f"| {IN_README['bounce_drift']} |"
     old = CELLS[IN_README["bounce_drift"], VARIANTS[0]]
     wrong = cells_of(TEXT.replace(f"{line} {old} |", f"{line} 0.057 |"))
@@ -75,7 +69,6 @@ def test_a_number_that_is_no_longer_true_is_noticed():
 
 
 def test_the_number_of_phases_behind_a_limit_is_said():
-    """In the words of the page and of README: no limit was found with more."""
     most = max(case.runs for case in CASES.values())
     case = CASES["tunnelling_head_on"]
     page = " ".join(facts(case))
@@ -88,7 +81,6 @@ def test_the_number_of_phases_behind_a_limit_is_said():
 
 
 def test_what_is_said_of_the_two_forms_is_what_they_do():
-    """How many runs, and how close the brackets are."""
     pattern = r"up to (\d+) runs.{0,200}?to\s+(\d+) %.{0,400}?`--full`.{0,200}?to\s+(\d+) %"
     said = re.search(pattern, " ".join(TEXT.split()))
 
@@ -101,5 +93,4 @@ def test_what_is_said_of_the_two_forms_is_what_they_do():
 
 
 def test_what_the_readme_says_is_of_the_full_form():
-    """Its numbers are read off nothing coarser."""
     assert {FOUND[case, engine].form for case in IN_README for engine in VARIANTS} == {"full"}
