@@ -132,7 +132,6 @@ def collided(played: Trajectory, scene: Scene, t: Array) -> Array:
 
 
 def wrong_collisions(scenario: Scenario, played: Trajectory) -> Verdict | None:
-    """A collision is missed or spurious."""
     scenario, true = answered(scenario)
     if true is None:
         return None

@@ -74,7 +74,6 @@ def scenario_of(
 
 
 def stepped(scene: Scene, dt: float, truth: Callable[[Array], Trajectory]) -> Scenario:
-    """A scenario of a few steps, sampled at each of them, with its collision after `LEAD`."""
     return scenario_of(scene, (LEAD + 1 + AFTER) * dt, dt, truth=truth)
 
 

@@ -27,7 +27,6 @@ FLOOR = [[[-4, 0], [4, 0]]]
 
 
 def column(count: int, mass: ArrayLike = 1.0) -> Scenario:
-    """Disks exactly above each other between two walls, 2 s."""
     y = RADIUS + 2 * RADIUS * np.arange(count)
     side, top = 1.05 * RADIUS, y[-1] + 2 * RADIUS
     walls = box([-side, 0], [side, top])

@@ -56,8 +56,7 @@ def find_limits(
     workers: int,
     command: str,
 ) -> NoReturn:
-    """Find the limits of `names`, all cases and maps if there are none, into `out`; exits 0, 1, 2
-    or 130."""
+    """Exits 0, 1, 2 or 130."""
     names, chosen = checked(names, vary), checked_engines(engines)
     added = {name: row_of(name) for name in chosen if name not in ENGINES}
     if files := [name.removesuffix(OWN) for name, row in added.items() if row.exercise]:
@@ -147,8 +146,7 @@ def shortened(value: float) -> float:
 
 
 def checked(names: Sequence[str], vary: Sequence[str]) -> list[str]:
-    """The cases, maps and scenes of touching disks that were asked for, by default all; if a name
-    is wrong, prints one line for each fault and exits 2.
+    """What to do, by default all; if a name is wrong, prints one line for each fault and exits 2.
 
     What can be varied in a scene file is named as FILE.toml:vary; what cannot, and was not asked
     for by name, is left out without a message.
@@ -185,8 +183,6 @@ def checked(names: Sequence[str], vary: Sequence[str]) -> list[str]:
 
 
 def print_limits(console: Console, limits: Sequence[Limit]) -> None:
-    """A row for each case, a column for each engine, and what the marks mean. A scene file is named
-    without its folder."""
     if not limits:
         return
     engines = [name for name in ENGINES if any(limit.engine == name for limit in limits)]

@@ -61,8 +61,8 @@ SAYS_SO = "the engine's message says so"
 
 
 def explained(limits: Sequence[Limit]) -> list[Limit]:
-    """The limits with their causes, each shown where that is possible: by the limit itself, or by
-    the limit of its variant. A search that was lost has none."""
+    """The limits with their final causes, some shown by the limit of a variant. A search that was
+    lost has none."""
     by_name = {(limit.case, limit.engine): limit for limit in limits}
     return [replace(limit, cause=final_cause(limit, by_name)) for limit in limits]
 
@@ -96,8 +96,6 @@ def final_cause(limit: Limit, by_name: Mapping[tuple[str, str], Limit]) -> Cause
 
 
 def predicted(limit: Limit, reason: Reason) -> bool:
-    """Whether the limit that follows from the reason lies in the bracket, or outside by no more
-    than the factor `NEAR`."""
     if reason.predicts is None:
         return False
     low, high = min(limit.works_at, limit.fails_at), max(limit.works_at, limit.fails_at)
@@ -168,19 +166,11 @@ def sufficient_mechanisms(search: LimitSearch, limit: Limit) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Ablations:
-    """A case with the scenarios that fail and work next to a limit, the engine's mechanisms, and
-    the verdict on its failing run.
-
-    Attributes:
-        bad: the first run that failed.
-        good: all runs at the nearest value that works; empty if the engine works nowhere.
-    """
-
     case: Case
-    bad: Scenario
-    good: list[Scenario]
-    mechanisms: list[Mechanism]
-    verdict: Verdict
+    bad: Scenario  # the first run that failed
+    good: list[Scenario]  # all runs at the nearest value that works, if the engine works anywhere
+    mechanisms: list[Mechanism]  # of the engine
+    verdict: Verdict  # on the engine's failing run
 
     @staticmethod
     def of(search: LimitSearch, limit: Limit) -> Ablations | None:
@@ -230,12 +220,10 @@ def finer(scenario: Scenario, times: int = FINER) -> Scenario:
 
 
 def at_home(scenario: Scenario) -> Scenario:
-    """The same scene, moved along x so that its middle is at the origin."""
     return similar(scenario, shift=-float(np.mean(scenario.scene.position[:, 0])))
 
 
 def joined(scenario: Scenario) -> Scenario:
-    """The same scene with walls that touch on one line joined into one."""
     walls, scene = list[Array](), scenario.scene
     lines = np.array([first_on_line(scene.walls, w) for w in range(len(scene.walls))])
     for line in np.unique(lines):

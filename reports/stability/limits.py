@@ -48,7 +48,6 @@ def make_variant(name: str, variant: str) -> Any:
 
 
 def with_variant(variant: str) -> tuple[str, ...]:
-    """The keys in `DRIVEN_ENGINES` of all engines that have this variant."""
     return tuple(f"{name}+{variant}" for name, row in ENGINES.items() if variant in row.variants)
 
 
@@ -84,7 +83,6 @@ def played(driven: DrivenEngine, scenario: Scenario) -> Run:
 
 
 def play_as(engine: str, scenario: Scenario) -> Run:
-    """`played`, by a key of `DRIVEN_ENGINES`, or a row that does not take part."""
     return played(DRIVEN_ENGINES.get(engine) or DrivenEngine(engine, row_of(engine).make), scenario)
 
 

@@ -132,7 +132,6 @@ def in_blocks(series: Array) -> Array:
 
 
 def block_error(blocks: Array) -> float:
-    """The standard error of the mean of (`BLOCKS`,)."""
     return float(blocks.std(ddof=1)) / sqrt(len(blocks))
 
 

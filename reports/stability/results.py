@@ -157,12 +157,10 @@ class StabilityPlan:
         )
 
     def done_before(self, store: Store) -> set[Task]:
-        """The tasks that have a row and ended well."""
         rows = {task: store.get(task.kind, self.key(task)) for task in self.tasks()}
         return {task for task, row in rows.items() if row and row.value["status"] == "ok"}
 
     def carry_out(self, store: Store, progress: Progress) -> None:
-        """Do every task that has no row yet, and write the row of each as it ends."""
         keys, done = {task: self.key(task) for task in self.tasks()}, self.done_before(store)
         header = about(self.command, 0) | {"versions": self.versions, "form": self.form}
         store.put(*HEADER, header | {"tasks": [(key, task) for task, key in keys.items()]})

@@ -63,11 +63,9 @@ class Map(NamedTuple):
 
 @dataclass(frozen=True)
 class MapOf:
-    """A map on one engine: rows (x, y, worst reading, whether a run failed, the id of its verdict,
-    what happened)."""
-
     name: str
     engine: str
+    # x, y, worst reading, whether a run failed, the id of its verdict, what happened
     cells: tuple[tuple[float, float, float, bool, str, str], ...]
     status: str = "ok"
 
@@ -156,19 +154,12 @@ class Touching(NamedTuple):
 
 
 class AtGap(NamedTuple):
-    """The result of an engine at one gap, in radii.
-
-    law: the nearest one, "none" if all are farther off than `NEAR`; off: the distance to it.
-    momentum: its change, over the initial momentum. energy: over the initial energy. velocity: of
-    the disks, over the incoming speed.
-    """
-
-    gap: float
-    law: str
-    off: float = nan
-    momentum: float = nan
-    energy: float = nan
-    velocity: tuple[tuple[float, float], ...] = ()
+    gap: float  # radii
+    law: str  # the nearest, "none" if all are farther off than `NEAR`
+    off: float = nan  # from that law, over the incoming speed
+    momentum: float = nan  # its change, over the initial momentum
+    energy: float = nan  # over the initial energy
+    velocity: tuple[tuple[float, float], ...] = ()  # of the disks, over the incoming speed
 
 
 @dataclass(frozen=True)
@@ -245,7 +236,6 @@ def law_of(name: str, engine: str, gaps: tuple[float, ...] = GAPS) -> LawOf:
 
 
 def named(velocity: Array, gap: float, laws: Laws) -> AtGap:
-    """The law whose velocities are nearest to these (n, 2), in units of the incoming speed."""
     off = {law: min(np.abs(velocity - v).max() for v in vs) for law, vs in laws.items()}
     nearest = min(off, key=lambda law: float(off[law]))
     momentum = float(np.linalg.norm(velocity.sum(axis=0) - [1, 0]))

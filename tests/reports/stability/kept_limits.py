@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Iterable, Sequence
+from functools import cache
 from io import StringIO
 from math import inf, nan
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import NamedTuple
 from crosscheck2d.adapters.engines import FETCHED
 from crosscheck2d.reports.page import style
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.limits import ONLY_BEYOND, Limit, engines_of
+from crosscheck2d.reports.stability.limits import ONLY_BEYOND, QUICK, Limit, LimitSearch, engines_of
 
 DATA = Path(__file__).parents[3] / "tests" / "data"
 FILE = DATA / "stability_limits.csv"
@@ -53,6 +54,17 @@ class Kept(NamedTuple):
     monotone: bool
     reason: str
     tested: str
+
+
+@cache
+def quick_search(case: str, engine: str) -> tuple[LimitSearch, Limit]:
+    """The search for a limit in the quick form, which remembers the failing run, and the limit."""
+    search = LimitSearch(CASES[case], engine, QUICK)
+    return search, search.limit()
+
+
+def quick_limit(case: str, engine: str) -> Limit:
+    return quick_search(case, engine)[1]
 
 
 def kept(file: Path = FILE) -> list[Kept]:
@@ -104,10 +116,10 @@ def reaches(limit: Kept | Limit) -> tuple[float, float]:
     return works, fails
 
 
-def agrees(one: Kept | Limit, other: Kept | Limit) -> bool:
+def agrees(limit: Kept | Limit, kept: Kept | Limit) -> bool:
     """The same verdict, and brackets that meet: what did not fail may fail beyond in the other."""
-    (works, fails), (works_too, fails_too) = reaches(one), reaches(other)
-    backwards = [limit.verdict == ONLY_BEYOND for limit in (one, other)]
+    (works, fails), (works_too, fails_too) = reaches(limit), reaches(kept)
+    backwards = [row.verdict == ONLY_BEYOND for row in (limit, kept)]
     return backwards[0] == backwards[1] and max(works, works_too) <= min(fails, fails_too)
 
 

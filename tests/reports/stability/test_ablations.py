@@ -4,7 +4,6 @@ has the cause, else not."""
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import pytest
@@ -23,7 +22,6 @@ from crosscheck2d.adapters.mechanisms.table import (
 from crosscheck2d.reports.compare.causes import (
     ACTS_AT_END,
     LATE,
-    Cause,
     by_mechanisms,
     mechanism_words,
 )
@@ -39,12 +37,7 @@ from crosscheck2d.reports.stability.limits import (
     play_as,
 )
 from crosscheck2d.scenarios.catalogue import scenario
-
-
-@cache
-def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
-    search = LimitSearch(CASES[case], engine, QUICK)
-    return search, search.limit()
+from tests.reports.stability.kept_limits import quick_search
 
 
 @pytest.mark.parametrize(
@@ -68,11 +61,11 @@ def found(case: str, engine: str) -> tuple[LimitSearch, Limit]:
     ],
 )
 def test_what_is_known_to_be_the_cause_comes_out_alone(case: str, engine: str, mechanisms: str):
-    assert sufficient_mechanisms(*found(case, engine)) == (mechanisms,)
+    assert sufficient_mechanisms(*quick_search(case, engine)) == (mechanisms,)
 
 
 def test_an_ablation_without_the_cause_does_not_have_the_limit():
-    search, limit = found("slow_collision", "box2d:shipped")
+    search, limit = quick_search("slow_collision", "box2d:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
     others = [mechanism for mechanism in ablations.mechanisms if mechanism.name != RESTITUTION]
@@ -101,7 +94,7 @@ def test_a_cause_that_no_mechanism_names_gives_no_ablation(monkeypatch: pytest.M
 
 
 def test_where_an_engine_works_nowhere_an_ablation_must_read_as_much_as_it_does():
-    search, limit = found("dt_wall_to_wall", "pymunk:shipped")
+    search, limit = quick_search("dt_wall_to_wall", "pymunk:shipped")
     ablations = Ablations.of(search, limit)
     assert ablations is not None
     far = replace(ablations, verdict=replace(ablations.verdict, value=3 * ablations.verdict.value))
@@ -117,20 +110,12 @@ def test_of_an_engine_whose_mechanisms_nobody_knows_there_is_no_ablation(engine:
     assert sufficient_mechanisms(search, search.limit()) == ()
 
 
-def causes(limits: list[Limit]) -> list[Cause]:
-    return [limit.cause for limit in explained(limits) if limit.cause is not None]
-
-
 def test_a_written_reason_that_speaks_of_something_else_gives_way_to_the_ablation():
     failing = Trial(10.0, 1, 1, 2.0, 0)
     limit = Limit("column", "pymunk:matched", "quick", "limit", 5.0, 10.0, (failing,))
-    [kept, other, untested] = causes(
-        [
-            replace(limit, mechanisms=(FLIGHT, POSITION_CORRECTION)),
-            replace(limit, mechanisms=(FRICTION,)),
-            limit,
-        ]
-    )
+    mechanisms = (FLIGHT, POSITION_CORRECTION), (FRICTION,), ()
+    limits = explained([replace(limit, mechanisms=names) for names in mechanisms])
+    [kept, other, untested] = [limit.cause for limit in limits]
 
     assert "corrected by a share per step" in kept.text
     assert (

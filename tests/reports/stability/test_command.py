@@ -244,43 +244,6 @@ def test_the_stability_page_and_the_report_point_at_each_other_where_they_are_ma
     assert 'href="../' not in (results / "stability.html").read_text()  # none that leads nowhere
 
 
-def test_every_case_of_the_issue_is_there():
-    wanted = {
-        "tunnelling_head_on",
-        "tunnelling_offset",
-        "tunnelling_thin_wall",
-        "tunnelling_thick_wall",
-        "near_miss",
-        "dt_gas_of_100",
-        "bounce_drift",
-        "slow_collision",
-        "scale_up",
-        "scale_down",
-        "far_from_origin",
-        "dense_gas",
-        "long_gas",
-        "long_wrapped_gas",
-        "mass_ratio",
-        "heavy_on_light",
-        "heavy_in_gas",
-        "column",
-        "overlap_energy",
-        "overlap_recovery",
-        "overfull_box",
-        "pile_comes_to_rest",
-        "ball_comes_to_rest",
-        "grazing",
-        "spin",
-        "stiff_force",
-        "insertion_order",
-        "restart",
-        "thermometer",
-        "equipartition",
-    }
-
-    assert wanted <= set(CASES)
-
-
 def with_threshold(folder: Path) -> Path:
     text = TEMPLATES["javascript"].read_text()
     right = "const impulse = -(1 + world.e)"

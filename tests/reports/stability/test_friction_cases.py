@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from math import pi, sqrt
 
 import numpy as np
@@ -31,25 +30,20 @@ from crosscheck2d.reports.stability.cases_friction import (
 from crosscheck2d.reports.stability.limits import (
     NEVER_FAILS,
     QUICK,
-    Limit,
     LimitSearch,
     engines_of,
     play_as,
 )
 from crosscheck2d.reports.stability.overview import findings
 from crosscheck2d.reports.stability.predicates import judge, truth_of
+from tests.reports.stability.kept_limits import quick_limit
 
 MATCHED = ("pymunk:matched", "box2d:matched", "box2d_v3:matched")
 REFUSE = ("reference:exercise", "reference:lesson")
 
 
-@cache
-def limit(case: str, engine: str) -> Limit:
-    return LimitSearch(CASES[case], engine, QUICK).limit()
-
-
 def bracket(case: str, engine: str) -> tuple[float, float]:
-    low, high = sorted((limit(case, engine).works_at, limit(case, engine).fails_at))
+    low, high = sorted((quick_limit(case, engine).works_at, quick_limit(case, engine).fails_at))
     return low, high
 
 
@@ -78,9 +72,9 @@ def test_friction_without_the_restitution_is_seen_in_box2d_3_1_alone():
     # is off, half of 0.05 radii of overlap; as shipped it never gives enough in every phase.
     low, high = bracket("friction_in_bounce", "box2d_v3:matched")
     assert (1 - 0.025) / 0.9 - 1 < low < high < 1 / 9
-    assert limit("friction_in_bounce", "box2d_v3:shipped").verdict == "never works"
+    assert quick_limit("friction_in_bounce", "box2d_v3:shipped").verdict == "never works"
     for engine in ("pymunk:matched", "box2d:shipped", "box2d:matched", "reference:coulomb"):
-        assert limit("friction_in_bounce", engine).verdict == NEVER_FAILS
+        assert quick_limit("friction_in_bounce", engine).verdict == NEVER_FAILS
 
 
 @pytest.mark.parametrize(("margin", "late"), [(0.02, 4), (0.01, 0)])
@@ -117,7 +111,7 @@ def test_a_product_of_frictions_is_seen_in_pymunk_as_shipped_alone():
     low, high = bracket("strong_friction", "pymunk:shipped")
     assert low < sqrt(0.9 / 1.25 / FALL) < high
     for case in ("critical_slope", "strong_friction"):
-        assert all(limit(case, engine).verdict == NEVER_FAILS for engine in MATCHED)
+        assert all(quick_limit(case, engine).verdict == NEVER_FAILS for engine in MATCHED)
 
 
 @pytest.mark.parametrize(("box", "cap"), [("box2d", pi / 2), ("box2d_v3", pi / 4)])
@@ -127,7 +121,7 @@ def test_the_caps_on_spin_end_rolling_and_spin_in_a_bounce(box: str, cap: float)
     assert low <= cap <= high
     low, high = bracket("slide_to_roll", f"{box}:matched")
     assert low <= 1.5 * cap <= high
-    assert limit("slide_to_roll", "pymunk:matched").verdict == NEVER_FAILS
+    assert quick_limit("slide_to_roll", "pymunk:matched").verdict == NEVER_FAILS
 
 
 def test_a_disk_in_a_corner_creeps_where_each_contact_is_solved_once_a_step():
@@ -145,7 +139,7 @@ def test_a_disk_in_a_corner_creeps_where_each_contact_is_solved_once_a_step():
 def test_what_models_no_friction_refuses_every_case():
     for case in FRICTION:
         for engine in REFUSE:
-            failing = limit(case.name, engine).failing
+            failing = quick_limit(case.name, engine).failing
             assert failing is not None
             assert failing.broken == "refused"
             assert "does not model friction" in failing.event
@@ -166,7 +160,7 @@ def test_who_fails_in_the_fewest_cases_is_said_of_those_with_friction_apart():
     rough, smooth = ("critical_slope", "strong_friction"), ("spin", "scale_down")
     engines = ("reference:exercise", "reference:coulomb", "pymunk:shipped", "box2d:shipped")
     limits = [
-        limit(case, engine)
+        quick_limit(case, engine)
         for case in (*smooth, *rough)
         for engine in engines
         if engine in engines_of(CASES[case])
@@ -187,7 +181,7 @@ def test_who_fails_in_the_fewest_cases_is_said_of_those_with_friction_apart():
 
 def test_the_best_of_the_libraries_is_named_where_a_solver_of_this_project_is_better():
     cases, engines = ("spin", "scale_down"), ("reference:exercise", "box2d:shipped")
-    limits = [limit(case, engine) for case in cases for engine in engines]
+    limits = [quick_limit(case, engine) for case in cases for engine in engines]
     (said,) = (one for one in findings(limits) if "fewest failures" in one)
 
     assert said.endswith("Of the libraries, the fewest are those of box2d:shipped (2).")

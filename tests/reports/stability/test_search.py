@@ -17,11 +17,11 @@ import pytest
 
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.causes import CauseKind
-from crosscheck2d.reports.compare.verdicts import Verdict
+from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.page.replay import pack_layers
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.cases_few import DT, RADIUS, flyby
+from crosscheck2d.reports.stability.cases_few import DT, EDGE, RADIUS, flyby, phase
 from crosscheck2d.reports.stability.cases_gas import gas
 from crosscheck2d.reports.stability.command import csv_row
 from crosscheck2d.reports.stability.explain import explained
@@ -48,42 +48,39 @@ from crosscheck2d.reports.stability.results import (
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 
-
-def abort() -> None:
-    os.abort()
-
-
 SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], restitution=1.0)
+TOO_FAST = Predicate(
+    "too fast",
+    "the speed is above 1",
+    "m/s",
+    1.0,
+    lambda _, played: read(played.velocity[0, 0, 0], 0.5, "it broke"),
+)
 
 
-def read_speed(_: Scenario, played: Trajectory) -> Verdict:
-    return read(played.velocity[0, 0, 0], 0.5, "it broke")
-
-
-TOO_FAST = Predicate("too fast", "the speed is above 1", "m/s", 1.0, read_speed)
+def resting(scenario: Scenario) -> Run:
+    """A run in which nothing changes."""
+    state = scenario.scene.state
+    names = ("position", "velocity", "angle", "angular_velocity")
+    arrays = [np.array([getattr(state, name)] * 2) for name in names]
+    return Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
 
 
 def case(reading: Callable[[float, int], float], values: tuple[float, ...], **more: Any) -> Case:
+    """A case whose runs read what a function of the value and the number of the run gives."""
+
     def scene(x: float, run: int) -> Scenario:
-        return Scenario(
-            "made-up", "?", "", replace(SCENE, velocity=[[reading(x, run), 0]]), 1.0, 1.0, (1,)
-        )
+        moving = replace(SCENE, velocity=[[reading(x, run), 0]])
+        return Scenario("made-up", "?", "", moving, 1.0, 1.0, (1,))
 
     def play(_: DrivenEngine, scenario: Scenario) -> tuple[Scenario, Run]:
-        start = scenario.scene.state
-        arrays = [
-            np.array([a, a])
-            for a in (start.position, start.velocity, start.angle, start.angular_velocity)
-        ]
-        return scenario, Run(
-            "made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays)
-        )
+        return scenario, resting(scenario)
 
     return Case("made-up", "?", scene, "x", values, TOO_FAST, play=play, **more)
 
 
-def limit_of(one: Case, form: Any = FULL) -> Limit:
-    return LimitSearch(one, "reference:exercise", form).limit()
+def limit_of(tried: Case, form: Any = FULL) -> Limit:
+    return LimitSearch(tried, "reference:exercise", form).limit()
 
 
 UP, DOWN = (1.0, 3.0, 10.0, 30.0, 100.0), (100.0, 30.0, 10.0, 3.0, 1.0)
@@ -117,20 +114,6 @@ def test_a_limit_that_is_not_met_is_a_result():
     assert never_works.verdict == "never works"
     assert never_works.fails_at == 1
     assert isnan(never_works.works_at)
-
-
-def test_what_works_again_beyond_a_failure_is_seen():
-    found = limit_of(case(lambda x, _: 2.0 if 5 < x < 20 else 0.5, UP))
-
-    assert not found.monotone
-    assert found.works_at <= 5 <= found.fails_at < 10
-    assert [trial.works for trial in found.trials if trial.value in UP] == [
-        True,
-        True,
-        False,
-        True,
-        True,
-    ]
 
 
 def test_what_works_only_where_it_is_harsh_is_called_so():
@@ -171,17 +154,10 @@ def test_a_number_that_is_none_fails_and_a_run_that_broke_off_fails_with_its_rea
     refused = Run("made", "up", "made-up", 1.0, "unsupported", "no such thing")
     scenario = Scenario("made-up", "?", "", SCENE, 1.0, 1.0, (1,))
 
-    assert limit_of(case(lambda _x, _run: 2.0, UP)).verdict == "never works"
     reading = judge(TOO_FAST, scenario, refused)
     assert (reading.failed, reading.id, reading.text) == (True, "refused", "no such thing")
     nothing = TOO_FAST._replace(read=lambda _scenario, _played: read(float("nan"), 0.0, ""))
-    start = scenario.scene.state
-    arrays = [
-        np.array([a, a])
-        for a in (start.position, start.velocity, start.angle, start.angular_velocity)
-    ]
-    played = Run("made", "up", "made-up", 1.0, trajectory=Trajectory(scenario.times, *arrays))
-    assert judge(nothing, scenario, played).failed
+    assert judge(nothing, scenario, resting(scenario)).failed
 
 
 def test_a_statistic_may_fail_by_chance_in_one_run_of_sixteen_and_not_in_two():
@@ -200,8 +176,10 @@ def test_the_limit_is_the_first_failure_and_what_works_beyond_is_seen_in_both_fo
 
     for found in (quick, full):
         assert found.verdict == "limit"
-        assert found.works_at <= 5 <= found.fails_at
+        assert found.works_at <= 5 <= found.fails_at < 10
         assert not found.monotone
+        works = [trial.works for trial in found.trials if trial.value in UP]
+        assert works == [True, True, False, True, False]
     assert quick.spacing == pytest.approx(3.0)
     assert full.spacing == pytest.approx(sqrt(3.0))
 
@@ -242,7 +220,7 @@ def test_one_phase_alone_would_overlook_the_limit():
 
 def test_a_worker_that_dies_is_a_row_of_the_table():
     task = Task("slow_collision", "pymunk:matched", "quick")
-    [(_, failure)] = run_all({task: abort}, workers=1)
+    [(_, failure)] = run_all({task: os.abort}, workers=1)
     assert isinstance(failure, Failure)
     limit = task.lost(failure)
     assert isinstance(limit, Limit)
@@ -312,19 +290,24 @@ def test_a_run_that_broke_off_is_kept_up_to_there():
     scenario = gas(0.3, 0, rows=3, columns=3, steps=100, every=1)
     whole = play_as("reference:exercise", scenario).trajectory
     assert whole is not None
-    until = replace(
-        whole,
-        t=whole.t[:50],
-        position=whole.position[:50],
-        velocity=whole.velocity[:50],
-        angle=whole.angle[:50],
-        angular_velocity=whole.angular_velocity[:50],
-    )
     shown = np.arange(40, 61)
-    part = part_of(until, shown, scenario)
+    part = part_of(cut(whole, 50), shown, scenario)
     head, _ = head_and_numbers(
         pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown)
     )
 
     assert len(part) == 10
     assert (head["layers"][0]["frames"], head["layers"][0]["ends"]) == (10, f"{part.t[-1]:.4g}")
+
+
+def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():
+    # The step's very beginning first; no gap between 32 phases is wider than a sixteenth of a step.
+    phases = [phase(run) for run in range(32)]
+
+    assert phases[0] == EDGE
+    assert phases[1:8:2] == pytest.approx([0.5, 0.25, 0.75, 0.125], abs=2 * EDGE)
+    assert all(EDGE <= x <= 1 - EDGE for x in phases)
+    assert np.diff(sorted(phases)).max() < 1 / 16 + 2 * EDGE
+    random = phases[2::2]
+    # what is random is no round share of a step
+    assert min(abs(x * 32 - round(x * 32)) for x in random) > 1e-3
