@@ -3,7 +3,6 @@ tests are skipped."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.limits import (
     DRIVEN_ENGINES,
     QUICK,
-    Limit,
     LimitSearch,
     taking_part,
 )
@@ -50,25 +48,13 @@ def test_a_report_of_a_package_names_its_version_and_no_file():
         assert (list(plan.added), list(alone.added)) == (["planck:shipped"], [])
 
 
-def found(cases: Sequence[str], engines: Sequence[str]) -> dict[tuple[str, str], Limit]:
-    added = {name: FETCHED[name] for name in engines}
-    limits = {}
-    for case in cases:
-        for name in engines:
-            limit = Task(case, name, "quick").run(added)
-            assert isinstance(limit, Limit)
-            limits[case, name] = limit
-    return limits
-
-
-KEPT = kept(FILE_OF_FETCHED)
 FAST = ("tunnelling_head_on", "slow_collision", "far_from_origin")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "row",
-    [row for row in KEPT if row.case in FAST],
+    [row for row in kept(FILE_OF_FETCHED) if row.case in FAST],
     ids=lambda row: f"{row.case}-{row.engine}",
 )
 def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
@@ -81,13 +67,14 @@ def test_the_quick_form_finds_the_kept_limit_of_the_full_one(row: Kept):
 @pytest.mark.slow
 def test_what_cuts_a_spin_is_its_limit():
     names = ("planck:shipped", "planck:matched", "rapier2d:shipped", "rapier2d:matched")
-    limits = found(["spin"], names)
+    added = {name: FETCHED[name] for name in names}
+    limits = {name: Task("spin", name, "quick").run(added) for name in names}
     bracket = 1.05  # that of the quick form
     for name, cut in (("planck:shipped", pi / 2), ("rapier2d:shipped", pi / 4)):
-        limit = limits["spin", name]
+        limit = limits[name]
         assert limit.works_at / bracket <= cut / 0.98 <= limit.fails_at * bracket
-    assert limits["spin", "planck:matched"].verdict == "does not fail"
-    assert limits["spin", "rapier2d:matched"].failing.broken == "refused"
+    assert limits["planck:matched"].verdict == "does not fail"
+    assert limits["rapier2d:matched"].failing.broken == "refused"
 
 
 @pytest.mark.slow
