@@ -20,8 +20,7 @@ from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.stability.cases_few import ALONE, COLLISIONS
 from crosscheck2d.reports.stability.cases_friction import FRICTION
-from crosscheck2d.reports.stability.cases_gas import GAS
-from crosscheck2d.reports.stability.cases_stacks import STACKS
+from crosscheck2d.reports.stability.cases_many import GAS, STACKS
 from crosscheck2d.reports.stability.limits import WITH_FRICTION_ONLY, Case
 from crosscheck2d.reports.stability.predicates import Predicate, largest, read, worst_of
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario

@@ -14,6 +14,7 @@ import numpy as np
 
 from crosscheck2d.reports.stability.cases_few import (
     AFTER,
+    DT,
     LEAD,
     RADIUS,
     G,
@@ -21,9 +22,6 @@ from crosscheck2d.reports.stability.cases_few import (
     phase,
     scenario_of,
     stepped,
-)
-from crosscheck2d.reports.stability.cases_few import (
-    DT as REST_DT,
 )
 from crosscheck2d.reports.stability.limits import WITH_FRICTION_ONLY, Case
 from crosscheck2d.reports.stability.predicates import (
@@ -41,7 +39,7 @@ SOLID = 2.0  # m r2 / I
 FALL = 4.0  # m/s, four times the threshold of restitution of both Box2Ds as shipped
 # A step displacement of 0.05 radii: an engine that takes its lever arm to the middle of the overlap
 # is off by half of that at most.
-DT = 0.05 * RADIUS / FALL
+BOUNCE_DT = 0.05 * RADIUS / FALL
 PHASES = 8  # runs at a value, each with the collision elsewhere in its step
 FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
 
@@ -49,7 +47,7 @@ FLOOR = [[[-200.0, 0.0], [200.0, 0.0]]]
 def rough_bounce(
     along: float, run: int, *, spin: float = 0.0, e: float = 0.0, mu: float = 0.1
 ) -> Scenario:
-    height = FALL * DT * (LEAD + phase(run))
+    height = FALL * BOUNCE_DT * (LEAD + phase(run))
     scene = disks(
         [[0.0, RADIUS + height]],
         [[along, -FALL]],
@@ -65,11 +63,11 @@ def rough_bounce(
         collision = (float(legs.start[1]), 0, -1, (1 + e) * FALL)
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped(scene, DT, truth)
+    return stepped(scene, BOUNCE_DT, truth)
 
 
 def spinning_into(x: float, run: int) -> Scenario:
-    start = -2 * RADIUS - FALL * DT * (LEAD + phase(run))
+    start = -2 * RADIUS - FALL * BOUNCE_DT * (LEAD + phase(run))
     scene = disks(
         [[start, 0.0], [0.0, 0.0]],
         [[FALL, 0.0], [0.0, 0.0]],
@@ -84,7 +82,7 @@ def spinning_into(x: float, run: int) -> Scenario:
         collision = (float(legs.start[1]), 0, 1, float(impulse[0]))
         return turning_answer(scene, t, legs.at(t), [collision])
 
-    return stepped(scene, DT, truth)
+    return stepped(scene, BOUNCE_DT, truth)
 
 
 def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenario:
@@ -97,7 +95,7 @@ def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenari
     scene = disks(
         [[0.0, RADIUS]],
         [[speed, 0.0]],
-        walls=[[[-10.0, 0.0], [10.0 + speed * steps * REST_DT, 0.0]]],
+        walls=[[[-10.0, 0.0], [10.0 + speed * steps * DT, 0.0]]],
         gravity=[G * sine, -G * cosine],
         e=0.0,
         friction=friction,
@@ -110,14 +108,14 @@ def on_floor(speed: float, friction: float, slope: float, steps: int) -> Scenari
         place[..., :2] += scene.position
         return turning_answer(scene, t, (place, moves), [(0.0, 0, -1, 0.0)])
 
-    return scenario_of(scene, steps * REST_DT, REST_DT, truth=truth)
+    return scenario_of(scene, steps * DT, DT, truth=truth)
 
 
 def sliding(x: float, run: int) -> Scenario:
     # the runs differ in where within its step the slide ends, by up to one step
-    friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / REST_DT
+    friction, speed = 0.5 * (1 + 0.02 * phase(run)), x * RADIUS / DT
     slides = speed / (3 * friction * G)
-    return on_floor(speed, friction, 0.0, ceil(1.5 * slides / REST_DT) + AFTER)
+    return on_floor(speed, friction, 0.0, ceil(1.5 * slides / DT) + AFTER)
 
 
 def in_corner(x: float, _run: int) -> Scenario:
@@ -125,8 +123,8 @@ def in_corner(x: float, _run: int) -> Scenario:
     walls = [[[-1.0, 0.0], [4.0, 0.0]], [[0.0, -1.0], [0.0, 4.0]]]
     scene = disks([[RADIUS, RADIUS]], walls=walls, gravity=[-3.0, -G], e=0.0, friction=0.5)
     every = max(1, int(x) // 100)
-    duration = int(x) // every * every * REST_DT
-    return scenario_of(scene, duration, every * REST_DT, every, lambda t: at_rest(scene, t))
+    duration = int(x) // every * every * DT
+    return scenario_of(scene, duration, every * DT, every, lambda t: at_rest(scene, t))
 
 
 rough = partial(Case, also=WITH_FRICTION_ONLY)
@@ -153,7 +151,7 @@ FRICTION = (
     rough(
         "spin_in_bounce",
         "How fast may a disk spin that falls onto a floor with friction?",
-        lambda x, run: rough_bounce(0.0, run, spin=x / DT, mu=0.5),
+        lambda x, run: rough_bounce(0.0, run, spin=x / BOUNCE_DT, mu=0.5),
         "w dt",
         (0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0, 6.0, 10.0),
         FRICTION_OFF,

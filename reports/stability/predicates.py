@@ -160,7 +160,8 @@ def spring_grows(_: Scenario, played: Trajectory) -> Verdict:
 
 
 def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
-    heights, scene = apexes(scenario, played), scenario.scene
+    scene, y = scenario.scene, played.position[:, 0, 1] - scenario.scene.radius[0]
+    heights = laws.apexes(y)[1] / y[0]  # of each flight, the drop itself first
     below = played.position[:, 0, 1] < 0
     if len(heights) < 2 or below[-1]:
         at = first_above(played.t, below.astype(float), 0.5)
@@ -174,14 +175,6 @@ def bounce_off(scenario: Scenario, played: Trajectory) -> Verdict:
         f" before; the mean over all bounces is {mean:.3g}"
     )
     return read(np.abs(changes[worst]), first, event)
-
-
-def apexes(scenario: Scenario, played: Trajectory) -> Array:
-    """(k,) the height that a dropped ball reaches in each flight, the drop itself first, over
-    the height of the drop."""
-    y = played.position[:, 0, 1] - scenario.scene.radius[0]
-    heights: Array = laws.apexes(y)[1] / y[0]
-    return heights
 
 
 def friction_off(scenario: Scenario, played: Trajectory) -> Verdict:

@@ -20,8 +20,7 @@ from crosscheck2d.adapters.engines import ENGINES, changed
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.stability.cases_few import LEAD, RADIUS, disks, flyby
-from crosscheck2d.reports.stability.cases_gas import gas
-from crosscheck2d.reports.stability.cases_stacks import column
+from crosscheck2d.reports.stability.cases_many import column, gas
 from crosscheck2d.reports.stability.limits import play_as
 from crosscheck2d.reports.stability.predicates import (
     REFUSED,

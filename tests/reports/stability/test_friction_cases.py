@@ -20,7 +20,7 @@ from crosscheck2d.reports.lessons.lesson import run_of
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_few import phase
 from crosscheck2d.reports.stability.cases_friction import (
-    DT,
+    BOUNCE_DT,
     FALL,
     FRICTION,
     PHASES,
@@ -91,7 +91,7 @@ def test_a_contact_that_is_foreseen_for_a_whole_step_takes_less_friction(margin:
         played = play(on, "reference:ablated", scenario, dt).trajectory
         assert played is not None
         shares.append(-float(np.diff(played.velocity[[0, -1], 0, 0])[0]) / (mu * FALL))
-        gap = phase(run) if margin > FALL * DT * (1 + phase(run)) else 1.0
+        gap = phase(run) if margin > FALL * BOUNCE_DT * (1 + phase(run)) else 1.0
         law.append(1 - 4 * gap if gap < 0.25 else 1.0)
         if margin == 0.02:
             assert shipped.trajectory is not None

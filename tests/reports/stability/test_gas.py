@@ -15,7 +15,7 @@ from crosscheck2d.adapters.pymunk import Pymunk
 from crosscheck2d.reports.compare import laws
 from crosscheck2d.reports.stability import limits
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.stability.cases_gas import RADIUS, gas, wrapped_run
+from crosscheck2d.reports.stability.cases_many import RADIUS, gas, wrapped_run
 from crosscheck2d.reports.stability.limits import QUICK, DrivenEngine, LimitSearch, play_as
 from crosscheck2d.reports.stability.predicates import judge
 from crosscheck2d.reports.stability.predicates_gas import (

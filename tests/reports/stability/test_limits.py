@@ -252,26 +252,18 @@ def cells_of(text: str, table: int = 0) -> dict[tuple[str, str], str]:
 CELLS, CELLS_OF_FETCHED = cells_of(README), cells_of(README, 1)
 
 
-def test_a_number_of_the_table_is_the_first_failure_of_the_full_form():
-    places = [(case, engine) for case in IN_README for engine in VARIANTS]
-
-    assert {place: CELLS[IN_README[place[0]], place[1]] for place in places} == {
-        place: in_words(KEPT_LIMITS[place]) for place in places
-    }
-
-
-def test_the_javascript_engines_have_a_table_of_their_own():
-    found = {(row.case, row.engine): row for row in kept(FILE_OF_FETCHED)}
-
-    assert {
-        (IN_README[case], engine): in_words(row) for (case, engine), row in found.items()
-    } == CELLS_OF_FETCHED
-    assert {engine for _, engine in CELLS_OF_FETCHED} == set(FETCHED)
-
-
-def test_the_table_has_no_other_rows_and_no_other_columns():
-    assert {row for row, _ in CELLS} == set(IN_README.values())
-    assert {engine for _, engine in CELLS} == set(VARIANTS)
+@pytest.mark.parametrize(
+    ("cells", "rows", "engines"),
+    [
+        (CELLS, [KEPT_LIMITS[case, name] for case in IN_README for name in VARIANTS], VARIANTS),
+        (CELLS_OF_FETCHED, kept(FILE_OF_FETCHED), FETCHED),
+    ],
+    ids=["python", "javascript"],
+)
+def test_a_table_of_readme_has_the_first_failures_of_the_full_form(cells, rows, engines):
+    assert cells == {(IN_README[row.case], row.engine): in_words(row) for row in rows}
+    assert {row.engine for row in rows} == set(engines)
+    assert {row.form for row in rows} == {"full"}
 
 
 def test_a_number_that_is_no_longer_true_is_noticed():
@@ -306,7 +298,3 @@ def test_what_is_said_of_the_two_forms_is_what_they_do():
         round(100 * (QUICK.ratio - 1)),
         round(100 * (FULL.ratio - 1)),
     ]
-
-
-def test_what_the_readme_says_is_of_the_full_form():
-    assert {KEPT_LIMITS[case, engine].form for case in IN_README for engine in VARIANTS} == {"full"}

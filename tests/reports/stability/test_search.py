@@ -22,7 +22,7 @@ from crosscheck2d.reports.page.replay import pack_layers
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.cases_few import DT, EDGE, RADIUS, flyby, phase
-from crosscheck2d.reports.stability.cases_gas import gas
+from crosscheck2d.reports.stability.cases_many import gas
 from crosscheck2d.reports.stability.command import csv_row
 from crosscheck2d.reports.stability.explain import explained
 from crosscheck2d.reports.stability.limits import (
