@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.compare.causes import CauseKind
+from crosscheck2d.reports.compare.causes import Cause, CauseKind
 from crosscheck2d.reports.compare.view import cut
 from crosscheck2d.reports.page.replay import pack_layers
 from crosscheck2d.reports.run.pool import Failure, run_all
@@ -47,6 +47,7 @@ from crosscheck2d.reports.stability.results import (
 )
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario, Trajectory
+from tests.reports.stability.kept_limits import quick_limit
 
 SCENE = lay_out(position=[[0, 0]], velocity=[[0, 0]], radius=[1.0], mass=[1.0], restitution=1.0)
 TOO_FAST = Predicate(
@@ -204,10 +205,8 @@ def test_a_value_is_left_at_its_first_failure_but_at_the_limit_all_is_played():
 
     assert failing is not None
     assert (failing.runs, failing.failed, failing.first, failing.left) == (16, 15, 1, False)
-    assert [(trial.runs, trial.left) for trial in found.trials if trial.value == 100.0] == [
-        (2, True)
-    ]
-    assert [trial.runs for trial in found.trials if trial.value == 1.0] == [4]
+    played = {trial.value: (trial.runs, trial.left) for trial in found.trials}
+    assert (played[1.0], played[100.0]) == ((4, False), (2, True))
 
 
 def test_one_phase_alone_would_overlook_the_limit():
@@ -231,31 +230,26 @@ def test_a_worker_that_dies_is_a_row_of_the_table():
 
 
 def test_a_limit_comes_back_from_its_row_as_it_was():
-    for found in (
-        limit_of(case(lambda x, _: x / 17, UP)),
-        limit_of(case(lambda _x, _run: 2.0, UP)),
-    ):
+    fails = limit_of(case(lambda _x, _run: 2.0, UP))
+    cause = Cause(CauseKind.SETTING, "friction 0", shown="works with it")
+    for found in (limit_of(case(lambda x, _: x / 17, UP)), replace(fails, cause=cause)):
         again = RESULTS["limit"].validate_python(json.loads(json.dumps(asdict(found))))
         assert repr(again) == repr(found)
 
 
 def test_a_reason_is_tested_by_the_run_itself_or_called_likely():
-    slow = LimitSearch(CASES["tunnelling_head_on"], "box2d_v3:matched", QUICK).limit()
-    free = LimitSearch(CASES["tunnelling_head_on"], "box2d_v3:matched+bullets", QUICK).limit()
+    slow = quick_limit("tunnelling_head_on", "box2d_v3:matched")
+    free = quick_limit("tunnelling_head_on", "box2d_v3:matched+bullets")
     elsewhere = replace(slow, works_at=3.9, fails_at=4.0)
-    [both, _], [alone], [wrong, _] = (
-        explained([slow, free]),
-        explained([slow]),
-        explained([elsewhere, slow]),
-    )
+    limits = [explained(pair)[0] for pair in ([slow, free], [slow], [elsewhere, slow])]
 
-    assert [limit.cause and limit.cause.shown for limit in (both, alone, wrong)] == [
+    assert [limit.cause and limit.cause.shown for limit in limits] == [
         "predicts 2; box2d_v3:matched+bullets gets farther",
         "predicts 2",
         "",
     ]
-    assert {limit.cause and limit.cause.kind for limit in (both, alone, wrong)} == {CauseKind.LAW}
-    assert csv_row(wrong)["reason"].startswith("likely: ")
+    assert {limit.cause and limit.cause.kind for limit in limits} == {CauseKind.LAW}
+    assert csv_row(limits[2])["reason"].startswith("likely: ")
 
 
 def test_of_a_failing_run_only_what_is_shown_is_kept():
@@ -270,7 +264,7 @@ def test_of_a_failing_run_only_what_is_shown_is_kept():
     )
     shown = near(failing, scenario)
     part = part_of(whole, shown, scenario)
-    head, _ = head_and_numbers(with_replay(search, found).replay)
+    head = head_of(with_replay(search, found).replay)
 
     assert len(part) == len(shown) == BEFORE + AFTER + 1
     assert 0 < len(part.collisions) < len(whole.collisions) / 10
@@ -280,10 +274,9 @@ def test_of_a_failing_run_only_what_is_shown_is_kept():
     assert with_replay(search, replace(found, trials=())).replay == ""
 
 
-def head_and_numbers(pack: str) -> tuple[Any, bytes]:
+def head_of(pack: str) -> Any:
     whole = zlib.decompress(base64.b64decode(pack))
-    size = int.from_bytes(whole[:4], "little")
-    return json.loads(whole[4 : 4 + size]), whole[4 + size :]
+    return json.loads(whole[4 : 4 + int.from_bytes(whole[:4], "little")])
 
 
 def test_a_run_that_broke_off_is_kept_up_to_there():
@@ -292,12 +285,11 @@ def test_a_run_that_broke_off_is_kept_up_to_there():
     assert whole is not None
     shown = np.arange(40, 61)
     part = part_of(cut(whole, 50), shown, scenario)
-    head, _ = head_and_numbers(
-        pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown)
-    )
+    pack = pack_layers(scenario, [(Run("made", "up", "gas", 1.0), part)], shown)
+    [layer] = head_of(pack)["layers"]
 
     assert len(part) == 10
-    assert (head["layers"][0]["frames"], head["layers"][0]["ends"]) == (10, f"{part.t[-1]:.4g}")
+    assert (layer["frames"], layer["ends"]) == (10, f"{part.t[-1]:.4g}")
 
 
 def test_phases_are_spread_evenly_and_drawn_and_fewer_are_the_first_of_more():
