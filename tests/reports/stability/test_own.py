@@ -239,7 +239,7 @@ def test_a_ghost_collision_is_named_and_gone_on_one_wall(engine: str):
 def test_the_reason_of_a_ghost_collision_is_the_walls_that_meet(engine: str):
     with taking_part({engine: FETCHED[engine]} if engine in FETCHED else {}):
         cause = final_cause(search_in(PIECES, "dt", engine))
-    assert cause.text == f"a ghost collision: {JOIN}"
+    assert cause.text.endswith(JOIN)
     assert cause.shown == "works on a floor of one wall"
 
 
