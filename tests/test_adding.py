@@ -236,7 +236,7 @@ from crosscheck2d.reports.lessons.pages import lesson_page
 from crosscheck2d.reports.page.style import PALETTE, look, mark_of_file
 from crosscheck2d.reports.run.cells import versions
 from crosscheck2d.reports.speed.budget import budget_of
-from crosscheck2d.reports.stability.variants import DRIVEN_ENGINES
+from crosscheck2d.reports.stability.limits import DRIVEN_ENGINES
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 found = conform("toy:plain", ENGINES["toy:plain"])
 sys.argv[1:] = ["toy"]
