@@ -9,8 +9,7 @@ def main() -> None:
     from crosscheck2d.adapters.safe_path import keep_path_safe
 
     keep_path_safe()  # before anything else is imported
-    from crosscheck2d.reports.terminal.exits import ends_on_signals, refuse
-    from crosscheck2d.reports.terminal.streams import printing
+    from crosscheck2d.reports.terminal.exits import ends_on_signals, printing, refuse
 
     with ends_on_signals(), printing():
         if sys.flags.optimize > 1:

@@ -62,7 +62,6 @@ def show_difference(before: Path, after: Path) -> NoReturn:
 
 
 def by_engine(changed: Difference) -> list[list[str]]:
-    """A row for each engine: changed statuses and numbers, and the factor of its time."""
     timings = {timing.engine: timing for timing in changed.timings}
     changes = *changed.statuses, *changed.numbers
     engines = [*changed.same, *(change.engine for change in changes)]
@@ -82,13 +81,11 @@ def by_engine(changed: Difference) -> list[list[str]]:
 
 
 def in_words(change: Change) -> str:
-    """A change in a line."""
     values = f"{change.before or 'nan'} → {change.after or 'nan'}"
     return f"{change.verdict}: {change.engine}, {change.what}: {values}"
 
 
 def said_of(timing: Timing | None) -> str:
-    """The factor, its interval, and the verdict."""
     if timing is None:
         return ""
     if timing.high == inf:
@@ -98,8 +95,7 @@ def said_of(timing: Timing | None) -> str:
 
 
 def severity(change: Change) -> tuple[bool, bool, bool, float]:
-    """The sort key of the list: worse changes first, rounding last, then statuses first, then by
-    size."""
+    # worse changes first, rounding last, then statuses first, then by size
     return (
         change.verdict != "worse",
         change.verdict == ROUNDING,
@@ -109,7 +105,6 @@ def severity(change: Change) -> tuple[bool, bool, bool, float]:
 
 
 def sentence(changed: Difference) -> str:
-    """The summary in a sentence."""
     said = f"{counted(changed.worse, 'result') if changed.worse else 'Nothing'} got worse."
     if not changed.timings:
         return f"{said} No times were compared: run both on one machine that is idle."

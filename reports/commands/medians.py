@@ -84,7 +84,6 @@ def pool(scenes: Sequence[SceneScores], name: str, column: Column) -> list[float
 
 
 def median_text(pooled: Sequence[float], failure: str) -> str:
-    """A median as text."""
     if not pooled:
         return "–"
     median = float(np.median(pooled))
@@ -98,6 +97,5 @@ def numbers_of_scenes(counts: Sequence[int]) -> str:
 
 
 def heading(column: Column) -> str:
-    """The title of a column above its unit, in lines short enough for 80 columns."""
     title = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
     return f"{title}\n{column.unit}"

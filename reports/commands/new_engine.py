@@ -60,8 +60,6 @@ BOXES = ("canvas.width canvas.height", "WIDTH HEIGHT", "width height", "W H")
 
 
 def write_engine(path: Path, hints: Hints = Hints()) -> None:  # noqa: B008 - a tuple
-    """Write an engine that works, in the language given by the suffix; with hints one around a
-    ball code."""
     kind = kind_of(path)
     if hints == Hints():
         write_new(path, TEMPLATES[kind].read_text(encoding="utf-8"), ENGINE)
@@ -143,7 +141,6 @@ def call(name: str, on: list[str], rest: list[str]) -> str:
 
 
 def code_in(source: Path | None, kind: str) -> str | None:
-    """The code in a file; exits 2 if it cannot be read."""
     if source is None:
         return None
     try:
@@ -156,12 +153,10 @@ def code_in(source: Path | None, kind: str) -> str | None:
 
 
 def write_solver(path: Path) -> None:
-    """Write the skeleton of the exercise."""
     write_new(path, EXERCISES[kind_of(path)].read_text(encoding="utf-8"), SOLVER)
 
 
 def kind_of(path: Path) -> str:
-    """The language of a file to write; exits 2 for a name that cannot be one."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         refuse([f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file"])
@@ -171,7 +166,6 @@ def kind_of(path: Path) -> str:
 
 
 def write_new(path: Path, text: str, done: str) -> None:
-    """Write a file, and print what to do next; exits 2 if it cannot be written or exists."""
     name = shlex.quote(str(path))
     try:
         with path.open("x", encoding="utf-8") as file:

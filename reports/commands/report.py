@@ -23,9 +23,8 @@ from crosscheck2d.reports.run.arguments import (
     opening,
     started_where,
 )
-from crosscheck2d.reports.run.plan import Means
 from crosscheck2d.reports.run.results import COMMAND, RunResults
-from crosscheck2d.reports.run.suite import take_timings
+from crosscheck2d.reports.run.suite import Means, take_timings
 from crosscheck2d.reports.run.timing_pass import cells_to_time
 from crosscheck2d.reports.terminal.console import Console
 from crosscheck2d.reports.terminal.counts import counted
@@ -88,8 +87,6 @@ def time_again(results: RunResults, seconds: float, progress: Progress) -> RunRe
 
 
 def print_summary(report: Report, page: str) -> None:
-    """Print the medians over the scenarios at their middle step, the findings, and the path of the
-    page."""
     console = Console()
     of_kind: dict[bool, list[SceneScores]] = {False: [], True: []}
     for scene in report.summary.scenes:
@@ -110,7 +107,6 @@ def print_summary(report: Report, page: str) -> None:
 
 
 def title_of(scenes: int, rough: bool = False) -> str:
-    """The title of the summary; `rough`: of scenes with friction."""
     kind = " with friction" if rough else ""
     if scenes == 1:
         return f"Largest error in the scene{kind}, at its middle step size; lower is better"
@@ -121,8 +117,6 @@ def title_of(scenes: int, rough: bool = False) -> str:
 
 
 def notes(report: Report) -> list[str]:
-    """A sentence for each scene whose thrusts start or stop inside a step, or whose disks are fast
-    for their step."""
     found = [
         (scene.name, note)
         for scene in report.summary.scenes
@@ -132,7 +126,6 @@ def notes(report: Report) -> list[str]:
 
 
 def statuses(report: Report) -> str:
-    """The number of cells of each status, and whether all have ended."""
     counts = report.runs.status.value_counts()
     said = ", ".join(f"{counts[status]} {status}" for status in STATUSES if status in counts)
     ended = counted(len(report.runs), "cell")
@@ -142,7 +135,6 @@ def statuses(report: Report) -> str:
 
 
 def times(report: Report) -> str:
-    """When the times were taken before this run, and how to take them again; or ""."""
     taken, again = report.results.timing.get("taken", ""), take_times(report.results.folder)
     if not taken:
         return f"No times were taken. To take them: {again}"
@@ -152,7 +144,6 @@ def times(report: Report) -> str:
 
 
 def failures(report: Report, out: Path) -> str:
-    """How to play the first cell that failed again, beside the run in `out`; "" if none did."""
     runs = report.runs[~report.runs.status.isin(["ok", "unsupported"])]
     if runs.empty:
         return ""

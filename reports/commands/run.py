@@ -17,11 +17,10 @@ from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, of_main_job, opening
 from crosscheck2d.reports.run.bits import kept_bits, write_bits
 from crosscheck2d.reports.run.cluster import NoScheduler, connect
-from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.pool import LEAST_MEMORY, affordable
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.run.suite import OtherVersions, carry_out
+from crosscheck2d.reports.run.suite import Means, OtherVersions, RunPlan, carry_out
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
@@ -98,7 +97,6 @@ def means_of(workers: int, timeout: float, memory: int, scheduler: str) -> Means
 
 
 def what_is_kept(store: Store) -> str:
-    """A sentence on what an interrupted run has left, and how to continue."""
     try:
         ended = len(RunResults.read(store).records)
     except ValueError:

@@ -61,7 +61,6 @@ def show_truth(
 def print_answer(
     scenario: Scenario, record: TruthRecord, every: bool, at: float | None, as_json: bool
 ) -> None:
-    """Print the record, or where each disk is `at` s, as JSON or as text."""
     state = None if at is None else state_at(scenario, record, at)
     if as_json:
         written = as_plain(scenario, record) | ({"state": state} if state else {})
@@ -79,7 +78,6 @@ def print_answer(
 
 
 def state_at(scenario: Scenario, record: TruthRecord, at: float) -> dict[str, Any]:
-    """Where each disk is at `at` s, within the horizon, and how it moves."""
     t = np.array([at])
     if record.method == CLOSED_FORM:
         assert scenario.truth is not None
@@ -123,7 +121,6 @@ def as_plain(scenario: Scenario, record: TruthRecord) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """The value in a form that strict JSON can hold: numbers that are not finite as text."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -147,7 +144,6 @@ def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
 
 
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
-    """Print the record as text."""
     console = Console()
     duration = scenario.duration
     whole = record.horizon >= duration
@@ -185,12 +181,10 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
 
 
 def seconds(t: float) -> str:
-    """A time with its unit."""
     return f"{number(t, 6)} s"
 
 
 def precision(record: TruthRecord) -> str:
-    """The precision and method of the record."""
     if record.bits == 53:
         return "float64"
     return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (
@@ -199,8 +193,6 @@ def precision(record: TruthRecord) -> str:
 
 
 def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
-    """The headings, then the collisions, or the first and the last ten; without the column of
-    angles if it is empty."""
     rows = [list(HEADINGS)]
     for t, i, j, impulse, cosine in record.events.tolist():
         force = f"{impulse:.6g}" if impulse else "comes to rest"
@@ -215,5 +207,4 @@ def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:
 
 
 def name(j: float) -> str:
-    """The other side of a collision."""
     return f"disk {int(j)}" if j >= 0 else f"wall {-1 - int(j)}"

@@ -56,8 +56,7 @@ def opening(out: Path, command: str, fresh: bool = False, there: bool = False) -
 
 
 def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:
-    """The requested scenes without duplicates; exits 2 with every fault of every scene, one line
-    each."""
+    """The scenes without duplicates; exits 2 with every fault of every scene, one line each."""
     scenes = list(dict.fromkeys(scenes))
     faults: list[str] = []
     names: dict[str, str] = {}
@@ -160,8 +159,6 @@ def faults_of_packages(rows: Iterable[str]) -> list[str]:
 
 
 def faults_of_version(library: LibraryAtVersion) -> list[str]:
-    """Fetches another version of a library, if it is not there; returns why it cannot be
-    played."""
     try:
         if not library.recorded:
             with Progress() as progress:
@@ -188,7 +185,6 @@ def started_where(folder: str) -> Iterator[None]:
 
 
 def faults_of_file(file: Path) -> list[str]:
-    """Why a file cannot be used as an engine."""
     if ":" in str(file):
         return [f"{file}: has a colon in its path, which separates engine and profile; rename it"]
     try:
@@ -199,7 +195,6 @@ def faults_of_file(file: Path) -> list[str]:
 
 
 def unknown_engine(name: str, known: Collection[str]) -> str:
-    """A sentence that an engine is unknown, or that it has no such versions."""
     names = {*known, *(row.split(":")[0] for row in known)}
     engine, at, _ = name.partition("@")
     if not at or (engine not in names and Path(engine).suffix.lower() not in KINDS):
@@ -214,7 +209,6 @@ def unknown_engine(name: str, known: Collection[str]) -> str:
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """A sentence that a name is unknown, with the most similar known names."""
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else "see: crosscheck list"
     return f"{kind} {name!r} is not known; {hint}"

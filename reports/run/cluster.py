@@ -50,18 +50,15 @@ class Cluster:
 
     @property
     def busy(self) -> bool:
-        """Whether a task has not ended."""
         return bool(self.under_way)
 
     def begin(self, key: Any, packed: bytes) -> None:
-        """Give a pickled task to the cluster."""
         future = self.executor.submit(in_thread, packed, *self.limits, key in self.alone)
         self.under_way[future] = key, packed
         future.add_done_callback(self.done.put)
 
     def ended(self) -> list[tuple[Any, bytes, Any]]:
-        """Key, pickled task and outcome of the tasks that have ended; raises `NoScheduler` if the
-        cluster has gone."""
+        """Key, pickled task and outcome of the tasks that have ended; raises `NoScheduler`."""
         outcomes: list[tuple[Any, bytes, Any]] = []
         while True:
             try:
@@ -97,8 +94,6 @@ def in_thread(packed: bytes, timeout: float, memory: int, alone: bool) -> bytes 
 
 
 def connect(scheduler: str) -> Any:
-    """A client of a dask scheduler that has workers; raises `NoScheduler` naming what is
-    missing."""
     if not re.fullmatch(r"(tcp|tls)://.+:\d+", scheduler):
         raise NoScheduler(
             f"--scheduler {scheduler}: is no address; one is like tcp://192.168.0.7:8786"

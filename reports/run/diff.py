@@ -74,8 +74,6 @@ class Timing(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """ "worse" or "better" if the change is both certain (the interval excludes 1) and large
-        (more than `FACTOR`), else "same"."""
         if self.low > 1 and self.factor > FACTOR:
             return "worse"
         return "better" if self.high < 1 and self.factor < 1 / FACTOR else "same"
@@ -107,7 +105,6 @@ class Difference:
 
     @property
     def worse(self) -> int:
-        """How many things got worse."""
         verdicts = [one.verdict for one in (*self.statuses, *self.numbers)] + [
             one.verdict for one in self.timings
         ]
@@ -153,7 +150,7 @@ def difference(before: Path, after: Path) -> Difference:
 
 
 def warnings_of(one: RunResults, other: RunResults) -> tuple[list[str], bool]:
-    """Warnings about machines, versions and completeness; and whether the machine is the same."""
+    """What may differ beside the engines; and whether the machine is the same."""
     before, after = one.header, other.header
     said = [
         f"differs in machine: {key}: {before['machine'][key]} before, {after['machine'][key]} after"
@@ -174,7 +171,6 @@ def warnings_of(one: RunResults, other: RunResults) -> tuple[list[str], bool]:
 
 
 def sentence_on_rest(folder: Path, rest: Cells) -> str:
-    """A sentence on the cells that only the run in `folder` has."""
     engines = list(dict.fromkeys(name[1] for name in rest))
     scenes = list(dict.fromkeys(name[0] for name in rest))
     names = [
@@ -185,7 +181,6 @@ def sentence_on_rest(folder: Path, rest: Cells) -> str:
 
 
 def by_name(results: RunResults) -> Cells:
-    """(scenario, `engine:profile` as the table has it, dt in s) -> the record of the cell."""
     return {
         (r["scenario"], encoded(f"{r['engine']}:{r['profile']}").decode(), r["dt_s"]): r
         for r in results.records
@@ -204,7 +199,6 @@ def edited_scenes(before: Cells, after: Cells) -> list[str]:
 
 
 def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> list[Change]:
-    """The cells of both runs that ended differently; in an edited scene none is worse."""
     changes = []
     for (scenario, engine, dt), cell in before.items():
         other = after.get((scenario, engine, dt))
@@ -240,7 +234,7 @@ def changed_judgement(
 
 
 def table_of(results: RunResults) -> pd.DataFrame:
-    """deviations.csv with all values as text: equal text means equal bits. Raises `Unusable`."""
+    """deviations.csv with all values as text: equal text means equal bits."""
     table = pd.read_csv(BytesIO(joined(results.tables())), dtype=str, keep_default_na=False)
     if list(table.columns) != list(COLUMNS):
         raise Unusable(
@@ -296,8 +290,6 @@ def changed_numbers(
 
 
 def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
-    """Whether two values differ by no more than the rounding of the engines' numbers explains; see
-    `ROUNDINGS`."""
     if not (math.isfinite(was) and math.isfinite(now)):
         return False
     bound = max(DIVERGED, *(ROUNDINGS * rounding_of(name) for name in engines))
@@ -305,7 +297,6 @@ def is_rounding(engines: Sequence[str], was: float, now: float) -> bool:
 
 
 def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
-    """Whether a number got better or worse, by the row of its metric."""
     better = METRICS[metric].better if metric in METRICS else ""
     if ":" in versus or better in ("", "as stated"):
         return "other"
@@ -316,14 +307,11 @@ def verdict_of(metric: str, versus: str, was: float, now: float) -> str:
 
 
 def ratio(was: float, now: float) -> float:
-    """The factor, 1 or more, by which a number grew or shrank; `inf` where it is undefined."""
     small, large = sorted((abs(was), abs(now)))
     return large / small if small > 0 and math.isfinite(large) else math.inf
 
 
 def timings_of(one: RunResults, other: RunResults, before: Cells, after: Cells) -> list[Timing]:
-    """The ratio after : before of every engine, over the cells that were timed in both runs, round
-    by round."""
     ratios: dict[str, list[float]] = {}
     least: dict[str, list[float]] = {}
     for name in before.keys() & after.keys():

@@ -81,8 +81,7 @@ _parent: Connection | None = None
 
 
 def leave(parts: Sequence[Any]) -> None:
-    """Append bytes to the trail of this task, which survives the process. Does nothing outside a
-    worker."""
+    """Append bytes to the trail of this task, which survives the process."""
     if _trail is not None:
         with suppress(OSError):  # if the trail cannot be written, the engine is not at fault
             os.write(_trail, b"".join(parts))
@@ -125,8 +124,7 @@ def serve(connection: Connection, folder: str, memory: int, fresh: bool) -> None
 
 
 def carried_out(packed: bytes, memory: int) -> tuple[bytes, bool]:
-    """The pickled result of a task, or its pickled `Failure`; and whether the process is still
-    usable."""
+    """The pickled result of a task, or `Failure`; and whether the process is still usable."""
     doing = "the worker cannot read its task: "
     try:
         task = pickle.loads(packed)
@@ -145,8 +143,6 @@ def carried_out(packed: bytes, memory: int) -> tuple[bytes, bool]:
 
 
 def out_of_memory(memory: int) -> Failure:
-    """The failure of a task that took more than `memory` bytes, or with 0 more than the machine
-    has."""
     limit = f"more than {memory / 1e6:.0f} MB (--memory)" if memory else "more than there is"
     return Failure("error", f"MemoryError: took {limit}", outside=True)
 
@@ -155,7 +151,6 @@ def out_of_memory(memory: int) -> Failure:
 
 
 def start_process(connection: Connection, folder: str, memory: int) -> Any:
-    """Start a worker at the other end of a connection."""
     fresh = CONTEXT.get_start_method() == "spawn"
     if fresh:  # finds nothing in the folder in which the command was started
         os.environ["PYTHONSAFEPATH"] = "1"
@@ -168,7 +163,6 @@ class Worker:
     """A process, its pipe, and a folder with its output and the trail of its task."""
 
     def __init__(self, memory: int) -> None:
-        """Start the process; `memory` in bytes, 0: no limit. Raises `OSError`."""
         self.memory, self.limit, self.begun = memory, STARTING, False
         self.key: Any = None  # of its task
         self.folder = Path(tempfile.mkdtemp(prefix="crosscheck-"))
@@ -187,7 +181,6 @@ class Worker:
 
     @property
     def idle(self) -> bool:
-        """Whether it can take a task."""
         return self.key is None and self.process.exitcode is None
 
     def begin(self, key: Any, packed: bytes, timeout: float) -> None:
@@ -220,7 +213,6 @@ class Worker:
         return RUNNING
 
     def death(self) -> Any:
-        """How it died."""
         self.process.join()
         code = self.process.exitcode
         if code in OUTSIDE:
@@ -257,14 +249,12 @@ class Worker:
         return place + (f'; it had printed "{lines[-1].strip()[:200]}"' if lines else "")
 
     def kill(self) -> None:
-        """End the process, and what it has started."""
         if not system.KERNEL and self.process.pid is not None:
             system.end_all(self.process.pid)
         self.process.kill()
         self.process.join()
 
     def close(self) -> None:
-        """End the process and delete its folder."""
         self.kill()
         self.connection.close()
         shutil.rmtree(self.folder, ignore_errors=True)
@@ -282,12 +272,10 @@ class Pool:
 
     @property
     def busy(self) -> list[Worker]:
-        """The workers that have a task."""
         return [worker for worker in self.workers if worker.key is not None]
 
     @property
     def has_room(self) -> bool:
-        """Whether it can begin a task."""
         return len(self.busy) < self.most
 
     def begin(self, key: Any, packed: bytes) -> None:
@@ -299,7 +287,6 @@ class Pool:
         worker.begin((key, packed), packed, self.timeout)
 
     def start(self) -> Worker:
-        """One more worker."""
         try:
             worker = Worker(self.memory)
         except OSError as fault:
@@ -308,7 +295,6 @@ class Pool:
         return worker
 
     def close(self, worker: Worker) -> None:
-        """End a worker."""
         worker.close()
         self.workers.remove(worker)
 
@@ -329,7 +315,6 @@ class Pool:
         return outcomes
 
     def close_all(self) -> None:
-        """End all workers."""
         for worker in self.workers:
             worker.process.kill()
         for worker in [*self.workers]:
@@ -398,7 +383,6 @@ def run_all(
 
 
 def result_of(outcome: Any) -> Any | Failure:
-    """The result of a task that has ended, or its `Failure`."""
     if outcome is LOST:
         why = f"its worker was killed {ATTEMPTS} times: by the system for want of memory?"
         return Failure("crashed", why, outside=True)

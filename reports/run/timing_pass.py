@@ -84,7 +84,6 @@ class CellToTime(NamedTuple):
 
     @property
     def is_slow(self) -> bool:
-        """Whether its part took longer than `SLOW` as played."""
         return self.seconds * self.part.duration / self.scenario.duration > SLOW
 
     @property
@@ -119,7 +118,6 @@ def cells_to_time(results: RunResults, engines: Mapping[str, EngineRow]) -> list
 
 
 def timed_scenes(played: Sequence[str]) -> list[str]:
-    """The played scenes of `SCENES`, then others in order, up to the number of `SCENES`."""
     known = [scene for scene in SCENES if scene in played]
     return [*known, *(scene for scene in played if scene not in SCENES)][: len(SCENES)]
 
@@ -160,7 +158,6 @@ def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[d
 
 
 def line_of(key: tuple[Any, ...], cost: list[float], wrapping: list[float]) -> dict[str, Any]:
-    """The line for the costs of one key."""
     if key[0] == "timing":
         _, cell, copy, until = key
         return {"timing": cell, "copy": copy, "timed_s": until, "cost": cost, "wrapping": wrapping}
@@ -180,7 +177,6 @@ def overheads_of(cells: Sequence[CellToTime]) -> list[Timed]:
 
 
 def can(timed: Timed) -> bool:
-    """Whether it runs; an engine may refuse a world in which nothing moves."""
     with suppress(Exception):
         timed.run()
         return True
@@ -188,12 +184,10 @@ def can(timed: Timed) -> bool:
 
 
 def is_busy(results: RunResults) -> bool:
-    """Whether other work kept the machine so busy that times are not shown."""
     return noise_floor(results).floor > BUSY
 
 
 def timings(results: RunResults) -> pd.DataFrame:
-    """timings.csv with `COLUMNS`: a row for each timed cell."""
     rows: list[tuple[Any, ...]] = []
     scenarios: dict[str, Scenario] = {}
     for record in results.records:
@@ -231,11 +225,9 @@ def binding(results: RunResults, name: str, scenario: Scenario, substeps: int) -
 
 
 def median_of(costs: Sequence[float] | None) -> float:
-    """The median; nan if there are no costs."""
     return float(np.median(costs)) if costs else np.nan
 
 
 def noise_floor(results: RunResults) -> Noise:
-    """The ratios of the two timings of a cell, over all cells timed twice."""
     pairs = [lines for lines in results.timings.values() if {0, 1} <= lines.keys()]
     return noise_of([median_of(pair[1]["cost"]) / median_of(pair[0]["cost"]) for pair in pairs])

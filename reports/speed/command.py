@@ -14,7 +14,7 @@ from crosscheck2d.adapters.engines import ENGINES, OWN, row_of
 from crosscheck2d.reports.compare.pareto import ACCURACIES, said_of_cheaper
 from crosscheck2d.reports.compare.pooling import said_of_pool
 from crosscheck2d.reports.run.arguments import checked_engines, checked_scenes, opening
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.made import digest_of
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.speed import figures

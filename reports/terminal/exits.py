@@ -1,8 +1,9 @@
-"""How a command ends: its exit status, its messages on standard error, and its reaction to
-signals."""
+"""How a command prints and ends: its exit status, its messages on standard error, streams that may
+be closed or full, and signals."""
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import signal
@@ -10,8 +11,9 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from errno import EPIPE
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from crosscheck2d.reports.terminal.foreign_text import legible
 
@@ -35,7 +37,6 @@ class Signals:
         self.status = DONE
 
     def __call__(self, number: int, _: object) -> NoReturn:
-        """Stop the command."""
         self.status = self.status or STATUS[signal.Signals(number)]
         raise KeyboardInterrupt
 
@@ -98,6 +99,58 @@ def keeping(out: Path, kept: Callable[[], str]) -> Iterator[None]:
         sys.exit(BAD_INPUT)
 
 
+class Outlet(io.FileIO):
+    """A file descriptor whose writes never fail: after the first `fault` data is dropped, so that
+    the work goes on."""
+
+    fault: OSError | None = None
+
+    def write(self, data: Any) -> int | None:  # type: ignore[override]
+        if self.fault is None:
+            try:
+                return super().write(data)
+            except OSError as fault:
+                self.fault = fault
+        return memoryview(data).nbytes
+
+
+@contextmanager
+def printing() -> Iterator[None]:
+    """Context in which printing cannot end a command: characters that a stream lacks are escaped.
+
+    Exits 1 with a message if standard output failed; a failure of standard error cannot be
+    reported.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:  # closed: else the next file would get its number, and be printed into
+            os.set_inheritable(os.open(os.devnull, os.O_RDONLY), True)
+    outlets = []
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        before, outlet = getattr(sys, name), Outlet(number, "w", closefd=False)
+        stream = io.TextIOWrapper(
+            io.BufferedWriter(outlet),
+            encoding=before.encoding if before is not None else "utf-8",
+            errors="backslashreplace",
+            line_buffering=number == 2 or outlet.isatty(),
+        )
+        setattr(sys, name, stream)
+        outlets.append(outlet)
+    try:
+        yield
+    except SystemExit as end:
+        sys.stdout.flush()
+        fault = outlets[0].fault
+        if fault is None or fault.errno == EPIPE:  # as of `crosscheck list | head`
+            raise
+        say(
+            f"cannot write to standard output: {fault.strerror}; not all was printed, but every"
+            " file is written"
+        )
+        sys.exit(FAILED if end.code in (None, DONE) else end.code)
+
+
 def refuse(faults: Sequence[str]) -> NoReturn:
     """Print the faults, one line each, and exit 2."""
     for fault in faults:
@@ -106,14 +159,12 @@ def refuse(faults: Sequence[str]) -> NoReturn:
 
 
 def say(line: str) -> None:
-    """One line on standard error; on a terminal it is folded between words."""
+    """One line on standard error. On a terminal it is folded between words; a longer word, as a
+    path, stays whole."""
     text = legible(line)
     if sys.stderr.isatty():
-        width = shutil.get_terminal_size().columns
-        text = "\n".join(folded(part, width) for part in text.split("\n"))
+        fold = textwrap.TextWrapper(
+            shutil.get_terminal_size().columns, break_long_words=False, break_on_hyphens=False
+        )
+        text = "\n".join(map(fold.fill, text.split("\n")))
     print(text, file=sys.stderr)
-
-
-def folded(line: str, width: int) -> str:
-    """The line in lines of at most so many columns; a longer word, as a path, stays whole."""
-    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)

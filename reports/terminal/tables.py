@@ -57,7 +57,6 @@ def print_table(
 
 
 def width_of(cell: str | Text) -> int:
-    """Columns of the widest line of a cell."""
     text = cell.plain if isinstance(cell, Text) else legible(cell)
     return max(map(cell_len, text.split("\n")))
 
@@ -91,7 +90,6 @@ def print_texts(console: Console, texts: Mapping[str, str | Text], title: str = 
 
 
 def print_list(console: Console, sentences: Iterable[str]) -> None:
-    """Print a list with an item for each sentence."""
     table = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences:
         table.add_row("-", sentence)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import suite
-from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading, writing
+from crosscheck2d.reports.run.suite import Means, RunPlan
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.rows import Rows
 

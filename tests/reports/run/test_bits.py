@@ -12,11 +12,10 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES, UNASKED, told_apart
 from crosscheck2d.adapters.play import play_once
 from crosscheck2d.reports.run import bits
-from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.scenes import open_scene
 from crosscheck2d.reports.run.store import reading, writing
-from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.suite import Means, RunPlan, carry_out
 from crosscheck2d.reports.terminal.progress import Progress
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from tests.measured import MEASURED, TABLE

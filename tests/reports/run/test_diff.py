@@ -17,10 +17,9 @@ from crosscheck2d.reports.commands.diff import show_difference
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
 from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
-from crosscheck2d.reports.run.plan import Means, RunPlan
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import carry_out
+from crosscheck2d.reports.run.suite import Means, RunPlan, carry_out
 from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read

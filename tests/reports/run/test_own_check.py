@@ -12,11 +12,10 @@ import pytest
 from crosscheck2d.adapters.host.engine import row_of_file
 from crosscheck2d.reports.check.verdict import check_file
 from crosscheck2d.reports.commands.own_solvers import checked, checks_of, lines
-from crosscheck2d.reports.run.plan import Check, Means, RunPlan, RunTask
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND
 from crosscheck2d.reports.run.store import writing
-from crosscheck2d.reports.run.suite import Suite
+from crosscheck2d.reports.run.suite import Check, RunPlan, RunTask, store_finding
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
 from tests.reports.terminal.command_line import crosscheck
@@ -35,9 +34,8 @@ def test_a_check_is_that_of_the_text_that_plays(tmp_path: Path):
     rows = []
     with writing(tmp_path / "out", COMMAND) as store, Progress() as progress:
         progress.start(3, 3)
-        suite = Suite(plan, Means(1), store, {}, progress)
         for result in (right, later, Failure("timeout", "was stopped")):
-            suite.keep(RunTask("check", "key", name), result)
+            store_finding(store, RunTask("check", "key", name), plan, result, progress)
             rows.append(store.get("check", "key").value)
 
     assert FAULTY.cause in right.says[0]

@@ -21,9 +21,15 @@ from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.run import playing, pool
 from crosscheck2d.reports.run.cells import Cell
-from crosscheck2d.reports.run.playing import CellResult, play_cell, play_here
+from crosscheck2d.reports.run.playing import (
+    CellResult,
+    from_trail,
+    load_trajectory,
+    pack,
+    play_cell,
+    play_here,
+)
 from crosscheck2d.reports.run.pool import Failure, affordable, run_all
-from crosscheck2d.reports.run.trajectories import from_trail, load_trajectory, packed
 from crosscheck2d.scenarios.catalogue import scenario
 from tests.conftest import START_PROCESS
 from tests.forks import start_worker
@@ -305,13 +311,12 @@ def test_urgent_tasks_start_before_the_others():
     assert order.index("urgent") <= 2
 
 
-def test_a_trajectory_comes_back_from_its_file_bit_for_bit(tmp_path: Path):
+def test_a_trajectory_comes_back_from_its_file_bit_for_bit():
     """The .npz holds every array of the trajectory and its collisions."""
     here = play_cell(
         Cell("line_gas", 0, "pymunk:matched", 1), ENGINES["pymunk:matched"], scenario("line_gas")
     ).trajectory
-    (tmp_path / "one.npz").write_bytes(packed(here))
-    there = load_trajectory(tmp_path / "one.npz")
+    there = load_trajectory(pack(here))
 
     assert len(here.collisions)
     for name in ("t", "position", "velocity", "angle", "angular_velocity"):

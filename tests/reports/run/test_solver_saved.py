@@ -209,13 +209,13 @@ def test_a_file_that_vanishes_during_a_run_is_played_to_the_end(
 
 def meanwhile(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> None:
     """When a run has begun, before any cell is played, `act`."""
-    begin = suite.Suite.run
+    run_tasks = suite.run_tasks
 
-    def act_and_begin(*given) -> None:
+    def act_and_run(*given) -> int:
         act()
-        begin(*given)
+        return run_tasks(*given)
 
-    monkeypatch.setattr(suite.Suite, "run", act_and_begin)
+    monkeypatch.setattr(suite, "run_tasks", act_and_run)
 
 
 def flight(out: Path) -> tuple[list[str], list[bytes]]:

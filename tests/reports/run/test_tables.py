@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck2d.reports.run import cells, comparing
 from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
-from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, SceneTasks, no_answer
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, store_answer
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store, writing
@@ -56,7 +56,7 @@ def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.Mo
     monkeypatch.setattr(comparing, "compute_answer", None)
     made = make_tables(RunResults.read(store), silent)
 
-    assert len(made.scenes.tables) == len(made.scenes.answers) == 2
+    assert len(made.scenes) == 2
 
 
 def test_what_is_kept_is_what_is_compared(store: Store):
@@ -68,7 +68,7 @@ def test_what_is_kept_is_what_is_compared(store: Store):
         source = results.sources[scene]
         csv = CompareTask(store, source, records, comparing.compute_answer(source))()
 
-        assert csv == made.scenes.tables[scene].csv
+        assert csv == made.scenes[scene].table
         assert all(run.trajectory for run in comparison.middle_runs)
         assert np.array_equal(comparing.read_scene_table(csv).columns, comparison.table.columns)
 
@@ -110,28 +110,6 @@ def killed_once(mark: Path, *given: Any) -> bytes:
     return COMPARE(*given)
 
 
-def test_a_scene_is_answered_then_compared_when_its_last_cell_has_ended(store: Store):
-    """Each once, and not before."""
-    for kind in (ANSWER, COMPARED):
-        for key in store.rows.keys(kind):
-            store.rows.delete(kind, key)
-    results = RunResults.read(store)
-    tasks = SceneTasks(store, results.cells, results.sources, {}, 60.0)
-    begun: list[Any] = []
-    last = [keys[-1] for keys in results.cells.values()]
-    for record in results.records:
-        tasks.records[record["cell"]] = record
-        begun.append([*tasks.next_task(record["scene"])])
-    first = [task for ended in begun for task in ended]
-    assert [record["cell"] for record, ended in zip(results.records, begun) if ended] == last
-    assert tasks.awaited == list(results.cells)
-    then = [task for key, work in first for task in tasks.task_ended(key, work())]
-    after = [task for key, work in then for task in tasks.task_ended(key, work())]
-
-    assert [key[0] for key, _ in (*first, *then)] == [ANSWER] * 2 + [COMPARED] * 2
-    assert after == [*tasks.tasks()] == tasks.awaited == []
-
-
 def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ):
@@ -166,9 +144,8 @@ def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(stor
     whole = deviations(store)
     results = RunResults.read(store)
     source = results.sources["slow_collision"]
-    key = comparing.digest(repr((source.digest, comparing.judge_hash())).encode())
-    late = no_answer(Failure("timeout", "stopped after 5 s"), 5.0)
-    store.put(ANSWER, key, late[1:])
+    late = Failure("timeout", "stopped after 5 s")
+    store_answer(store, comparing.answer_key(source), late, 5.0)
     for record in results.records:
         record["timeout_s"] = 5.0
     without = make_tables(results, silent)
