@@ -14,10 +14,8 @@ def main() -> None:
     with ends_on_signals(), printing():
         if sys.flags.optimize > 1:
             refuse(
-                [
-                    "PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are"
-                    " explained by; unset it"
-                ]
+                "PYTHONOPTIMIZE=2, or python -OO, takes away the docstrings that metrics are"
+                " explained by; unset it"
             )
         # which takes a second: what is raised while it is imported may be lost
         from crosscheck2d.reports.cli import app

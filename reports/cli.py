@@ -33,7 +33,7 @@ def place(text: str) -> Path:
     """A path as it was given; exits 2 for an empty one, which `Path` takes for the current
     folder."""
     if not text:
-        refuse(['"": is not there; name a file or a folder'])
+        refuse('"": is not there; name a file or a folder')
     return Path(text)
 
 
@@ -192,7 +192,7 @@ def report(
     They are made from what was played; no scene is played again. With --timings the engines are
     timed again.
     """
-    from crosscheck2d.reports.commands.report import report_again
+    from crosscheck2d.reports.commands.run import report_again
 
     report_again(out, timings)
 

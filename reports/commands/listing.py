@@ -30,7 +30,7 @@ def explain(what: str) -> None:
         "lessons": {f"{row.number} {name}": row.asks for name, row in LESSONS.items()},
     }
     if what and what not in kinds:
-        refuse([unknown("list", what, kinds)])
+        refuse(unknown("list", what, kinds))
     console = Console()
     for kind, lines in kinds.items():
         if what in ("", kind):

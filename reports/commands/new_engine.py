@@ -75,11 +75,11 @@ def ported(kind: str, hints: Hints) -> str:
 
     names = (hints.fields or FIELDS).split()
     if len(names) not in (5, 6):
-        refuse([f'--fields "{hints.fields}": must be the names of x, y, vx, vy, radius and mass'])
+        refuse(f'--fields "{hints.fields}": must be the names of x, y, vx, vy, radius and mass')
     fields = [name if name.startswith("[") else f".{name}" for name in names]
     plain = all(name.isidentifier() for name in names)
     if not plain and hints.ball is None:
-        refuse([f'--fields "{hints.fields}": --ball has to say how such a ball is made'])
+        refuse(f'--fields "{hints.fields}": --ball has to say how such a ball is made')
     code = code_in(hints.source, kind)
     if code is None:
         given = {name: value for name, value in hints._asdict().items() if value is not None}
@@ -89,13 +89,13 @@ def ported(kind: str, hints: Hints) -> str:
         hints = hints._replace(box=next((x for x in BOXES if {*x.split()} <= words), None))
     box = (hints.box or "").split()
     if len(box) not in (0, 2):
-        refuse([f'--box "{hints.box}": must be the names of its width and its height'])
+        refuse(f'--box "{hints.box}": must be the names of its width and its height')
     for option, value in (("--pixels", hints.pixels), ("--per-frame", hints.per_frame)):
         if value is not None and not 0 < value < 1e9:
-            refuse([f"{option} {value:g}: must be above 0"])
+            refuse(f"{option} {value:g}: must be above 0")
     move, collide = hints.move or "move", hints.collide or "collide"
     if hints.source is None and (hints.step or not (move + collide).isidentifier()):
-        refuse(["--step, a method or a call as --move or --collide: --from has to name the code"])
+        refuse("--step, a method or a call as --move or --collide: --from has to name the code")
     try:
         restitution, variable = f"{float(hints.restitution or 1):g}", None
     except ValueError:
@@ -146,9 +146,9 @@ def code_in(source: Path | None, kind: str) -> str | None:
     try:
         solver = read_solver(source)
     except NotASolver as refusal:
-        refuse([f"--from {refusal}"])
+        refuse(f"--from {refusal}")
     if solver.kind != kind:
-        refuse([f"--from {source}: is in another language than the file to write"])
+        refuse(f"--from {source}: is in another language than the file to write")
     return solver.text.rstrip()
 
 
@@ -159,7 +159,7 @@ def write_solver(path: Path) -> None:
 def kind_of(path: Path) -> str:
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
-        refuse([f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file"])
+        refuse(f"{path}: ends in {path.suffix or 'nothing'}; name a .js or a .py file")
     if ":" in str(path):
         refuse(faults_of_file(path))
     return kind
@@ -171,7 +171,7 @@ def write_new(path: Path, text: str, done: str) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text.replace("THIS_FILE", name))
     except FileExistsError:
-        refuse([f"{path}: exists; name another file"])
+        refuse(f"{path}: exists; name another file")
     except OSError as fault:
-        refuse([f"{path}: {fault.strerror or fault}; name a file that can be written"])
+        refuse(f"{path}: {fault.strerror or fault}; name a file that can be written")
     Console().print(done.format(name), highlight=False, soft_wrap=True)

@@ -39,7 +39,7 @@ def show_truth(
     (checked,) = checked_scenes([scene], [], False, seed)
     scenario = open_scene(checked, seed)
     if at is not None and not 0 <= at <= scenario.duration:
-        refuse([f"--at {at:g}: must be from 0 to {scenario.duration:g} s, the scene's duration"])
+        refuse(f"--at {at:g}: must be from 0 to {scenario.duration:g} s, the scene's duration")
     # In a worker, which can always be stopped.
     task = partial(compute_record, checked, seed, timeout)
     with Progress() as progress, closing(run_all({checked: task}, 1, timeout)) as results:

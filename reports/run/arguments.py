@@ -44,15 +44,15 @@ def opening(out: Path, command: str, fresh: bool = False, there: bool = False) -
                     pass
             store = stack.enter_context(writing(out, command, fresh, option))
         except FolderTaken as fault:
-            refuse([str(fault)])
+            refuse(str(fault))
         except Damaged as fault:
-            refuse([f"{option}{fault}"])
+            refuse(f"{option}{fault}")
         except OSError as fault:
-            refuse([f"{option}{out}: {fault.strerror or fault}; name a folder that can be written"])
+            refuse(f"{option}{out}: {fault.strerror or fault}; name a folder that can be written")
         try:
             yield store
         except (Damaged, Unusable) as fault:
-            refuse([str(fault)])
+            refuse(str(fault))
 
 
 def checked_scenes(scenes: Sequence[str], dts: Sequence[float], full: bool, seed: int) -> list[str]:

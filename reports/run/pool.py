@@ -290,7 +290,7 @@ class Pool:
         try:
             worker = Worker(self.memory)
         except OSError as fault:
-            refuse([f"no more processes can be started: {fault.strerror or fault}"])
+            refuse(f"no more processes can be started: {fault.strerror or fault}")
         self.workers.append(worker)
         return worker
 
@@ -396,7 +396,7 @@ def affordable(workers: int) -> int:
     files = system.most_files()
     if files < OTHERS + LINES:
         refuse(
-            [f"at most {files} files may be open, and a run needs {OTHERS + LINES}: ulimit -n 1024"]
+            f"at most {files} files may be open, and a run needs {OTHERS + LINES}: ulimit -n 1024"
         )
     most = {
         f"memory of {memory} MB, each needs {LEAST_MEMORY}": max(1, memory // LEAST_MEMORY),

@@ -151,9 +151,9 @@ def printing() -> Iterator[None]:
         sys.exit(FAILED if end.code in (None, DONE) else end.code)
 
 
-def refuse(faults: Sequence[str]) -> NoReturn:
+def refuse(faults: str | Sequence[str]) -> NoReturn:
     """Print the faults, one line each, and exit 2."""
-    for fault in faults:
+    for fault in [faults] if isinstance(faults, str) else faults:
         say(fault)
     sys.exit(BAD_INPUT)
 

@@ -12,6 +12,7 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
+from crosscheck2d.reports.commands.diff import changed_numbers
 from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.delays import WINDOW
@@ -21,7 +22,6 @@ from crosscheck2d.reports.page.findings import findings, nearest
 from crosscheck2d.reports.page.scenes import scenes_of, values
 from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.reports.run.comparing import read_scene_table
-from crosscheck2d.reports.run.diff import changed_numbers
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, truth_of

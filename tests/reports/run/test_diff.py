@@ -13,10 +13,17 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
-from crosscheck2d.reports.commands.diff import show_difference
+from crosscheck2d.reports.commands.diff import (
+    ROUNDING,
+    Change,
+    Timing,
+    difference,
+    is_rounding,
+    show_difference,
+    timing,
+)
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
-from crosscheck2d.reports.run.diff import ROUNDING, Change, Timing, difference, is_rounding, timing
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.run.suite import Means, RunPlan, carry_out

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.reports.commands import diff
-from crosscheck2d.reports.run.diff import Change
+from crosscheck2d.reports.commands.diff import Change
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.command import print_limits
 from crosscheck2d.reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
