@@ -7,6 +7,7 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import chdir, nullcontext
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,7 +26,6 @@ from crosscheck2d.reports.run.arguments import (
     default_engines,
     of_main_job,
     opening,
-    started_where,
 )
 from crosscheck2d.reports.run.bits import kept_bits, write_bits
 from crosscheck2d.reports.run.cluster import NoScheduler, connect
@@ -137,7 +137,9 @@ def report_again(out: Path, timings: float | None) -> NoReturn:
 
 def time_again(results: RunResults, seconds: float, progress: Progress) -> RunResults:
     """The results with new times; exits 2 if the engines have changed since they were played."""
-    with started_where(results.header["folder"]):
+    # the paths of solvers' files are relative to the folder in which the run was started
+    started = Path(results.header["folder"])
+    with chdir(started) if started.is_dir() else nullcontext():
         rows = {name: row_of(name) for name in checked_engines(results.header["engines"])}
     cells = cells_to_time(results, rows)
     if not cells:

@@ -145,15 +145,18 @@ def outcomes(record: TruthRecord) -> list[dict[str, Any]]:
 
 def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
     console = Console()
-    duration = scenario.duration
+    duration, float64 = scenario.duration, min(record.float64_horizon, record.horizon)
     whole = record.horizon >= duration
+    precision = "float64" if record.bits == 53 else f"{record.bits} bits"
+    if record.method == TWO_PRECISIONS and record.bits != 53:
+        precision += f", checked against {record.bits // 2}"
     lines = {
         "scenario": f"{scenario.name}: {scenario.asks}",
         "method": record.method,
-        "precision": precision(record),
-        "horizon": f"{seconds(min(record.horizon, duration))} of {seconds(duration)}",
+        "precision": precision,
+        "horizon": f"{number(min(record.horizon, duration), 6)} s of {number(duration, 6)} s",
         "ends because": record.reason or ("the scenario ends there" if whole else ""),
-        "horizon of float64": seconds(min(record.float64_horizon, record.horizon, duration)),
+        "horizon of float64": f"{number(min(float64, duration), 6)} s",
         "error bound": (
             f"{number(record.error_bound, 2)} m" if record.error_bound else "a rounding of float64"
         ),
@@ -178,18 +181,6 @@ def print_truth(scenario: Scenario, record: TruthRecord, every: bool) -> None:
         }
         console.print()
         print_texts(console, lines, f"Outcome {k} of {len(ends)}; none is the truth")
-
-
-def seconds(t: float) -> str:
-    return f"{number(t, 6)} s"
-
-
-def precision(record: TruthRecord) -> str:
-    if record.bits == 53:
-        return "float64"
-    return f"{record.bits} bits" + f", checked against {record.bits // 2}" * (
-        record.method == TWO_PRECISIONS
-    )
 
 
 def rows_of_collisions(record: TruthRecord, every: bool) -> list[list[str]]:

@@ -4,9 +4,8 @@ exit 2."""
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -169,19 +168,6 @@ def faults_of_version(library: LibraryAtVersion) -> list[str]:
     except NotInstalled as reason:
         return [str(reason)]
     return []
-
-
-@contextmanager
-def started_where(folder: str) -> Iterator[None]:
-    """Context in the folder in which a run was started, to which the paths of solvers' files are
-    relative; nothing changes if it is gone."""
-    before = Path.cwd()
-    with suppress(OSError):
-        os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(before)
 
 
 def faults_of_file(file: Path) -> list[str]:

@@ -36,6 +36,15 @@ class ChangedBits(NamedTuple):
     same: int
     other: int
 
+    @property
+    def sentence(self) -> str:
+        where = f"the same bits up to sample {self.same}, others by sample {self.other}"
+        if self.other < 0:
+            where = "it did not play to the same sample"
+        elif self.same < 0:
+            where = "other bits from the start on"
+        return f"{self.name} in {self.scenario}: {where}"
+
 
 def rows_of(results: RunResults) -> list[dict[str, Any]]:
     """A row of the table for each scene and engine of a run, at the middle of the step sizes; none
@@ -81,11 +90,6 @@ def read(text: str) -> pd.DataFrame:
     return pd.read_csv(io.StringIO("\n".join(lines)), dtype=str, keep_default_na=False)
 
 
-def about_of(text: str) -> dict[str, str]:
-    lines = [line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# ")]
-    return {key: value for key, value in lines}
-
-
 def differences(kept: pd.DataFrame, now: pd.DataFrame) -> tuple[list[ChangedBits], pd.DataFrame]:
     both = kept.merge(now, on=COLUMNS[:4], suffixes=("_kept", "_now"))
     changed = [
@@ -120,7 +124,13 @@ def write_bits(results: RunResults) -> None:
 def kept_bits(folder: Path) -> bool:
     """Print how the bits of a run differ from the kept ones; whether there are any, and none do."""
     kept, here = (path.read_text(encoding="utf-8") for path in (KEPT, folder / BITS))
-    table, (before, made_by) = read(here), map(about_of, (kept, here))
+    table, (before, made_by) = (
+        read(here),
+        (
+            dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# "))
+            for text in (kept, here)
+        ),
+    )
     changed, both = differences(read(kept), table)
     counts = Counter((both.engine + ":" + both.profile).tolist())
     other = Counter(row.name for row in changed)
@@ -129,7 +139,7 @@ def kept_bits(folder: Path) -> bool:
     title = "In how many scenes the bits are those kept in reports/bits.csv"
     print_table(console, ["engine", "the same", "of"], rows, title)
     console.print()
-    print_list(console, map(in_words, changed[:SHOWN]))
+    print_list(console, [row.sentence for row in changed[:SHOWN]])
     if len(changed) > SHOWN:
         console.print(f"and {counted(len(changed) - SHOWN, 'more difference')}")
     if new := {*(table.engine + ":" + table.profile)} - {*counts}:
@@ -144,13 +154,3 @@ def kept_bits(folder: Path) -> bool:
         console.print(f"The kept bits were made with {', '.join(others)}.", highlight=False)
     console.print()
     return not changed and not both.empty
-
-
-def in_words(row: ChangedBits) -> str:
-    if row.other < 0:
-        where = "it did not play to the same sample"
-    elif row.same < 0:
-        where = "other bits from the start on"
-    else:
-        where = f"the same bits up to sample {row.same}, others by sample {row.other}"
-    return f"{row.name} in {row.scenario}: {where}"

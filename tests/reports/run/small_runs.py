@@ -32,27 +32,23 @@ LONG += [
 
 
 def plan_of(scene_file: Path, timings: float = 0.0) -> RunPlan:
-    """The plan of the small run."""
     rows = {name: ENGINES[name] for name in PLAYED}
     scenes = ["slow_collision", str(scene_file)]
     return RunPlan(scenes, rows, 0, [], False, timings, "made by a test")
 
 
 def make(folder: Path, scene_file: Path, timings: float = 0.0) -> Path:
-    """Its folder, with all rows and no tables."""
     with writing(folder, COMMAND) as store, Progress() as progress:
         suite.carry_out(plan_of(scene_file, timings), Means(2), store, progress)
     return folder
 
 
 def read(folder: Path) -> RunResults:
-    """The results in a folder; the file of its rows is closed, and so no trajectory can be read."""
     with reading(folder, COMMAND) as store:
         return RunResults.read(store)
 
 
 def cells_in(folder: Path) -> int:
-    """How many cells have a row, while another process writes."""
     try:
         with closing(Rows(folder / "results.sqlite", writing=False)) as rows:
             return len(rows.keys("cell"))

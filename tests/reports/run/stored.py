@@ -13,7 +13,6 @@ Change = Callable[[dict], object]
 
 
 def change_plan(folder: Path, change: Change) -> None:
-    """Change the plan in place."""
     with writing(folder, COMMAND) as store:
         plan = store.get("run", "plan").value
         change(plan)
@@ -21,7 +20,6 @@ def change_plan(folder: Path, change: Change) -> None:
 
 
 def change_cells(folder: Path, change: Change) -> None:
-    """Change the row of each cell in place, in which `cell` is the key."""
     with writing(folder, COMMAND) as store:
         plan = store.get("run", "plan").value
         for task in plan["tasks"]["cell"]:
@@ -34,7 +32,6 @@ def change_cells(folder: Path, change: Change) -> None:
 
 
 def change_timings(folder: Path, change: Change) -> None:
-    """Change each line of the timing pass in place."""
     with writing(folder, COMMAND) as store:
         key = store.get("run", "plan").value["timing"]
         timing = store.get("timing", key).value
@@ -44,7 +41,6 @@ def change_timings(folder: Path, change: Change) -> None:
 
 
 def put_table(table: pd.DataFrame, folder: Path) -> None:
-    """Give a run this table of deviations."""
     with writing(folder, COMMAND) as store:
         store.put("comparison", "changed", None, csv_of(table))
         store.put("run", "comparisons", {"all": "changed"})

@@ -27,7 +27,6 @@ SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of two scenes on two engines, with its tables."""
     folder = make(tmp_path_factory.mktemp("tables") / "out", SCENE)
     with writing(folder, COMMAND) as store:
         make_tables(RunResults.read(store), silent)
@@ -36,7 +35,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def store(folder: Path, tmp_path: Path):
-    """The rows of a copy of it."""
     with writing(Path(shutil.copytree(folder, tmp_path / "out")), COMMAND) as store:
         yield store
 
@@ -46,12 +44,10 @@ def silent(_: str) -> None:
 
 
 def deviations(store: Store) -> bytes:
-    """The table in the folder."""
     return (store.folder / "deviations.csv").read_bytes()
 
 
 def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.MonkeyPatch):
-    """The tables are put together, and no worker is asked."""
     monkeypatch.setattr(comparing, "compare_scene", None)
     monkeypatch.setattr(comparing, "compute_answer", None)
     made = make_tables(RunResults.read(store), silent)
@@ -60,7 +56,6 @@ def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.Mo
 
 
 def test_what_is_kept_is_what_is_compared(store: Store):
-    """Every bit is the same in what is compared here and now and in what the page is made from."""
     results = RunResults.read(store)
     made = make_tables(results, silent)
     again = comparisons_of(results, made)
@@ -88,7 +83,6 @@ def test_tables_that_are_gone_are_made_again_to_the_same_bytes(store: Store):
 def test_a_worker_that_is_killed_while_it_compares_loses_nothing(
     store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """`kill -9` once, after the judge has changed: all is compared anew, to the same bytes."""
     whole, before = deviations(store), {*store.rows.keys(COMPARED)}
     monkeypatch.setattr(comparing, "judge_hash", lambda: "another metric")
     monkeypatch.setattr(comparing, "compare_scene", partial(killed_once, tmp_path / "mark"))
@@ -103,7 +97,6 @@ COMPARE = comparing.compare_scene
 
 
 def killed_once(mark: Path, *given: Any) -> bytes:
-    """In the worker: what the system does that has no memory left, the first time only."""
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
@@ -113,7 +106,6 @@ def killed_once(mark: Path, *given: Any) -> bytes:
 def test_a_comparison_that_fails_is_a_row_a_run_and_leaves_the_other_scene(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ):
-    """It says what was raised, in the worker; the scene is held to no answer."""
     row = store.get("run", "comparisons").value
     store.rows.delete(COMPARED, row["slow_collision"])
     monkeypatch.setattr(comparing, "compare_scene", fails)
@@ -135,12 +127,10 @@ WHY = "the comparison could not be made: error: ZeroDivisionError: of a metric"
 
 
 def fails(*_: object) -> bytes:
-    """What a metric with a fault does."""
     raise ZeroDivisionError("of a metric")
 
 
 def test_an_answer_that_took_too_long_is_computed_again_only_with_more_time(store: Store):
-    """One that was not there in 5 s is not tried again within 5 s; within 6 s it is."""
     whole = deviations(store)
     results = RunResults.read(store)
     source = results.sources["slow_collision"]
@@ -174,17 +164,14 @@ def test_trajectories_are_exported_when_asked_for(store: Store):
 
 
 def engine_source(root: Path) -> str:
-    """The hash of the engines' source."""
     return cells.source_hash(SOURCES, root)
 
 
 def judge_source(root: Path) -> str:
-    """The hash of the source that compares."""
     return cells.source_hash(JUDGE_SOURCE, root)
 
 
 def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_hashed():
-    """So that a changed metric is measured again."""
     folder = ROOT / "reports" / "compare"
     imported = {
         node.module or ""
@@ -221,7 +208,6 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
 def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(
     file, hashed, tmp_path: Path
 ):
-    """Else a change of it would be served by results that it did not make."""
     where, moved = (
         tmp_path / "before" / file,
         tmp_path / "after" / Path(file).parent / "deeper" / Path(file).name,
