@@ -350,8 +350,7 @@ def check(
 @app.command()
 def play(
     flight: Annotated[
-        Path | None,
-        path_argument(metavar="FLIGHT.toml", help="A saved flight to fly again."),
+        Path | None, path_argument(metavar="FLIGHT.toml", help="A saved flight to fly again.")
     ] = None,
     engine: Engines = None,
     port: Port = 8000,
@@ -520,8 +519,7 @@ def new_engine(
     name: Annotated[
         Path,
         path_argument(
-            metavar="NAME",
-            help="The file to write: NAME.js in JavaScript, NAME.py in Python.",
+            metavar="NAME", help="The file to write: NAME.js in JavaScript, NAME.py in Python."
         ),
     ],
     source: Annotated[
@@ -565,19 +563,16 @@ def new_engine(
         str | None, Option(metavar="NAME", help="The list of all balls, if --step uses one.")
     ] = None,
     box: Annotated[
-        str | None,
-        Option(metavar="NAMES", help='Width and height of its box: "canvas.width H".'),
+        str | None, Option(metavar="NAMES", help='Width and height of its box: "canvas.width H".')
     ] = None,
     gravity: Annotated[
         str | None, Option(metavar="NAME", help="Its gravity, positive if down.")
     ] = None,
     restitution: Annotated[
-        str | None,
-        Option(metavar="NAME|NUMBER", help="Its restitution. Default: 1."),
+        str | None, Option(metavar="NAME|NUMBER", help="Its restitution. Default: 1.")
     ] = None,
     per_frame: Annotated[
-        float | None,
-        Option(metavar="N", help="Its speeds are per frame, with N frames a second."),
+        float | None, Option(metavar="N", help="Its speeds are per frame, with N frames a second.")
     ] = None,
     pixels: Annotated[float | None, Option(metavar="N", help="Its pixels in 1 m.")] = None,
     y_down: Annotated[bool, Option("--y-down", help="Its y points down.")] = False,
@@ -598,8 +593,7 @@ def new_engine(
 @app.command(name="new-solver")
 def new_solver(
     name: Annotated[
-        Path,
-        path_argument(metavar="NAME", help="The file to write: Exercise.js or solver.py."),
+        Path, path_argument(metavar="NAME", help="The file to write: Exercise.js or solver.py.")
     ],
 ) -> None:
     """Write the two functions of the exercise, to be filled in."""

@@ -23,11 +23,10 @@ from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import reading
 from crosscheck2d.reports.run.tables import joined
 from crosscheck2d.reports.run.timing_pass import is_busy, noise_floor
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table
 from crosscheck2d.reports.terminal.counts import counted, listed
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, FolderTaken, Unusable, refuse, say
 from crosscheck2d.reports.terminal.foreign_text import encoded
-from crosscheck2d.reports.terminal.tables import print_list, print_table
 from crosscheck2d.scenarios.rows import Damaged
 from crosscheck2d.scenarios.truth.horizon import DIVERGED
 
@@ -140,9 +139,18 @@ def difference(before: Path, after: Path) -> Difference:
     edited = edited_scenes(*cells)
     # of these scene, settings and versions are the same
     alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
-    numbers, same = changed_numbers(*tables, alike if same_machine else set(), edited)
+    numbers, same = changed_numbers(*tables, alike if same_machine else set())
     played = {name for name in both if all(side[name]["status"] == "ok" for side in cells)}
-    statuses = changed_statuses(*cells, edited) + changed_judgement(*tables, played, edited)
+    statuses = changed_statuses(*cells) + changed_judgement(*tables, played)
+    numbers, statuses = (
+        [
+            change._replace(verdict="other")  # nothing in an edited scene is worse or better
+            if change.what.partition("  ")[0] in edited and change.verdict in ("worse", "better")
+            else change
+            for change in changes
+        ]
+        for changes in (numbers, statuses)
+    )
     warnings = [*warnings_of(*runs), *warnings_on_cells(runs, cells, edited)]
     busy = [run for run in runs if run.timings and is_busy(run)]
     warnings += [
@@ -219,20 +227,18 @@ def edited_scenes(before: Cells, after: Cells) -> list[str]:
     return sorted({scene for scene, _ in hashes[0] ^ hashes[1]} & common)
 
 
-def changed_statuses(before: Cells, after: Cells, edited: Collection[str]) -> list[Change]:
+def changed_statuses(before: Cells, after: Cells) -> list[Change]:
     changes = []
     for (scenario, engine, dt), cell in before.items():
-        other = after.get((scenario, engine, dt))
-        was, now = cell["status"], other["status"] if other else cell["status"]
+        was, now = cell["status"], after.get((scenario, engine, dt), cell)["status"]
         if was != now:
             verdict = "worse" if was == "ok" else "better" if now == "ok" else "other"
-            verdict = "other" if scenario in edited else verdict
             changes.append(Change(engine, f"{scenario}  dt {dt:.4g} s  status", was, now, verdict))
     return changes
 
 
 def changed_judgement(
-    before: pd.DataFrame, after: pd.DataFrame, played: Collection[Name], edited: Collection[str]
+    before: pd.DataFrame, after: pd.DataFrame, played: Collection[Name]
 ) -> list[Change]:
     """The cells that both runs `played` but only one judged, so that only that one has numbers."""
     reasons = [
@@ -249,7 +255,6 @@ def changed_judgement(
             what = f"{scenario}  dt {dt:.4g} s  against {versus}: status"
             was, now = (of.get((cell, versus), {"note": "judged"})["note"] for of in reasons)
             verdict = "better" if now == "judged" else "worse"
-            verdict = "other" if scenario in edited else verdict
             changes.append(Change(engine, what, was, now, verdict))
     return changes
 
@@ -266,14 +271,14 @@ def table_of(results: RunResults) -> pd.DataFrame:
 
 
 def changed_numbers(
-    before: pd.DataFrame, after: pd.DataFrame, equal: Collection[Name], edited: Collection[str]
+    before: pd.DataFrame, after: pd.DataFrame, equal: Collection[Name]
 ) -> tuple[list[Change], Counter[str]]:
     """Every number that differs between the tables, and how many are equal, by engine.
 
     The numbers of `equal` cells must have the same bits: any change is worse. Elsewhere the metric
     says which value is better, unless they differ in rounding; a verdict that fails now, and did
-    not before, is worse. A deviation between two engines, a
-    number that only one run judges, or one of an edited scene is then "other".
+    not before, is worse. A deviation between two engines, or a number that only one run judges, is
+    then "other".
     """
     both = before.merge(after, on=WHOSE, suffixes=("", "_after"))
     both["name"] = both.engine + ":" + both.profile
@@ -293,8 +298,6 @@ def changed_numbers(
             verdict, what = "worse", f"{what} (same cell, other bits)"
         elif is_rounding(engines, was, now):
             verdict = ROUNDING
-        elif scenario in edited:
-            verdict = "other"
         elif row["metric"] in VERDICTS:
             fails = [
                 not value <= float(row[f"bound{end}"])

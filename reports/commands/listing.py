@@ -9,9 +9,8 @@ from crosscheck2d.reports.compare.verdicts import VERDICTS
 from crosscheck2d.reports.lessons.catalogue import LESSONS
 from crosscheck2d.reports.run.arguments import unknown
 from crosscheck2d.reports.stability.cases import CASES
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_texts
 from crosscheck2d.reports.terminal.exits import refuse
-from crosscheck2d.reports.terminal.tables import print_texts
 from crosscheck2d.scenarios.catalogue import RANDOM, SCENARIOS, scenario
 from crosscheck2d.scenarios.truth.exact import answered_by
 

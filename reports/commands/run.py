@@ -6,20 +6,22 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from contextlib import chdir, nullcontext
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
+import numpy as np
 import psutil
 
 from crosscheck2d.adapters.engines import OWN, row_of
 from crosscheck2d.adapters.run import STATUSES
 from crosscheck2d.adapters.thrust_grid import off_grid_note
-from crosscheck2d.reports.commands.medians import medians
 from crosscheck2d.reports.commands.own_solvers import checks_of, lines
 from crosscheck2d.reports.compare.fast_disks import fast_note
 from crosscheck2d.reports.page.report import PAGE, Report, make_report, take_times
+from crosscheck2d.reports.page.scenes import SceneScores, values
+from crosscheck2d.reports.page.style import number
 from crosscheck2d.reports.run.arguments import (
     checked_engines,
     checked_scenes,
@@ -34,13 +36,32 @@ from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import Store
 from crosscheck2d.reports.run.suite import Means, OtherVersions, RunPlan, carry_out, take_timings
 from crosscheck2d.reports.run.timing_pass import cells_to_time
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_list, print_table
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.truth import cache
+
+MAPPED = "position_max_radii"
+
+
+class Column(NamedTuple):
+    """A column, lower is better: heading, unit in nine letters, and the metrics whose sum it is."""
+
+    title: str
+    unit: str
+    metrics: tuple[str, ...]
+
+
+COLUMNS = (
+    Column("Position", "radii", (MAPPED,)),
+    Column("Momentum", "of Σ m|v|", ("momentum_error",)),
+    Column("Energy", "of energy", ("energy_error",)),
+    Column("Restitution", "in e", ("restitution_error",)),
+    Column("Wrong collisions", "number", ("collisions_missed", "collisions_spurious")),
+)
+COUNTED = (Column("Fails", "scenes", ()), Column("Not played", "scenes", ()))
 
 
 def run_plan(
@@ -236,3 +257,72 @@ def failures(report: Report, out: Path) -> str:
         words += ["--seed", str(first["seed"])]
     again = shlex.join(["crosscheck", *words, "--out", f"{out}-again"])
     return f"To play the failure of {first['scenario']} on {engine} again: {again}"
+
+
+def medians(
+    scenes: Sequence[SceneScores], names: Sequence[str], untrusted: Set[str]
+) -> tuple[list[str], list[list[str]], list[str]]:
+    """The headings and rows of the table, the last with the numbers of scenes, and the engines
+    without a row because they do not model friction.
+
+    A scene that an engine fails or does not play counts as infinitely far off; one that a solver's
+    own file refuses does not count, as the exercise does not ask for it. Engines in `untrusted`
+    broke the protocol or a law, and are not scored.
+    """
+    without = [name for name in names if all(name in s.frictionless for s in scenes)]
+    names = [name for name in names if name not in without]
+    pools = {(name, column): pool(scenes, name, column) for name in names for column in COLUMNS}
+    columns = [column for column in COLUMNS if any(pools[name, column] for name in names)]
+    rows = []
+    for name in names:
+        asked = [s for s in scenes if not (name.endswith(OWN) and name in s.refused)]
+        refused = sum(name in scene.refused for scene in asked)
+        fails = sum(bool(scene.verdicts(name)) for scene in scenes)
+        played = sum(name not in scene.refused for scene in scenes)
+        failure = "fails" if fails else "not played"
+        cells = [median_text(pools[name, column], failure) for column in columns]
+        cells.append(f"{fails} of {played}" if played else "–")
+        if name in untrusted:
+            cells = ["breaks"] * len(cells)
+        cells.append(f"{refused} of {len(asked)}" if asked else "not asked")
+        rows.append([name, *cells])
+    if rows and len(scenes) > 1:
+        counts = [[len(pools[name, column]) for name in names] for column in columns]
+        rows.append(["in scenes", *map(numbers_of_scenes, counts), "", ""])
+    return ["engine", *map(heading, [*columns, *COUNTED])], rows, without
+
+
+def pool(scenes: Sequence[SceneScores], name: str, column: Column) -> list[float]:
+    """The value in each scene in which it is judged; wrong collisions are the missed and the
+    spurious ones together, without collisions in the exact answer the spurious ones."""
+    pooled = []
+    for scene in scenes:
+        found = values(scene.comparison)
+        own = [found[name, metric] for metric in column.metrics if (name, metric) in found]
+        judged = [value.value for value in own if value.judged]
+        applies = any(metric in column.metrics and v.judged for (_, metric), v in found.items())
+        refused = name in scene.refused and not name.endswith(OWN)
+        lost = bool(scene.verdicts(name)) or refused
+        if lost and (applies or (column.metrics == (MAPPED,) and bool(scene.verdicts(name)))):
+            pooled.append(np.inf)
+        elif judged:
+            pooled.append(float(sum(judged)))
+    return pooled
+
+
+def median_text(pooled: Sequence[float], failure: str) -> str:
+    if not pooled:
+        return "–"
+    median = float(np.median(pooled))
+    return failure if np.isinf(median) else number(median)
+
+
+def numbers_of_scenes(counts: Sequence[int]) -> str:
+    """Of how many scenes the medians of a column are: "9", "5–8", or "" if there is none."""
+    counts = sorted({count for count in counts if count})
+    return "–".join(map(str, dict.fromkeys((*counts[:1], *counts[-1:]))))
+
+
+def heading(column: Column) -> str:
+    title = column.title.replace(" ", "\n").replace("collisions", "colli-\nsions")
+    return f"{title}\n{column.unit}"

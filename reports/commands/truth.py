@@ -17,10 +17,9 @@ from crosscheck2d.reports.run.arguments import checked_scenes
 from crosscheck2d.reports.run.comparing import compute_record, no_answer
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.scenes import open_scene
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_table, print_texts
 from crosscheck2d.scenarios.model import Scenario
 from crosscheck2d.scenarios.truth.exact import CLOSED_FORM
 from crosscheck2d.scenarios.truth.record import TWO_PRECISIONS, TruthRecord

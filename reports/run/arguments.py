@@ -9,15 +9,7 @@ from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
-from crosscheck2d.adapters.engines import (
-    ENGINES,
-    FETCHED,
-    OWN,
-    UNASKED,
-    packages,
-    parsed,
-    read_row,
-)
+from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, UNASKED, packages, parsed, read_row
 from crosscheck2d.adapters.host.file import HINTS, KINDS, NotASolver
 from crosscheck2d.adapters.library_at_version import LibraryAtVersion
 from crosscheck2d.adapters.npm_packages import ABSENT, NotInstalled, fetch, missing, version_of

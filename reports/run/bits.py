@@ -15,9 +15,8 @@ import pandas as pd
 
 from crosscheck2d.reports.run.cells import versions
 from crosscheck2d.reports.run.results import RunResults
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table
 from crosscheck2d.reports.terminal.counts import counted, listed
-from crosscheck2d.reports.terminal.tables import print_list, print_table
 from crosscheck2d.scenarios.model import Trajectory
 
 KEPT = Path(__file__).parents[1] / "bits.csv"

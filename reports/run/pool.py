@@ -34,7 +34,6 @@ from crosscheck2d.adapters.safe_path import OwnPackages, keep_path_safe
 from crosscheck2d.reports.terminal.exits import refuse, say
 
 TIMEOUT = 60.0  # s a task may take
-LONGEST = 1e6  # s, of a task that only ends with the run
 STARTING = 120.0  # s for a process to start and to import the modules of a task, on a busy machine
 IDLE = 60.0  # s without a task after which a process ends: those of other machines outlive a run
 ATTEMPTS = 2  # of a task whose worker is killed from outside

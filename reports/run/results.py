@@ -88,10 +88,6 @@ class RunResults:
     def folder(self) -> Path:
         return self.store.folder
 
-    @property
-    def seconds(self) -> float:
-        return float(self.header["seconds"]) if self.complete else float("nan")
-
     @cached_property
     def by_scene(self) -> dict[str, list[dict[str, Any]]]:
         by_scene: dict[str, list[dict[str, Any]]] = {}
@@ -101,7 +97,10 @@ class RunResults:
 
     @cached_property
     def sources(self) -> dict[str, SceneSource]:
-        return sources_of(self.header)
+        return {
+            scene: SceneSource(**source | {"substeps": tuple(source["substeps"])})
+            for scene, source in self.header["sources"].items()
+        }
 
     @cached_property
     def timings(self) -> dict[str, dict[int, dict[str, Any]]]:
@@ -138,10 +137,3 @@ class RunResults:
                 f"{self.folder}: has no complete tables; make them: crosscheck report {self.folder}"
             )
         return [row.blob for row in rows if row is not None]
-
-
-def sources_of(header: Mapping[str, Any]) -> dict[str, SceneSource]:
-    return {
-        scene: SceneSource(**source | {"substeps": tuple(source["substeps"])})
-        for scene, source in header["sources"].items()
-    }

@@ -18,14 +18,7 @@ from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.pool import allow
 from crosscheck2d.reports.run.results import RunResults
-from crosscheck2d.reports.run.stepping import (
-    CALL,
-    EMPTY,
-    READ,
-    binding_of,
-    overheads,
-    step_through,
-)
+from crosscheck2d.reports.run.stepping import CALL, EMPTY, READ, binding_of, overheads, step_through
 from crosscheck2d.reports.run.timing import WARM_UP, Noise, Sample, Timed, interleaved, noise_of
 from crosscheck2d.scenarios.model import Scenario
 
@@ -83,10 +76,6 @@ class CellToTime(NamedTuple):
     seconds: float  # s that it took as played
 
     @property
-    def is_slow(self) -> bool:
-        return self.seconds * self.part.duration / self.scenario.duration > SLOW
-
-    @property
     def part(self) -> Scenario:
         """The scenario, or the first part of it with `WORK` disk steps."""
         scenario = self.scenario
@@ -135,7 +124,7 @@ def time_cells(cells: Sequence[CellToTime], seconds: float, seed: int) -> list[d
     what, slow = [], []
     for cell in cells:
         part = cell.part
-        if cell.is_slow:
+        if cell.seconds * part.duration / cell.scenario.duration > SLOW:
             cost, until = [cell.seconds / cell.scenario.duration], cell.scenario.duration
             slow.append(line_of(("timing", cell.key, 0, until), cost, [0.0]))
             continue

@@ -25,10 +25,9 @@ from crosscheck2d.reports.speed.measure import Measuring
 from crosscheck2d.reports.speed.page import NEVER, NOT_REACHED, cost_of, write_page
 from crosscheck2d.reports.speed.plan import SpeedPlan
 from crosscheck2d.reports.speed.results import Results
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, keeping, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 
 MACHINE, FIGURES, PAGE = "machine.json", "speed_figures.csv", "speed.html"
 SPEED = "crosscheck speed"

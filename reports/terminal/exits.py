@@ -29,33 +29,30 @@ class Unusable(ValueError):
     """A file of a run does not fit the others; says which, why, and what to do."""
 
 
-class Signals:
-    """The handler of Ctrl-C and of SIGTERM, with which a batch system or a shutdown ends a command:
-    both raise `KeyboardInterrupt`. `status`: the exit status of the first that came, or 0."""
+_status = DONE  # the exit status of the first signal that came
 
-    def __init__(self) -> None:
-        self.status = DONE
 
-    def __call__(self, number: int, _: object) -> NoReturn:
-        self.status = self.status or STATUS[signal.Signals(number)]
-        raise KeyboardInterrupt
+def stop(number: int, _: object) -> NoReturn:
+    """The handler of Ctrl-C and of SIGTERM, with which a batch system or a shutdown ends a
+    command."""
+    global _status
+    _status = _status or STATUS[signal.Signals(number)]
+    raise KeyboardInterrupt
 
 
 def signal_status() -> int:
     """The exit status of the signal that stops this command; 0 if none has come."""
-    handler = signal.getsignal(signal.SIGTERM)
-    return handler.status if isinstance(handler, Signals) else DONE
+    return _status
 
 
 @contextmanager
 def ends_on_signals() -> Iterator[None]:
     """Context of a whole command: a signal ends it with status 130 or 143, without waiting for
     threads. An ignored signal stays ignored, as in a shell's background job."""
-    signals = Signals()
     before = {number: signal.getsignal(number) for number in STATUS}
     for number in STATUS:
         if before[number] is not signal.SIG_IGN:
-            signal.signal(number, signals)
+            signal.signal(number, stop)
     status: str | int | None = DONE
     try:
         yield
@@ -65,14 +62,14 @@ def ends_on_signals() -> Iterator[None]:
         status = INTERRUPTED
     finally:
         for number, handler in before.items():
-            signal.signal(number, signal.SIG_IGN if signals.status else handler)
-    if not signals.status:
+            signal.signal(number, signal.SIG_IGN if _status else handler)
+    if not _status:
         sys.exit(status)
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()
     # Typer makes 130 of any KeyboardInterrupt.
-    os._exit(signals.status if status == INTERRUPTED or not isinstance(status, int) else status)
+    os._exit(_status if status == INTERRUPTED or not isinstance(status, int) else status)
 
 
 @contextmanager

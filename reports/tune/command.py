@@ -13,11 +13,10 @@ import pandas as pd
 from crosscheck2d.reports.run.arguments import opening, unknown
 from crosscheck2d.reports.run.cells import content_key, source_hash
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import DONE, keeping, refuse
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_table
 from crosscheck2d.reports.tune.search import (
     BETTER,
     BREAKS,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.commands.medians import medians, numbers_of_scenes
+from crosscheck2d.reports.commands.run import medians, numbers_of_scenes
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.page.scenes import SceneScores, scenes_of
 from crosscheck2d.scenarios.catalogue import scenario

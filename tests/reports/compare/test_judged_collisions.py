@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.commands.run import medians
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.metrics import METRICS
 from crosscheck2d.reports.compare.view import LEAST_SHARE, NOT_JUDGED, Value

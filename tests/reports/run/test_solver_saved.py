@@ -143,9 +143,7 @@ def test_what_a_file_has_kept_is_gone_in_the_next_cell_of_a_worker(
     started = Counter()
     begin = solver_process.SolverProcess.begin
     monkeypatch.setattr(
-        solver_process.SolverProcess,
-        "begin",
-        lambda self: (started.update([file]), begin(self)),
+        solver_process.SolverProcess, "begin", lambda self: (started.update([file]), begin(self))
     )
     (tmp_path / file).write_text(COUNTS[file])
     row = row_of_file(tmp_path / file)

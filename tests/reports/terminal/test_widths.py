@@ -16,11 +16,10 @@ from crosscheck2d.reports.commands.diff import Change
 from crosscheck2d.reports.stability.cases import CASES
 from crosscheck2d.reports.stability.command import print_limits
 from crosscheck2d.reports.stability.limits import LIMIT, NEVER_FAILS, NEVER_WORKS, Limit, Trial
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_list, print_table, print_texts
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import say
 from crosscheck2d.reports.terminal.progress import OneLine, Progress
-from crosscheck2d.reports.terminal.tables import print_list, print_table, print_texts
 from tests.reports.terminal.command_line import Done, crosscheck, on_terminal
 
 DATA = Path(__file__).parents[3] / "tests" / "data"
