@@ -135,7 +135,8 @@ def difference(before: Path, after: Path) -> Difference:
         tables = table_of(runs[0]), table_of(runs[1])
     cells = by_name(runs[0]), by_name(runs[1])
     both = cells[0].keys() & cells[1].keys()
-    same_machine = not differences_of_machine(*runs)
+    machines = [[run.header["machine"][key] for key in MACHINE] for run in runs]
+    same_machine = machines[0] == machines[1]
     edited = edited_scenes(*cells)
     # of these scene, settings and versions are the same
     alike = {name for name in both if cells[0][name]["cell"] == cells[1][name]["cell"]}
@@ -162,18 +163,14 @@ def difference(before: Path, after: Path) -> Difference:
     return Difference(warnings, statuses, numbers, same, len(both), timed)
 
 
-def differences_of_machine(before: RunResults, after: RunResults) -> list[str]:
-    was, now = before.header["machine"], after.header["machine"]
-    return [
-        f"differs in machine: {key}: {was[key]} before, {now[key]} after"
-        for key in MACHINE
-        if was[key] != now[key]
-    ]
-
-
 def warnings_of(before: RunResults, after: RunResults) -> list[str]:
     """What may differ beside the engines."""
-    warnings, was, now = differences_of_machine(before, after), before.header, after.header
+    was, now = before.header, after.header
+    warnings = [
+        f"differs in machine: {key}: {was['machine'][key]} before, {now['machine'][key]} after"
+        for key in MACHINE
+        if was["machine"][key] != now["machine"][key]
+    ]
     for name in sorted({*was["versions"], *now["versions"]}):
         versions = [header["versions"].get(name, "missing") for header in (was, now)]
         if versions[0] != versions[1]:

@@ -50,11 +50,6 @@ class Cell:
     engine: str
     substeps: int
 
-    @property
-    def names(self) -> tuple[str, str]:
-        name, profile = self.engine.split(":")
-        return name, profile
-
     def key(self, hash_of_scene: str, source: str) -> str:
         return content_key(hash_of_scene, self.engine, source, self.substeps)
 

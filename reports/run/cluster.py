@@ -11,7 +11,6 @@ from collections.abc import Collection, Hashable
 from concurrent.futures import CancelledError, Future
 from math import inf
 from queue import Empty, SimpleQueue
-from types import TracebackType
 from typing import Any
 
 from crosscheck2d.adapters.library_versions import how_to_add
@@ -34,17 +33,12 @@ class Cluster:
         self, scheduler: str, timeout: float, memory: int, alone: Collection[Hashable]
     ) -> None:
         self.client = connect(scheduler)
+        self.executor = self.client.get_executor(pure=False)
         self.limits, self.alone = (timeout, memory), alone
         self.under_way: dict[Future[Any], tuple[Any, bytes]] = {}
         self.done: SimpleQueue[Future[Any]] = SimpleQueue()
 
-    def __enter__(self) -> Cluster:
-        self.executor = self.client.get_executor(pure=False)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
         self.executor.shutdown(wait=False)  # with dask this cancels the remaining tasks
         self.client.close(timeout=1)
 

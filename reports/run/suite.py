@@ -241,7 +241,7 @@ def run_tasks(
     with ExitStack() as stack:
         far = None
         if means.scheduler:
-            far = stack.enter_context(Cluster(means.scheduler, *limits, alone))
+            far = stack.enter_context(closing(Cluster(means.scheduler, *limits, alone)))
             here = [task for task in missing if task.kind in HERE]
             urgent.extend((task, missing.pop(task)) for task in here)
         results = run_all(missing, means.workers, *limits, far, alone, urgent)
@@ -339,7 +339,8 @@ def store_cell(
             step, t = (samples - 1) * cell.substeps, scenario.times[samples - 1]
             reason += f"; last good state: step {step}, {t:g} s"
         dt = scenario.dt(cell.substeps)
-        run = Run(*cell.names, scenario.name, dt, result.status, reason)
+        engine, profile = cell.engine.split(":")
+        run = Run(engine, profile, scenario.name, dt, result.status, reason)
         file, outside = pack(trajectory) if trajectory else b"", result.outside
     else:
         run, samples, file, outside = result.run, result.samples, result.file, False
