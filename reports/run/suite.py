@@ -18,33 +18,11 @@ from crosscheck2d.adapters.conformance.conform import not_probed
 from crosscheck2d.adapters.engine_row import EngineRow
 from crosscheck2d.adapters.engines import told_apart
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.run.cells import (
-    CHECK_SOURCE,
-    Cell,
-    about,
-    content_key,
-    scene_hash,
-    source_hash,
-)
+from crosscheck2d.reports.run import cells, comparing, playing
+from crosscheck2d.reports.run.cells import Cell
 from crosscheck2d.reports.run.cluster import Cluster
-from crosscheck2d.reports.run.comparing import (
-    ANSWER,
-    COMPARED,
-    Record,
-    answer_key,
-    compare_task,
-    compute_answer,
-    store_answer,
-)
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, Record
 from crosscheck2d.reports.run.known_answers import KNOWN_ANSWERS, KNOWN_SCENE
-from crosscheck2d.reports.run.playing import (
-    CellResult,
-    conform_here,
-    from_trail,
-    pack,
-    play_here,
-    source_and_versions,
-)
 from crosscheck2d.reports.run.pool import TIMEOUT, Failure, run_all
 from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.scenes import SceneSource, open_scene, with_steps
@@ -143,23 +121,24 @@ def tasks_of(
     """Each task of a plan with the picklable function that carries it out; cells in reading
     order."""
     for name, row in plan.engines.items():
-        probes = RunTask("probes", content_key(name, row.source), name)
-        yield probes, partial(conform_here, name, row)
-    checker = source_hash(CHECK_SOURCE)
+        probes = RunTask("probes", cells.content_key(name, row.source), name)
+        yield probes, partial(playing.conform_here, name, row)
+    checker = cells.source_hash(cells.CHECK_SOURCE)
     for name, check in plan.checks.items():
-        key = content_key(name, plan.engines[name].source, checker)
+        key = cells.content_key(name, plan.engines[name].source, checker)
         yield RunTask("check", key, name), check
     if KNOWN_SCENE in plan.scenes:
         for known in KNOWN_ANSWERS:
-            yield RunTask("known_answer", content_key(repr(known)), known), known.reproduce
+            yield RunTask("known_answer", cells.content_key(repr(known)), known), known.reproduce
     for scene, scenario in scenarios.items():
         source, question = sources[scene], replace(scenario, truth=None)  # no answer for an engine
         for name in told_apart(plan.engines, scenario.scene):
             for cell in (Cell(scene, plan.seed, name, k) for k in scenario.substeps):
                 key = cell.key(source.digest, plan.engines[name].source)
                 task = RunTask("cell", key, cell)
-                yield task, partial(play_here, cell, plan.engines[name], question)
-        yield RunTask(ANSWER, answer_key(source), scene), partial(compute_answer, source)
+                yield task, partial(playing.play_here, cell, plan.engines[name], question)
+        answer = RunTask(ANSWER, comparing.answer_key(source), scene)
+        yield answer, partial(comparing.compute_answer, source)
 
 
 def header_of(
@@ -172,7 +151,7 @@ def header_of(
     for task in tasks:
         keys.setdefault(task.kind, []).append((task.key, task.name))
     made = {scene: source._asdict() for scene, source in sources.items()}
-    row = about(plan.command, plan.seed) | lists | values
+    row = cells.about(plan.command, plan.seed) | lists | values
     return row | {"tasks": keys, "sources": made, "folder": os.getcwd(), "timing": ""}
 
 
@@ -188,7 +167,7 @@ def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> 
             plan.seed,
             tuple(scenario.substeps),
             scene_text(scenario) if scene.endswith(".toml") else "",
-            scene_hash(scenario),
+            cells.scene_hash(scenario),
         )
         for scene, scenario in scenarios.items()
     }
@@ -202,8 +181,8 @@ def carry_out(plan: RunPlan, means: Means, store: Store, progress: Progress) -> 
     if before is not None and not done and not isnan(before.value["seconds"]):
         seconds = before.value["seconds"]  # of the command that played
     store.put("run", "plan", header | {"seconds": seconds})
-    cells = cells_to_time(RunResults.read(store), plan.engines)
-    take_timings(store, cells, plan.timings, means, progress)
+    timed = cells_to_time(RunResults.read(store), plan.engines)
+    take_timings(store, timed, plan.timings, means, progress)
 
 
 def run_tasks(
@@ -228,8 +207,8 @@ def run_tasks(
 
     def compare_if_whole(scene: str) -> None:
         if all(task.key in records for task in scenes[scene]):
-            cells = [records[task.key] for task in scenes[scene] if task.kind == "cell"]
-            key, compare = compare_task(store, sources[scene], cells)
+            rows = [records[task.key] for task in scenes[scene] if task.kind == "cell"]
+            key, compare = comparing.compare_task(store, sources[scene], rows)
             if store.get(COMPARED, key) is None:
                 urgent.append(((COMPARED, key), compare))
 
@@ -252,7 +231,7 @@ def run_tasks(
                 continue
             del waiting[task]
             if task.kind == ANSWER:
-                records[task.key] = store_answer(store, task.key, result, means.timeout)
+                records[task.key] = comparing.store_answer(store, task.key, result, means.timeout)
             elif task.kind == "cell":
                 records[task.key] = store_cell(
                     store, task, scenarios[task.name], result, means.timeout, progress
@@ -278,8 +257,11 @@ def usable_rows(store: Store, tasks: Iterable[RunTask], timeout: float) -> dict[
 
 def leaving_state(plan: RunPlan, tasks: Iterable[RunTask]) -> set[RunTask]:
     """The cells of engines that leave state in their process."""
-    cells = (task for task in tasks if task.kind == "cell")
-    return {task for task in cells if plan.engines[task.what.engine].leaves_state}
+    return {
+        task
+        for task in tasks
+        if task.kind == "cell" and plan.engines[task.what.engine].leaves_state
+    }
 
 
 def show_waiting(tasks: Collection[RunTask], progress: Progress) -> None:
@@ -325,7 +307,7 @@ def store_cell(
     store: Store,
     task: RunTask,
     scenario: Scenario,
-    result: CellResult | Failure,
+    result: playing.CellResult | Failure,
     timeout: float,
     progress: Progress,
 ) -> Record:
@@ -333,7 +315,7 @@ def store_cell(
     time. Returns the row with its key and digest."""
     cell: Cell = task.what
     if isinstance(result, Failure):
-        trajectory = from_trail(result.trail, scenario)
+        trajectory = playing.from_trail(result.trail, scenario)
         samples, reason = len(trajectory) if trajectory else 0, result.reason
         if samples:
             step, t = (samples - 1) * cell.substeps, scenario.times[samples - 1]
@@ -341,15 +323,15 @@ def store_cell(
         dt = scenario.dt(cell.substeps)
         engine, profile = cell.engine.split(":")
         run = Run(engine, profile, scenario.name, dt, result.status, reason)
-        file, outside = pack(trajectory) if trajectory else b"", result.outside
+        file, outside = playing.pack(trajectory) if trajectory else b"", result.outside
     else:
         run, samples, file, outside = result.run, result.samples, result.file, False
-        if result.played_by != source_and_versions():
+        if result.played_by != playing.source_and_versions():
             raise OtherVersions(
                 "a worker has other versions or other source of the engines than this machine"
             )
     value = {
-        "scene_hash": scene_hash(scenario),
+        "scene_hash": cells.scene_hash(scenario),
         "substeps": cell.substeps,
         "scenario": run.scenario,
         "engine": run.engine,
@@ -373,7 +355,7 @@ def store_cell(
 
 def take_timings(
     store: Store,
-    cells: Sequence[CellToTime],
+    timed: Sequence[CellToTime],
     seconds: float,
     means: Means,
     progress: Progress,
@@ -383,13 +365,13 @@ def take_timings(
     machine, and not `again`."""
     plan = store.get("run", "plan")
     assert plan is not None
-    machine, seed = about("", 0)["machine"], plan.value["seed"]
-    key = content_key(*sorted(cell.key for cell in cells), repr(machine), seed)
+    machine, seed = cells.about("", 0)["machine"], plan.value["seed"]
+    key = cells.content_key(*sorted(cell.key for cell in timed), repr(machine), seed)
     store.put("run", "plan", plan.value | {"timing": key, "timings": seconds})
-    if not cells or not seconds or (store.get("timing", key) and not again):
+    if not timed or not seconds or (store.get("timing", key) and not again):
         return
     progress.start(1, 1, f"timing, at most {seconds:g} s")
-    work: dict[Any, Callable[[], Any]] = {"timing": partial(time_cells, cells, seconds, seed)}
+    work: dict[Any, Callable[[], Any]] = {"timing": partial(time_cells, timed, seconds, seed)}
     with closing(run_all(work, 1, seconds + means.timeout, means.memory)) as results:
         for _, result in results:
             if isinstance(result, Failure):

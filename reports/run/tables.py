@@ -13,21 +13,9 @@ import pandas as pd
 
 from crosscheck2d.reports.compare.against import ITSELF
 from crosscheck2d.reports.compare.comparison import Comparison
+from crosscheck2d.reports.run import comparing
 from crosscheck2d.reports.run.cells import scene_hash
-from crosscheck2d.reports.run.comparing import (
-    ANSWER,
-    COMPARED,
-    PATHS,
-    CompareTask,
-    ExactAnswer,
-    answer_key,
-    compare_task,
-    compute_answer,
-    csv_of,
-    read_scene_table,
-    rows_not_judged,
-    store_answer,
-)
+from crosscheck2d.reports.run.comparing import ANSWER, COMPARED
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.results import RunResults
 from crosscheck2d.reports.run.store import FILE, is_usable
@@ -41,7 +29,7 @@ class ComparedScene(NamedTuple):
     """The exact answer to a scene; the key of its table, which is its part of deviations.csv; the
     table, or why it could not be made."""
 
-    answer: ExactAnswer
+    answer: comparing.ExactAnswer
     key: str
     table: bytes | Failure
 
@@ -86,7 +74,7 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
             unjudged[name] = answer.lost
         if isinstance(table, Failure):
             unjudged[name] = not_compared(table)
-            parts.append(csv_of(not_judged(results, scene, table).table))
+            parts.append(comparing.csv_of(not_judged(results, scene, table).table))
         else:
             keys[scene] = key
             parts.append(table)
@@ -109,7 +97,7 @@ def make_tables(results: RunResults, say: Callable[[str], None]) -> Tables:
 def joined(parts: Sequence[bytes]) -> bytes:
     """Scene tables as one table, whose header stands only once."""
     rows = [part.partition(b"\n")[2] if number else part for number, part in enumerate(parts)]
-    return encoded(b"".join(rows).decode(errors=PATHS))
+    return encoded(b"".join(rows).decode(errors=comparing.PATHS))
 
 
 def compare_scenes(results: RunResults, say: Callable[[str], None]) -> dict[str, ComparedScene]:
@@ -118,21 +106,21 @@ def compare_scenes(results: RunResults, say: Callable[[str], None]) -> dict[str,
     store, sources, cores = results.store, results.sources, os.cpu_count() or 1
     # As much time as the cells had: it is the same option.
     timeout = max(record["timeout_s"] for record in results.records)
-    answers: dict[Any, Callable[[], ExactAnswer]] = {}
+    answers: dict[Any, Callable[[], comparing.ExactAnswer]] = {}
     for scene in results.by_scene:
-        row = store.get(ANSWER, answer_key(sources[scene]))
+        row = store.get(ANSWER, comparing.answer_key(sources[scene]))
         if row is None or not is_usable(row, timeout):
-            answers[scene] = partial(compute_answer, sources[scene])
+            answers[scene] = partial(comparing.compute_answer, sources[scene])
     with closing(run_all(answers, cores, timeout)) as ended:
         for scene, result in ended:
             say(f"answered: {sources[scene].name}")
-            store_answer(store, answer_key(sources[scene]), result, timeout)
+            comparing.store_answer(store, comparing.answer_key(sources[scene]), result, timeout)
     tasks = {
-        scene: compare_task(store, sources[scene], records)
+        scene: comparing.compare_task(store, sources[scene], records)
         for scene, records in results.by_scene.items()
     }
     tables: dict[str, bytes | Failure] = {}
-    missing: dict[Any, CompareTask] = {}
+    missing: dict[Any, comparing.CompareTask] = {}
     for scene, (key, task) in tasks.items():
         if row := store.get(COMPARED, key):
             tables[scene] = row.blob
@@ -161,7 +149,7 @@ def not_judged(results: RunResults, scene: str, failure: Failure) -> Comparison:
     runs = [results.run(record) for record in results.by_scene[scene]]
     why = not_compared(failure)
     scenario = replace(results.sources[scene].scenario(), truth=None, without_truth=why)
-    return Comparison(scenario, None, runs, rows_not_judged(runs, why, ITSELF))
+    return Comparison(scenario, None, runs, comparing.rows_not_judged(runs, why, ITSELF))
 
 
 def comparisons_of(results: RunResults, tables: Tables) -> list[Comparison]:
@@ -177,7 +165,7 @@ def comparisons_of(results: RunResults, tables: Tables) -> list[Comparison]:
         scenario, truth = answered(scenario)
         middle = scenario.middle_substeps
         runs = [results.run(record, record["substeps"] == middle) for record in records]
-        table = read_scene_table(compared)
+        table = comparing.read_scene_table(compared)
         comparisons.append(Comparison(scenario, truth, runs, table))
     return comparisons
 

@@ -55,7 +55,15 @@ def print_table(
     beside = {gap: sum(widths[k] + gap for k in numbers) for gap in GAPS}
     gap = next((gap for gap in GAPS if widths[0] + beside[gap] <= console.width), GAPS[-1])
     names = min(widths[0], max(console.width // 2, console.width - beside[gap]))
-    for k, group in enumerate(groups(numbers, widths, gap, console.width - names)):
+    groups: list[list[int]] = [[]]
+    for column in numbers:
+        if (
+            groups[-1]
+            and names + sum(widths[k] + gap for k in (*groups[-1], column)) > console.width
+        ):
+            groups.append([])
+        groups[-1].append(column)
+    for k, group in enumerate(groups):
         table = Table(box=None, padding=(0, gap, 0, 0), pad_edge=False)
         table.add_column(headings[0], width=names, overflow="fold", vertical="top")
         for column in group:
@@ -75,16 +83,6 @@ def print_table(
 def width_of(cell: str | Text) -> int:
     text = cell.plain if isinstance(cell, Text) else legible(cell)
     return max(map(cell_len, text.split("\n")))
-
-
-def groups(columns: Iterable[int], widths: Sequence[int], gap: int, room: int) -> list[list[int]]:
-    """The columns in order, in groups that fit into the room; at least one in each."""
-    found: list[list[int]] = [[]]
-    for column in columns:
-        if found[-1] and sum(widths[k] + gap for k in (*found[-1], column)) > room:
-            found.append([])
-        found[-1].append(column)
-    return found
 
 
 def print_texts(console: Console, texts: Mapping[str, str | Text], title: str = "") -> None:

@@ -17,7 +17,7 @@ from crosscheck2d.reports.run.cells import JUDGE_SOURCE, ROOT, SOURCES
 from crosscheck2d.reports.run.comparing import ANSWER, COMPARED, CompareTask, store_answer
 from crosscheck2d.reports.run.pool import Failure
 from crosscheck2d.reports.run.results import COMMAND, RunResults
-from crosscheck2d.reports.run.store import Store, writing
+from crosscheck2d.reports.run.store import Store, reading, writing
 from crosscheck2d.reports.run.tables import comparisons_of, make_tables
 from crosscheck2d.scenarios.truth import cache
 from tests.reports.run.small_runs import make
@@ -26,8 +26,13 @@ SCENE = Path(__file__).parents[3] / "tests" / "data" / "scenes" / "two.toml"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = make(tmp_path_factory.mktemp("tables") / "out", SCENE)
+def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make(tmp_path_factory.mktemp("tables") / "out", SCENE)
+
+
+@pytest.fixture(scope="module")
+def folder(played: Path) -> Path:
+    folder = Path(shutil.copytree(played, played.parent / "tables"))
     with writing(folder, COMMAND) as store:
         make_tables(RunResults.read(store), silent)
     return folder
@@ -47,12 +52,9 @@ def deviations(store: Store) -> bytes:
     return (store.folder / "deviations.csv").read_bytes()
 
 
-def test_all_is_compared_while_it_is_played(store: Store, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(comparing, "compare_scene", None)
-    monkeypatch.setattr(comparing, "compute_answer", None)
-    made = make_tables(RunResults.read(store), silent)
-
-    assert len(made.scenes) == 2
+def test_all_is_compared_while_it_is_played(played: Path):
+    with reading(played, COMMAND) as store:
+        assert [len(store.rows.keys(kind)) for kind in (ANSWER, COMPARED)] == [2, 2]
 
 
 def test_what_is_kept_is_what_is_compared(store: Store):
@@ -171,6 +173,10 @@ def judge_source(root: Path) -> str:
     return cells.source_hash(JUDGE_SOURCE, root)
 
 
+def truth_source(root: Path) -> str:
+    return cache.source_hash(root / "scenarios" / "truth")
+
+
 def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_hashed():
     folder = ROOT / "reports" / "compare"
     imported = {
@@ -195,14 +201,8 @@ def test_all_that_the_comparison_imports_of_reports_is_in_the_folder_that_is_has
         ("reference_impl/ordered.py", engine_source),
         ("reports/compare/metrics.py", judge_source),
         ("scenarios/truth/oracle/events.py", judge_source),
-        (
-            "scenarios/truth/oracle/events.py",
-            lambda root: cache.source_hash(root / "scenarios" / "truth"),
-        ),
-        (
-            "scenarios/truth/horizon.py",
-            lambda root: cache.source_hash(root / "scenarios" / "truth"),
-        ),
+        ("scenarios/truth/oracle/events.py", truth_source),
+        ("scenarios/truth/horizon.py", truth_source),
     ],
 )
 def test_a_file_that_is_moved_into_a_folder_of_its_own_stays_in_the_hash(
