@@ -121,7 +121,8 @@ class Difference:
 
     @property
     def worse(self) -> int:
-        return sum(row.verdict == "worse" for row in (*self.statuses, *self.numbers, *self.timings))
+        verdicts = [change.verdict for change in (*self.statuses, *self.numbers)]
+        return [*verdicts, *(timing.verdict for timing in self.timings)].count("worse")
 
 
 def difference(before: Path, after: Path) -> Difference:
@@ -190,10 +191,11 @@ def warnings_on_cells(
     warnings = []
     for run, own, other in zip(runs, cells, reversed(cells)):
         if rest := [name for name in own if name not in other]:
-            kinds = (list(dict.fromkeys(name[k] for name in rest)) for k in (1, 0))
+            kinds = [dict.fromkeys(engine for _, engine, _ in rest)]
+            kinds.append(dict.fromkeys(scene for scene, _, _ in rest))
             engines, scenes = (
                 listed([*names[:6], *([f"{len(names) - 6} more"] if len(names) > 6 else [])])
-                for names in kinds
+                for names in map(list, kinds)
             )
             warnings.append(
                 f"only in {run.folder}: {counted(len(rest), 'cell')} of {engines}, in {scenes}"

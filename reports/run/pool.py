@@ -276,13 +276,13 @@ class Pool:
             ended = worker.process.exitcode is not None
             if ended or key in self.alone or worker.memory != self.memory:
                 self.close(worker)
-        worker = next((idle for idle in self.workers if idle.task is None), None)
-        if worker is None:
+        if all(worker.task is not None for worker in self.workers):
             try:
-                self.workers.append(worker := Worker(self.memory))
+                self.workers.append(Worker(self.memory))
             except OSError as fault:
                 refuse(f"no more processes can be started: {fault.strerror or fault}")
-        worker.begin(key, packed, self.timeout)
+        idle = next(worker for worker in self.workers if worker.task is None)
+        idle.begin(key, packed, self.timeout)
 
     def close(self, worker: Worker) -> None:
         worker.close()

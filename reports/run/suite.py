@@ -197,7 +197,9 @@ def run_tasks(
     """Carry out the tasks that have no usable row, and compare each scene when its answer and all
     its cells are there. Returns how many tasks had none, exact answers not counted."""
     records = usable_rows(store, tasks, means.timeout)
-    missing = {task: work for task, work in tasks.items() if task.key not in records}
+    missing: dict[Any, Callable[[], Any]] = {
+        task: work for task, work in tasks.items() if task.key not in records
+    }
     scenes: dict[str, list[RunTask]] = {}
     for task in (task for task in tasks if task.kind in ("cell", ANSWER)):
         scenes.setdefault(task.name, []).append(task)
@@ -224,11 +226,12 @@ def run_tasks(
             here = [task for task in missing if task.kind in HERE]
             urgent.extend((task, missing.pop(task)) for task in here)
         results = run_all(missing, means.workers, *limits, far, alone, urgent)
-        for task, result in stack.enter_context(closing(results)):
-            if task[0] == COMPARED:
+        for ended, result in stack.enter_context(closing(results)):
+            if ended[0] == COMPARED:
                 if not isinstance(result, Failure):  # else the report tries again
-                    store.put(*task, None, result)
+                    store.put(*ended, None, result)
                 continue
+            task = ended
             del waiting[task]
             if task.kind == ANSWER:
                 records[task.key] = comparing.store_answer(store, task.key, result, means.timeout)
