@@ -24,13 +24,13 @@ from crosscheck2d.reports.commands.diff import (
 )
 from crosscheck2d.reports.page.report import make_report
 from crosscheck2d.reports.run import suite
+from crosscheck2d.reports.run.comparing import csv_of
 from crosscheck2d.reports.run.results import COMMAND, RunResults
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.run.suite import Means, RunPlan, carry_out
 from crosscheck2d.reports.terminal.exits import Unusable
 from crosscheck2d.reports.terminal.progress import Progress
 from tests.reports.run.small_runs import read
-from tests.reports.run.stored import change_cells, change_plan, change_timings, put_table
 
 PLAN = RunPlan(
     ["slow_collision", "near_miss"],
@@ -58,6 +58,40 @@ def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def after(before: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(before, tmp_path / "after"))
+
+
+def change_plan(folder: Path, change: Callable[[dict], object]) -> None:
+    with writing(folder, COMMAND) as store:
+        plan = store.get("run", "plan").value
+        change(plan)
+        store.put("run", "plan", plan)
+
+
+def change_cells(folder: Path, change: Callable[[dict], object]) -> None:
+    with writing(folder, COMMAND) as store:
+        plan = store.get("run", "plan").value
+        for task in plan["tasks"]["cell"]:
+            row = store.get("cell", task[0])
+            value = row.value | {"cell": task[0]}
+            change(value)
+            task[0] = value.pop("cell")
+            store.put("cell", task[0], value, row.blob)
+        store.put("run", "plan", plan)
+
+
+def change_timings(folder: Path, change: Callable[[dict], object]) -> None:
+    with writing(folder, COMMAND) as store:
+        key = store.get("run", "plan").value["timing"]
+        timing = store.get("timing", key).value
+        for line in timing["lines"]:
+            change(line)
+        store.put("timing", key, timing)
+
+
+def put_table(table: pd.DataFrame, folder: Path) -> None:
+    with writing(folder, COMMAND) as store:
+        store.put("comparison", "changed", None, csv_of(table))
+        store.put("run", "comparisons", {"all": "changed"})
 
 
 def elsewhere(plan: dict) -> None:
