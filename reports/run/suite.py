@@ -203,8 +203,8 @@ def run_tasks(
     scenes: dict[str, list[RunTask]] = {}
     for task in (task for task in tasks if task.kind in ("cell", ANSWER)):
         scenes.setdefault(task.name, []).append(task)
-    total, to_do = (sum(task.kind != ANSWER for task in some) for some in (tasks, missing))
-    progress.start(to_do, total)
+    to_do = len([task for task in missing if task.kind != ANSWER])
+    progress.start(to_do, len(tasks) - len(scenes))  # answers are not counted
     urgent: deque[Any] = deque()
 
     def compare_if_whole(scene: str) -> None:
@@ -227,9 +227,10 @@ def run_tasks(
             urgent.extend((task, missing.pop(task)) for task in here)
         results = run_all(missing, means.workers, *limits, far, alone, urgent)
         for ended, result in stack.enter_context(closing(results)):
-            if ended[0] == COMPARED:
+            kind, key = ended[:2]
+            if kind == COMPARED:
                 if not isinstance(result, Failure):  # else the report tries again
-                    store.put(*ended, None, result)
+                    store.put(kind, key, None, result)
                 continue
             task = ended
             del waiting[task]
