@@ -27,10 +27,9 @@ from crosscheck2d.reports.stability.results import (
     read_results,
 )
 from crosscheck2d.reports.stability.tables import MAPS, TOUCHING, AtGap
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table, print_texts
 from crosscheck2d.reports.terminal.exits import DONE, FAILED, Unusable, keeping, refuse, say
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_table, print_texts
 from crosscheck2d.scenarios.files.scene_file import SceneFileError, read_scene_file
 
 SEE = (

@@ -19,12 +19,11 @@ from crosscheck2d.adapters.engines import ENGINES, FETCHED, OWN, parsed
 from crosscheck2d.adapters.npm_packages import version_of
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.page.replay import COLLISIONS, pack_layers, ratio_of
-from crosscheck2d.reports.run.cells import content_key, source_hash
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about, content_key, source_hash
 from crosscheck2d.reports.run.made import digest_of
+from crosscheck2d.reports.run.playing import STATE
 from crosscheck2d.reports.run.pool import Failure, run_all
 from crosscheck2d.reports.run.store import Store
-from crosscheck2d.reports.run.trajectories import STATE
 from crosscheck2d.reports.stability.cases import CASES, case_named
 from crosscheck2d.reports.stability.explain import explained, with_replays
 from crosscheck2d.reports.stability.limits import (

@@ -21,11 +21,10 @@ from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.adapters.matched import Searched
 from crosscheck2d.reports.run.arguments import opening, unknown
 from crosscheck2d.reports.run.cells import content_key, source_hash
-from crosscheck2d.reports.terminal.console import Console
+from crosscheck2d.reports.terminal.console import Console, print_table
 from crosscheck2d.reports.terminal.counts import counted
 from crosscheck2d.reports.terminal.exits import DONE, keeping, refuse
 from crosscheck2d.reports.terminal.progress import Progress
-from crosscheck2d.reports.terminal.tables import print_table
 from crosscheck2d.reports.tune.score import (
     FAILED,
     HARMS,

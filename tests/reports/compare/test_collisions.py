@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.commands.run import medians
 from crosscheck2d.reports.compare.collisions import closest_in_order, match
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.metrics import METRICS

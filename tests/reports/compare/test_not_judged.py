@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.run import Run
-from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.commands.diff import changed_numbers
+from crosscheck2d.reports.commands.run import medians
 from crosscheck2d.reports.compare.collisions import WINDOW
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.metrics import METRICS
@@ -19,7 +20,6 @@ from crosscheck2d.reports.page.findings import findings, nearest
 from crosscheck2d.reports.page.scenes import scenes_of, values
 from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.reports.run.comparing import read_scene_table
-from crosscheck2d.reports.run.diff import changed_numbers
 from crosscheck2d.scenarios.catalogue import scenario
 from crosscheck2d.scenarios.model import Scenario, Trajectory
 from tests.reports.compare.answers import beside_truth, run_engine, truth_of
@@ -176,10 +176,10 @@ def test_a_number_that_is_judged_in_one_run_only_is_neither_worse_nor_better(tmp
         each.table.to_csv(tmp_path / "share.csv", index=False)
         read_scene_table((tmp_path / "share.csv").read_bytes())
         tables.append(pd.read_csv(tmp_path / "share.csv", dtype=str, keep_default_na=False))
-    changes, _ = changed_numbers(*tables, set(), set())
-    back, _ = changed_numbers(*tables[::-1], set(), set())
+    changes, _ = changed_numbers(*tables, set())
+    back, _ = changed_numbers(*tables[::-1], set())
     tables[1].loc[tables[1].note.str.startswith(NOT_JUDGED), ["value", "note"]] = "1e9", ""
-    control, _ = changed_numbers(*tables, set(), set())
+    control, _ = changed_numbers(*tables, set())
 
     assert {change.verdict for change in (*changes, *back)} == {"other"}
     assert {change.after for change in changes} == {NOT_JUDGED}

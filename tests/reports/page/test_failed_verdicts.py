@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from crosscheck2d.adapters.engines import row_of
 from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.commands.medians import medians
+from crosscheck2d.reports.commands.run import medians
 from crosscheck2d.reports.compare.comparison import Comparison, compare
 from crosscheck2d.reports.compare.pareto import cost_to_reach
 from crosscheck2d.reports.compare.pooling import middle_half

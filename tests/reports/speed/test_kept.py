@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from crosscheck2d.adapters.engines import read_row
-from crosscheck2d.reports.run.machine import about
+from crosscheck2d.reports.run.cells import about
 from crosscheck2d.reports.run.store import writing
 from crosscheck2d.reports.speed import ladder, measure
 from crosscheck2d.reports.speed.command import SPEED, kept_of
