@@ -12,7 +12,7 @@ from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.adapters.run import Run
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.report import report_page
 from crosscheck2d.reports.page.summary import summarize
 from crosscheck2d.scenarios.catalogue import scenario
 

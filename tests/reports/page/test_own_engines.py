@@ -16,7 +16,7 @@ from crosscheck2d.adapters.conformance.probe import Departure
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.host.engine import TEMPLATES, row_of_file
 from crosscheck2d.adapters.host.process import processes_reused
-from crosscheck2d.reports.page.own_engines import WORDS, is_lawless, own_engine_sentences
+from crosscheck2d.reports.page.findings import WORDS, is_lawless, own_engine_sentences
 from tests.reports.terminal.command_line import crosscheck
 
 PROBES = (*LAWS, "order_and_shapes", "load_forgets", "static_stays", "pair_momentum")

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page
 from crosscheck2d.adapters.engines import ENGINES, FETCHED
 from crosscheck2d.reports.compare.comparison import Comparison
 from crosscheck2d.reports.page.replay import GRID
-from crosscheck2d.reports.page.report_page import report_page
+from crosscheck2d.reports.page.report import report_page
 from crosscheck2d.reports.page.summary import summarize
 from tests.reports.page.browsing import opened, overhang
 from tests.reports.page.small import ASTEROIDS, HEAD_ON, HOSTILE, ORBIT, PLAYED, write_small

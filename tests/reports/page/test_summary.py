@@ -11,7 +11,7 @@ import pytest
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.compare.comparison import Comparison, compare
-from crosscheck2d.reports.page.cost_points import RunTimes
+from crosscheck2d.reports.page.summary import RunTimes
 from crosscheck2d.reports.page.findings import ranked
 from crosscheck2d.reports.page.scene_map import map_section
 from crosscheck2d.reports.page.scenes import ANGLE, scenes_of
