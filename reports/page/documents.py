@@ -20,7 +20,7 @@ from crosscheck2d.reports.page import style
 from crosscheck2d.reports.terminal.foreign_text import encoded
 
 REPORTS = Path(__file__).parents[1]
-ENGINE = ("page/player.js", "page/player_canvas.js")  # the replay
+ENGINE = ("page/player.js",)  # the replay
 
 
 def render(

@@ -12,10 +12,10 @@ import pandas as pd
 from markupsafe import Markup
 
 from crosscheck2d.reports.page import style
-from crosscheck2d.reports.page.documents import deflated, environment, render
+from crosscheck2d.reports.page.documents import ENGINE, deflated, environment, render
 from crosscheck2d.reports.page.links import Neighbour
 
-SCRIPTS = ("page/player.js", "page/player_canvas.js", "page/panels.js", "page/kit.js")
+SCRIPTS = (*ENGINE, "page/kit.js")
 
 
 @dataclass(frozen=True)
@@ -125,12 +125,15 @@ class Playback:
         ratio: height over width of the view, `replay.ratio_of`.
         label: what it shows, in words.
         caption: a sentence below.
+        speeds, speed: those to choose from, and the first.
     """
 
     pack: str
     ratio: float = 0.5
     label: str = "Replay"
     caption: str = ""
+    speeds: Sequence[float] = (0.1, 0.25, 0.5, 1, 2, 4)
+    speed: float = 1
     kind: ClassVar[str] = "replay"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -65,22 +66,27 @@ def make_line(
 ) -> Line:
     """(cost, error) at each step size: the geometric mean of the timed scenes, the median of all
     scenes; a scene with fewer step sizes is left out where it has none."""
-    rows = []
+    costs: dict[int, list[float]] = {}  # number of the step size -> of each scene
+    errors: dict[int, list[float]] = {}
+    usual = Counter[int]()
     for scene in scenes:
         engine, scenario = stand_in(name, scene), scene.comparison.scenario
         for k, dt in enumerate(map(scenario.dt, scenario.substeps)):
             key = (scene.name, engine, rounded(dt))
-            cost = summary.times.get(key, np.nan) if summary.costs else 1 / dt
-            middle = dt == scene.comparison.middle_dt
-            rows.append((k, np.log(cost), scene.error(engine, dt), middle))
-    table = pd.DataFrame(rows, columns=["k", "cost", "error", "middle"])
-    costs = table[table.cost.notna()].groupby("k").cost
-    cost = costs.agg(lambda logarithms: np.exp(np.mean(logarithms.to_numpy())))
-    points = pd.concat([cost, table.groupby("k").error.median()], axis=1).sort_index().dropna()
-    middle = table.k[table.middle].mode()
-    filled = -1 if faint or middle.empty else int(middle[0])
-    error = points.error.where(points.error > 0)
-    return Line(name, points.cost, error, "" if faint else label(name), filled, faint)
+            costs.setdefault(k, []).append(
+                summary.times.get(key, np.nan) if summary.costs else 1 / dt
+            )
+            errors.setdefault(k, []).append(scene.error(engine, dt))
+            usual[k] += dt == scene.comparison.middle_dt
+    points = []
+    for k in sorted(costs):
+        cost, error = (np.array(values)[~np.isnan(values)] for values in (costs[k], errors[k]))
+        if len(cost) and len(error):
+            points.append((np.exp(np.mean(np.log(cost))), np.median(error) or np.nan))
+    x, y = zip(*points) if points else ((), ())
+    # of several numbers that are usual in as many scenes the smallest
+    filled = -1 if faint else max(sorted(usual), key=usual.__getitem__)
+    return Line(name, x, y, "" if faint else label(name), filled, faint)
 
 
 def cost_against_size(summary: Summary) -> Section | None:
