@@ -56,7 +56,6 @@ EVENTS = [  # frame, key, down: a turn, a thrust across it, a renewed thrust, bo
 
 
 def with_edges(names: Iterable[str]) -> list[str]:
-    """Those that play the field; an engine may refuse its edges."""
     found = []
     for name in names:
         with suppress(Unsupported), loaded(ENGINES[name], field_scenario().scene):
@@ -70,7 +69,6 @@ def flown(
     events: Iterable[tuple[int, str, bool]] = EVENTS,
     **field: float,
 ) -> Flight:
-    """A flight steered by `events` (frame, key, down)."""
     flight = Flight(field_scenario(**field), names)  # type: ignore[arg-type]
     for frame, key, down in events:
         flight.advance(frame - flight.frame)
@@ -80,7 +78,6 @@ def flown(
 
 
 def bits(flight: Flight) -> list[dict[str, bytes]]:
-    """The state of every engine."""
     return [
         {name: array.tobytes() for name, array in vars(flyer.state).items()}
         for flyer in flight.flyers
@@ -91,8 +88,6 @@ def bits(flight: Flight) -> list[dict[str, bytes]]:
     "name", ["reference:exercise", "pymunk:matched", "box2d:matched", "event_driven:float64"]
 )
 def test_keys_move_the_ship_as_the_exercise_says(name: str):
-    """Against x + v t + F t2 / 2m, thrusts of 0.25 m/s2 along the heading at the key event and
-    turns of 1 rad/s2."""
     flight = flown([name], 160, asteroids=0)
     scenario = flight.saved()
     truth = world_thrusts(scenario.scene, scenario.thrusts, scenario.times).at(-1)
@@ -112,8 +107,6 @@ def test_keys_move_the_ship_as_the_exercise_says(name: str):
 
 
 def test_a_thrust_keeps_its_direction_while_the_ship_turns():
-    """W aims once when it goes down, and anew when its event is repeated; the force's size is mass
-    times 0.25."""
     flight = flown(["reference:exercise"], 60, EVENTS[:4], asteroids=0)
     thrusts = [thrust for thrust in flight.saved().thrusts if thrust.force.any()]
     size = flight.scenario.scene.mass[SHIP] * 0.25
@@ -130,8 +123,8 @@ def test_a_thrust_keeps_its_direction_while_the_ship_turns():
 
 
 def test_releasing_either_key_of_a_pair_ends_the_thrust():
-    """As in the exercise: S takes over from W, and when S is released no force acts, though W is
-    still held."""
+    # As in the exercise: S takes over from W, and when S is released no force acts, though W is
+    # still held.
     flight = flown(
         ["reference:exercise"], 40, [(0, "w", True), (10, "s", True), (20, "s", False)], asteroids=0
     )
@@ -142,7 +135,6 @@ def test_releasing_either_key_of_a_pair_ends_the_thrust():
 
 
 def test_the_same_keys_give_the_same_flight():
-    """Bit for bit; another seed gives another."""
     one, two, other = (flown(list(ENGINES)[:3], 200, seed=seed) for seed in (3, 3, 4))
 
     assert bits(one) == bits(two)
@@ -151,8 +143,6 @@ def test_the_same_keys_give_the_same_flight():
 
 @pytest.mark.parametrize("substeps", [2, pytest.param(16, marks=pytest.mark.long)])
 def test_a_saved_flight_replays_to_the_same_bits(tmp_path: Path, substeps: int):
-    """Flown again, and played by `crosscheck run`'s own loop: every engine ends in the same
-    state."""
     names = with_edges(ENGINES)
     flight = flown(names, 150, substeps=substeps)
     path = tmp_path / "flight.toml"
@@ -190,7 +180,6 @@ def steered_home() -> list[tuple[int, str, bool]]:
 
 
 def test_a_scripted_flight_wins():
-    """Not on the way: only next to the earth, slow, and without spin."""
     events = steered_home()
     flight = flown(["reference:exercise"], events[-1][0] - 200, events[:-1], asteroids=0)
     on_the_way = flight.won
@@ -203,7 +192,7 @@ def test_a_scripted_flight_wins():
 
 
 def test_winning_is_the_exercises_rule_as_written():
-    """A squared distance below 0.5, so from 0.707 m on; spin may be as negative as it likes."""
+    # A squared distance below 0.5, so from 0.707 m on; spin may be as negative as it likes.
     flight = Flight(field_scenario(asteroids=0), ["reference:exercise"])
     state = flight.solid.state
     verdicts = []
@@ -222,7 +211,6 @@ def test_winning_is_the_exercises_rule_as_written():
 
 
 def test_a_ship_that_leaves_is_set_back_to_its_start():
-    """At rest, in each engine by itself; what is saved ends before, for a scene has no way back."""
     # Backwards: 1.5 m at 0.25 m/s2 take sqrt(12) s = 222 frames.
     flight = flown(
         ["reference:exercise", "box2d:matched"],
@@ -240,8 +228,6 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "pymunk:matched"])
 def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
-    """As in the exercise: the rest of the frame it is already under way again, thrusting from its
-    start and from rest."""
     flight = flown([name], 222, [(0, "s", True)], asteroids=0)
     while flight.left_at < 0:
         flight.advance()
@@ -267,8 +253,8 @@ def test_a_ship_is_set_back_in_the_step_in_which_it_leaves(name: str):
     ids=["two", "all"],
 )
 def test_looking_at_every_step_near_an_edge_changes_no_bit(names: Iterable[str]):
-    """The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
-    once a frame."""
+    # The ship turns round 0.1 m before the edge, where it is looked at step by step; `play` looks
+    # once a frame.
     keys = [(0, "s", True), (150, "s", False), (151, "w", True)]
     names = with_edges(names)
     flight = flown(names, 400, keys, seed=4, asteroids=8)
@@ -284,8 +270,8 @@ def test_looking_at_every_step_near_an_edge_changes_no_bit(names: Iterable[str])
 
 
 def test_the_marker_names_the_first_collision():
-    """pymunk as shipped has restitution 0.81 in a field of 0.9, so it diverges at the first
-    collision; the oracle names it."""
+    # pymunk as shipped has restitution 0.81 in a field of 0.9, so it diverges at the first
+    # collision; the oracle names it.
     flight = flown(["reference:exercise", "pymunk:shipped", "pymunk:matched"], 64, [])
     scenario = flight.saved()
     ghost, matched = flight.flyers[1:]
@@ -302,15 +288,12 @@ def test_the_marker_names_the_first_collision():
 
 
 def read_truth(scenario):  # type: ignore[no-untyped-def]
-    """The oracle's answer to a flight."""
     from crosscheck2d.scenarios.truth.exact import with_oracle
 
     return with_oracle(scenario).truth(scenario.times)
 
 
 class Failing:
-    """An engine that raises in its third frame."""
-
     def __init__(self, row: EngineRow) -> None:
         self.inner, self.frames = row.make(), 0
 
@@ -325,7 +308,6 @@ class Failing:
 
 
 def test_an_engine_that_fails_leaves_and_the_others_fly_on(monkeypatch: pytest.MonkeyPatch):
-    """With its reason; where it was the solid one, the next takes over."""
     row = ENGINES["pymunk:matched"]
     monkeypatch.setitem(
         ENGINES, "pymunk:matched", EngineRow(lambda: Failing(row), "fails", 0.0, 0.0)
@@ -362,7 +344,6 @@ def meeting(
     fails_at: int = 0,
     patience: float = 10.0,
 ) -> Flight:
-    """A flight of such files, which wait for each other so many s; the first fails."""
     barrier = Barrier(2, timeout=patience)
     for k, name in enumerate(names):
         make = partial(Meeting, barrier, 0 if k else fails_at)
@@ -371,8 +352,6 @@ def meeting(
 
 
 def test_files_fly_side_by_side_each_with_its_own_state(monkeypatch: pytest.MonkeyPatch):
-    """And in the order of their names: each has what it has alone. The control: a file that is
-    alone waits in vain."""
     flight = meeting(["a:own", "b:own"], monkeypatch)
     flight.key("w", True)
     flight.advance(20)
@@ -391,7 +370,6 @@ def test_files_fly_side_by_side_each_with_its_own_state(monkeypatch: pytest.Monk
 def test_a_file_that_raises_in_its_thread_leaves_and_the_others_fly_on(
     monkeypatch: pytest.MonkeyPatch,
 ):
-    """With its reason and the time, as an engine that flies in no thread."""
     flight = meeting(["a:own", "b:own"], monkeypatch, fails_at=3)
     flight.advance(3)
     left, other, _ = flight.flyers
@@ -401,7 +379,6 @@ def test_a_file_that_raises_in_its_thread_leaves_and_the_others_fly_on(
 
 
 def test_spin_is_part_of_the_energy():
-    """m v2 / 2 + I w2 / 2, and momentum m v, of all disks."""
     flight = Flight(field_scenario(), ["reference:exercise"])
     scene, reported = flight.scenario.scene, flight.measures(flight.solid)
     each = [
@@ -415,8 +392,6 @@ def test_spin_is_part_of_the_energy():
 
 
 def test_an_engine_leaves_by_the_flights_clock(monkeypatch: pytest.MonkeyPatch):
-    """What it says counts from when its ship was set back; the flight says when that was for who
-    looks on."""
     row = ENGINES["event_driven:float64"]
     monkeypatch.setitem(
         ENGINES, "event_driven:float64", replace(row, make=lambda: Accumulating(row))
@@ -449,8 +424,6 @@ class Accumulating(Failing):
 
 
 def test_ghosts_are_compared_after_the_ship_was_set_back():
-    """One that has stayed with the solid one so far diverges at a collision later on; the way back
-    itself is no divergence."""
     names = ["reference:exercise", "pymunk:matched", "box2d:matched"]
     flight = flown(names, 300, [(0, "s", True), (260, "s", False)], asteroids=0)
     together = [(flyer.set_backs, flyer.divergence) for flyer in flight.flyers]
@@ -469,7 +442,6 @@ def test_ghosts_are_compared_after_the_ship_was_set_back():
 
 
 def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
-    """Not at a collision of long ago, and not while the other is about to follow."""
     flight = flown(["reference:exercise", "pymunk:matched"], 200, [(0, "s", True)], asteroids=0)
     slow = flight.flyers[1]
     state = slow.engine.read()
@@ -489,8 +461,8 @@ def test_a_ship_that_leaves_in_one_engine_only_diverges_at_the_edge():
 
 
 def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
-    """As a solver with a wrong sign has it, whose disks stay in each other, and one of which then
-    strikes another; the place is that of the collision, not where the disks were thrown to."""
+    # As a solver with a wrong sign has it, whose disks stay in each other, and one of which then
+    # strikes another; the place is that of the collision, not where the disks were thrown to.
     scene = field_scenario().scene
     solid, ghost = Touches(scene, 1 / 1024, 0.0), Touches(scene, 1 / 1024, 0.0)
     before, thrown = scene.state, np.zeros((scene.n, 2))
@@ -515,7 +487,6 @@ def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
 
 
 def test_a_velocity_that_differs_without_a_collision_is_said_to():
-    """Not blamed on a collision of long ago: a ghost whose ship was slowed by hand."""
     names = ["reference:exercise", "pymunk:matched"]
     flight = flown(names, 40, [(0, "w", True), (20, "w", False)], asteroids=0)
     slow = flight.flyers[1]
@@ -530,8 +501,6 @@ def test_a_velocity_that_differs_without_a_collision_is_said_to():
 
 @pytest.mark.parametrize("name", ["reference:exercise", "event_driven:float64", "pymunk:matched"])
 def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
-    """In every engine alike, also in one that cannot begin with an overlap: an asteroid is over the
-    start when the ship leaves."""
     scenario = field_scenario(asteroids=1)
     scene = replace(
         scenario.scene,
@@ -550,7 +519,6 @@ def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
 
 
 def test_a_ship_whose_start_is_free_goes_there():
-    """And to the start, too, where no place is free."""
     scene = field_scenario(asteroids=1).scene
     crowd = replace(scene, radius=np.array([scene.radius[0], 20.0]))
 
@@ -559,8 +527,6 @@ def test_a_ship_whose_start_is_free_goes_there():
 
 
 def test_collisions_are_counted_as_a_run_counts_them():
-    """One by one, where a run looks at all of them: of the flight's own engines, and of a solver
-    whose pair collides in every step."""
     flight = flown(["reference:exercise", "pymunk:matched", "event_driven:float64"], 380)
     every = [ContactImpulse(k, 1, 2, 1e-3) for k in range(100)]
     counted = Touches(flight.scenario.scene, flight.dt, 2e-3)

@@ -50,7 +50,6 @@ FOREVER = "while (true) {}"
 
 
 def solver(folder: Path, more: str = "") -> Path:
-    """A solver's file that is right but for `more` at its end."""
     path = folder / "Exercise.js"
     path.write_text(SOLVER.read_text() + more)
     return path
@@ -58,8 +57,6 @@ def solver(folder: Path, more: str = "") -> Path:
 
 @contextmanager
 def page_of(browser: Browser, path: Path) -> Iterator[Page]:
-    """The game, paused at its first frame, with this solver solid and the reference as its
-    ghost."""
     rows, _ = own_rows([f"{path}:own"])
     ENGINES.update(rows)
     with served(application(Game([*rows, "reference:exercise"]))) as url:
@@ -74,7 +71,6 @@ def page_of(browser: Browser, path: Path) -> Iterator[Page]:
 
 @pytest.mark.slow
 def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: Path):
-    """Under its file's name, the ship under thrust in both."""
     with page_of(browser, solver(tmp_path)) as page:
         page.keyboard.down("w")
         fly(page, 20)
@@ -103,9 +99,6 @@ def test_a_right_solver_flies_as_the_reference_does(browser: Browser, tmp_path: 
 def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
     browser: Browser, tmp_path: Path, act: str, reason: str
 ):
-    """Whether it throws or hangs: the page says so in the field and in its row, and the ghost
-    becomes solid, which the page says, too; a ring shows where its ship was. It is solid again in a
-    new flight."""
     path = solver(tmp_path, AFTER.format(calls=3000, act=act))
     with page_of(browser, path) as page:
         began = monotonic()
@@ -138,7 +131,6 @@ def test_a_solver_that_dies_in_flight_leaves_and_the_others_fly_on(
 
 @pytest.mark.slow
 def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path):
-    """While an answer takes longer than a second; then why."""
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
     with page_of(browser, path) as page:
         page.evaluate("game.ask(4)")
@@ -163,7 +155,6 @@ def test_the_page_says_that_it_waits(browser: Browser, tmp_path: Path):
 def test_a_file_that_cannot_fly_is_reported_before_anything_is_served(
     text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """One line that names the file, exit 2."""
     (tmp_path / "Exercise.js").write_text(text)
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     done = crosscheck("play", "--engine", "Exercise.js", "--engine", "reference", cwd=tmp_path)
@@ -185,7 +176,6 @@ def test_a_file_that_cannot_fly_is_reported_before_anything_is_served(
 def test_a_file_that_fails_in_its_first_step_starts_and_leaves(
     tmp_path: Path, act: str, reason: str
 ):
-    """So that the page says what `check` says of it; the right solver beside it flies on."""
     path = solver(tmp_path, AFTER.format(calls=0, act=act))
     rows, _ = own_rows([f"{path}:own"])
     ENGINES.update(rows)
@@ -200,7 +190,6 @@ def test_a_file_that_fails_in_its_first_step_starts_and_leaves(
 
 
 def test_every_file_that_cannot_fly_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A line each; the good one is not named, and none of them is left among the engines."""
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     shutil.copy(SOLVER, tmp_path / "good.js")
     (tmp_path / "a.js").write_text("\0")
@@ -217,7 +206,6 @@ def test_every_file_that_cannot_fly_is_reported(tmp_path: Path, monkeypatch: pyt
 def test_a_solver_that_hangs_keeps_no_other_tab_waiting(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """The engines of each tab work in a thread of their own."""
     path = solver(tmp_path, AFTER.format(calls=400, act=FOREVER))
     for name, row in own_rows([f"{path}:own"])[0].items():
         monkeypatch.setitem(ENGINES, name, row)
@@ -244,8 +232,6 @@ def test_a_solver_that_hangs_keeps_no_other_tab_waiting(
 
 @pytest.mark.slow  # its check hangs, too, and is waited for
 def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
-    """As soon as the patience with it is at its end: exit 0, and nothing but where it was and that
-    it has stopped. It hangs in flight, after its check."""
     solver(tmp_path, AFTER.format(calls=3000, act=FOREVER))
     words = [CROSSCHECK, "play", "--port", "8300", "--engine", "Exercise.js"]
     with subprocess.Popen(
@@ -273,8 +259,6 @@ def test_ctrl_c_while_a_solver_hangs_stops_it_cleanly(tmp_path: Path):
 
 @pytest.mark.slow
 def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path):
-    """Spaces, umlauts, quotes, brackets: the solver flies, and can be left out and made solid
-    again."""
     folder = tmp_path / 'Übung "zwei" <b>]'
     folder.mkdir()
     with page_of(browser, solver(folder)) as page:
@@ -301,7 +285,6 @@ def test_any_name_of_a_folder_will_do(browser: Browser, tmp_path: Path):
 def test_what_is_asked_wrongly_is_reported(
     words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    """One line, exit 2, before anything is served: not a page that cannot begin."""
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it was served"))
     solver(tmp_path)
     for k in range(17):
@@ -314,8 +297,6 @@ def test_what_is_asked_wrongly_is_reported(
 
 @pytest.mark.slow
 def test_a_faulty_solver_is_the_solid_ship_and_named(browser: Browser, tmp_path: Path):
-    """Played as it is; the field has its name, the page what `check` says of it, and the table is
-    on the first screen at 1280 x 900 with two files."""
     [faulty] = [mutant for mutant in MUTANTS if mutant.name == "normal_long.js"]
     files = [faulty.write(tmp_path), solver(tmp_path)]
     game = game_of(None, ["pymunk:shipped", "box2d:shipped", *map(str, files)])
@@ -346,7 +327,6 @@ def test_a_faulty_solver_is_the_solid_ship_and_named(browser: Browser, tmp_path:
 
 
 def test_files_of_one_name_are_told_apart():
-    """By as much of their path as that takes; engines keep their names."""
     names = ["/a/anna/Exercise.js:own", "/a/ben/Exercise.js:own", "/a/solver.py:own", "x:matched"]
 
     assert list(labels(names).values()) == [
@@ -358,7 +338,6 @@ def test_files_of_one_name_are_told_apart():
 
 
 def test_the_field_begins_with_the_restitution_of_the_file(tmp_path: Path):
-    """So that a file written for 0.5 flies; the exact answer and a right solver fly beside it."""
     path = solver(tmp_path)
     path.write_text(path.read_text().replace("restitution = 0.9", "restitution = 0.5"))
     game = game_of(None, [str(path)])
@@ -376,8 +355,8 @@ def test_the_field_begins_with_the_restitution_of_the_file(tmp_path: Path):
 def test_a_frame_under_thrust_is_one_exchange_with_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, collected: bool, exchanges: int
 ):
-    """Each goes through four threads of two processes: 17 of them, one a step and one to look, are
-    what slowed two files to two thirds of the clock."""
+    # Each goes through four threads of two processes: 17 of them, one a step and one to look, are
+    # what slowed two files to two thirds of the clock.
     count = Counter[str]()
 
     def counted(self: SolverProcess, *arguments: Any) -> Any:
@@ -398,9 +377,6 @@ def test_a_frame_under_thrust_is_one_exchange_with_the_file(
 
 @pytest.mark.long
 def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Path):
-    """In Chromium, under thrust: what engines and picture take fits into a frame, by the least of
-    many, as everything else on the machine adds to it. `python -m tests.bench.game` prints the
-    pace."""
     (tmp_path / "anna").mkdir()
     files = [str(solver(tmp_path)), str(solver(tmp_path / "anna"))]
     times, _, _ = measure(browser, 6.0, [*files, "reference:exercise", "pymunk:shipped"])
@@ -410,8 +386,6 @@ def test_two_files_and_two_engines_keep_the_clock(browser: Browser, tmp_path: Pa
 
 
 def test_an_engine_in_a_file_flies(tmp_path: Path):
-    """As the reference does, to rounding, under thrust, over the edges as `coulomb`; one that does
-    not model what the game has is refused with its name and what it lacks."""
     text = TEMPLATES["javascript"].read_text()
     path, ball = tmp_path / "mine.js", tmp_path / "ball.js"
     path.write_text(text)

@@ -32,8 +32,6 @@ FRAME = json.dumps({"do": "frames", "count": 1})
 
 
 class Served:
-    """A server in a thread of its own, on a free port."""
-
     def __init__(self) -> None:
         self.game = Game(FLOWN)
         listening = taken_socket(0)
@@ -46,12 +44,10 @@ class Served:
         self.thread.start()
 
     def open(self, origin: str | None = "", **options: object) -> ClientConnection:
-        """A tab; `origin` "": the server's own page."""
         origin = self.origin if origin == "" else origin
         return connect(f"ws://localhost:{self.port}/fly", origin=origin, **options)  # type: ignore[arg-type]
 
     def get(self, path: str, host: str) -> tuple[int, str]:
-        """Status and text of a page asked for under the name `host`."""
         asked = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10)
         asked.request("GET", path, headers={"Host": host})
         answer = asked.getresponse()
@@ -60,7 +56,6 @@ class Served:
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    """One server for all tests here."""
     served = Served()
     yield served
     served.server.should_exit = True
@@ -68,12 +63,10 @@ def served() -> Iterator[Served]:
 
 
 def hear(tab: ClientConnection) -> dict:
-    """The next answer."""
     return json.loads(tab.recv(timeout=10))
 
 
 def flood(tab: ClientConnection, text: str, count: int) -> None:
-    """Send `text` so often, then listen until the tab is closed."""
     for _ in range(count):
         tab.send(text)
     while True:
@@ -81,7 +74,6 @@ def flood(tab: ClientConnection, text: str, count: int) -> None:
 
 
 def still_flies(served: Served) -> bool:
-    """Whether a new tab gets its field and a frame."""
     with served.open() as tab:
         first = hear(tab)
         tab.send(FRAME)
@@ -89,7 +81,6 @@ def still_flies(served: Served) -> bool:
 
 
 def no_tabs(served: Served) -> bool:
-    """Whether all flights are given back, now or within a second."""
     for _ in range(100):
         if served.game.tabs == 0:
             return True
@@ -112,7 +103,6 @@ def no_tabs(served: Served) -> bool:
     ],
 )
 def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | None):
-    """403 before a flight is made; the same tab from its own origin is let in."""
     with (
         pytest.raises(InvalidStatus) as refusal,
         served.open(origin and origin.format(port=served.port)),
@@ -124,13 +114,11 @@ def test_pages_of_other_origins_cannot_drive_it(served: Served, origin: str | No
 
 
 def test_the_page_is_given_under_this_machines_names_only(served: Served):
-    """A name that somebody else's DNS points here gets nothing."""
     assert served.get("/", f"localhost:{served.port}")[0] == 200
     assert served.get("/", "evil.example")[0] == 400
 
 
 def test_malformed_messages_are_answered_and_then_cut_off(served: Served):
-    """Each with a sentence; the flight goes on; after too many the tab is closed."""
     with served.open() as tab:
         hear(tab)
         for text in ("{", '{"do": "jump"}', b"\xff\x00", '{"do": "frames", "count": 1e9}'):
@@ -145,7 +133,6 @@ def test_malformed_messages_are_answered_and_then_cut_off(served: Served):
 
 
 def test_a_large_message_closes_its_tab_only(served: Served):
-    """1009, message too big."""
     with served.open() as tab, served.open() as other:
         hear(tab), hear(other)
         with pytest.raises(ConnectionClosed) as closed:
@@ -158,7 +145,6 @@ def test_a_large_message_closes_its_tab_only(served: Served):
 
 
 def test_a_flood_closes_its_tab_only(served: Served):
-    """More messages a second than a page sends."""
     with served.open() as tab:
         hear(tab)
         with pytest.raises(ConnectionClosed, match=f"{MOST_A_SECOND} messages a second"):
@@ -168,7 +154,6 @@ def test_a_flood_closes_its_tab_only(served: Served):
 
 
 def test_a_tab_that_does_not_read_holds_nobody_up(served: Served):
-    """It asks for frames and takes none."""
     with served.open(max_queue=1, close_timeout=0.1) as slow:
         for _ in range(100):
             slow.send(FRAME)
@@ -176,8 +161,6 @@ def test_a_tab_that_does_not_read_holds_nobody_up(served: Served):
 
 
 def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
-    """Each counts its own frames; a tab whose connection is cut is closed, too; one too many is
-    reported."""
     assert no_tabs(served)
     with ExitStack() as stack:
         tabs = [stack.enter_context(served.open()) for _ in range(10)]
@@ -199,8 +182,8 @@ def test_ten_tabs_fly_their_own_flights_and_give_them_back(served: Served):
 
 
 def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: pytest.MonkeyPatch):
-    """Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or
-    after, not within."""
+    # Box2D 3.1 has one unit of length for all its worlds: another tab's world is made before or
+    # after, not within.
     alone = flown(["box2d_v3:shipped"], 100)
     other, options, tabs = ENGINES["box2d_v3:matched"].make(), Box2DV3._options, []
 
@@ -223,8 +206,6 @@ def test_a_flight_is_the_same_whatever_another_tab_does_meanwhile(monkeypatch: p
 
 @pytest.mark.slow
 def test_ctrl_c_stops_it_cleanly_and_a_taken_port_is_reported(served: Served, tmp_path: Path):
-    """Exit 0, no traceback, with a tab open; where the port is taken the next free one is used and
-    named."""
     program = Path(sys.executable).parent / "crosscheck"
     arguments = [program, "play", "--port", str(served.port), "--engine", "reference"]
     with subprocess.Popen(
@@ -259,7 +240,6 @@ def test_bad_input_is_reported_and_nothing_is_served(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ):
-    """A line a fault, exit 2."""
     top = 'name = "a"\nduration = 1.0\nsample_interval = 0.5\nrestitution = {}\n'
     disk = "[[disk]]\nposition = [{}, 0.0]\nvelocity = [0.0, 0.0]\nradius = 0.1\nmass = 1.0\n"
     (tmp_path / "bad.toml").write_text(top.format(2.0) + disk.format(0.0))
@@ -276,8 +256,6 @@ def test_bad_input_is_reported_and_nothing_is_served(
 def test_a_port_that_nobody_may_have_is_not_called_taken(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """As 80, unless one is an administrator; another is not tried in its place."""
-
     class Kept(socket.socket):
         def bind(self, _: object) -> None:
             raise PermissionError(13, "Permission denied")
@@ -293,7 +271,6 @@ def test_a_port_that_nobody_may_have_is_not_called_taken(
 def test_a_missing_browser_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    """By --open on a machine without one; it is served all the same."""
     served_on: list[int] = []
     monkeypatch.setattr("webbrowser.open", lambda _: False)
     monkeypatch.setattr(

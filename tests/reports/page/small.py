@@ -42,7 +42,6 @@ def played(name: str, **changes: Any) -> Comparison:
 
 
 def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
-    """Write their page to `path`; `more` goes to `report_page`."""
     probe = {
         "engine": "pymunk",
         "profile": "matched",
@@ -75,7 +74,7 @@ def write_small(path: Path, comparisons: list[Comparison], **more: Any) -> None:
         path,
         summarize(comparisons),
         conformance=conformance,
-        known_answers=pd.DataFrame([known]),
+        known_answers=[known],
         about=about,
         **{"first": ["One.", HOSTILE, "Three."], **more},
     )
