@@ -29,11 +29,16 @@ from crosscheck2d.reports.game.divergence import (
     FirstCollision,
     Touches,
     cause_of,
-    contact,
     differing_since,
 )
-from crosscheck2d.reports.game.flight import EARTH, FRAME, Flight, field_scenario, free_place
-from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.reports.game.flight import (
+    EARTH,
+    FRAME,
+    SHIP,
+    Flight,
+    field_scenario,
+    free_place,
+)
 from crosscheck2d.scenarios.families.exercise import SHIP as START
 from crosscheck2d.scenarios.files.scene_file import read_scene_file, scene_text
 from crosscheck2d.scenarios.model import Scene
@@ -188,7 +193,6 @@ def test_a_scripted_flight_wins():
 
     assert not on_the_way
     assert flight.won
-    assert flight.frame - flight.won_at < 200
 
 
 def test_winning_is_the_exercises_rule_as_written():
@@ -219,7 +223,7 @@ def test_a_ship_that_leaves_is_set_back_to_its_start():
         asteroids=0,
     )
 
-    assert [flyer.set_backs for flyer in flight.flyers] == [1, 1]
+    assert [len(flyer.edges) for flyer in flight.flyers] == [1, 1]
     assert 220 <= flight.left_at <= 223
     assert flight.solid.state.position[SHIP, 0] == pytest.approx(START[0], abs=0.05)
     assert flight.saved().duration == flight.left_at * FRAME
@@ -401,7 +405,7 @@ def test_an_engine_leaves_by_the_flights_clock(monkeypatch: pytest.MonkeyPatch):
     left = flight.flyers[1]
     frame = round(left.left_at / FRAME)
 
-    assert left.set_backs == 1
+    assert len(left.edges) == 1
     assert 222 < frame < 240
     assert left.left == f"they accumulate at {left.touches.since + Accumulating.AT:.4g} s"
     assert left.left_at - FRAME <= left.touches.since + Accumulating.AT <= left.left_at + FRAME
@@ -426,7 +430,7 @@ class Accumulating(Failing):
 def test_ghosts_are_compared_after_the_ship_was_set_back():
     names = ["reference:exercise", "pymunk:matched", "box2d:matched"]
     flight = flown(names, 300, [(0, "s", True), (260, "s", False)], asteroids=0)
-    together = [(flyer.set_backs, flyer.divergence) for flyer in flight.flyers]
+    together = [(len(flyer.edges), flyer.divergence) for flyer in flight.flyers]
     struck = flight.flyers[1]
     state = struck.engine.read()
     state.velocity[SHIP] += 0.5
@@ -480,9 +484,9 @@ def test_the_first_wrong_collision_is_named_though_the_pair_goes_on_colliding():
     at, in_solid, in_ghost = found[WAIT - 1]  # type: ignore[misc]
 
     assert (at.frame, at.i, at.j) == (10, 3, 4)
-    assert (at.x, at.y) == pytest.approx(
-        contact(before.position + before.velocity / 1024, scene.radius, 3, 4)
-    )
+    three, four = (before.position + before.velocity / 1024)[3:5]
+    share = scene.radius[3] / scene.radius[3:5].sum()
+    assert (at.x, at.y) == pytest.approx(tuple(three + share * (four - three)))
     assert (in_solid, in_ghost) == (True, True)
 
 
@@ -513,7 +517,7 @@ def test_a_ship_whose_start_is_taken_is_set_back_beside_it(name: str):
     flyer = flight.solid
     ship, rock = flyer.state.position
 
-    assert (flyer.left, flyer.set_backs, flyer.beside) == ("", 1, True)
+    assert (flyer.left, len(flyer.edges), flyer.beside) == ("", 1, True)
     assert np.hypot(*(ship - rock)) >= scene.radius.sum()
     assert np.hypot(*(ship - START)) < 2 * scene.radius.sum()
 

@@ -17,8 +17,7 @@ from playwright.sync_api import Browser, Page
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
 from crosscheck2d.reports.commands.serve import application
-from crosscheck2d.reports.game.flight import FRAME
-from crosscheck2d.reports.game.pilot import SHIP
+from crosscheck2d.reports.game.flight import FRAME, SHIP
 from crosscheck2d.reports.game.server import Game
 from crosscheck2d.scenarios.files.scene_file import read_scene_file
 from crosscheck2d.scenarios.truth.closed_forms import world_thrusts

@@ -9,9 +9,8 @@ import pytest
 
 from crosscheck2d.adapters.engines import ENGINES
 from crosscheck2d.adapters.play import play
-from crosscheck2d.reports.game.messages import read_message
-from crosscheck2d.reports.game.pilot import SHIP
-from crosscheck2d.reports.game.session import Session
+from crosscheck2d.reports.game.flight import SHIP
+from crosscheck2d.reports.game.session import Session, read_message
 from crosscheck2d.scenarios.catalogue import SCENARIOS
 from crosscheck2d.scenarios.families.placing import lay_out
 from crosscheck2d.scenarios.model import Scenario
